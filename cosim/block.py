@@ -1,0 +1,222 @@
+"""What a plant or a controller is, and what its declarations say: names, types, units, shapes, starts, ranges.
+
+A block is a plain class with three dataclasses of declared fields (`Params`, `Inputs`, `Outputs`); they are found by
+the annotations of `__init__` and `step`. Everything that is told of a variable elsewhere comes from `describe`.
+"""
+
+import dataclasses
+import enum
+import functools
+import inspect
+import typing
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from cosim.ports import Declaration, Raster, Shape
+from cosim.units import ONE, Unit
+
+
+class Block(Protocol):
+    """A plant or a controller with declared ports, advanced in steps.
+
+    Class attributes: `feedthrough` names, by output, the inputs that act on it at once (within the same communication
+    point); `period` is the sampling period of a block that is sampled, in seconds, else None.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]]
+    period: ClassVar[Fraction | None]
+
+    def __init__(self, params: Any) -> None: ...
+    def outputs(self, t: float, u: Any) -> Any:
+        """Return the outputs at the start; no time passes."""
+        ...
+
+    def step(self, t: float, dt: float, u: Any) -> Any:
+        """Advance from t by dt with u held and return the outputs at t + dt."""
+        ...
+
+    def get_state(self) -> bytes:
+        """Return the complete state: what follows `set_state` is the same, bit for bit."""
+        ...
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state that `get_state` gave."""
+        ...
+
+
+class Kind(enum.Enum):
+    """Kind of a variable."""
+
+    REAL = "real"
+    INTEGER = "integer"
+    BOOLEAN = "boolean"
+    ENUMERATION = "enumeration"
+    STRING = "string"
+    BINARY = "binary"
+
+
+class Causality(enum.Enum):
+    """Role of a variable."""
+
+    PARAMETER = "parameter"
+    INPUT = "input"
+    OUTPUT = "output"
+
+
+class DeclarationError(TypeError):
+    """A block's field is not declared as a parameter or a port, or is of a type that no port has."""
+
+    def __init__(self, owner: str, field: str, fault: str) -> None:
+        super().__init__(f"{owner}.{field}: {fault}")
+        self.owner, self.field, self.fault = owner, field, fault
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Variable:
+    """All that a block says of one of its parameters, inputs or outputs."""
+
+    name: str
+    kind: Kind
+    causality: Causality
+    description: str
+    start: Any
+    shape: tuple[int, ...] = ()
+    unit: Unit = ONE
+    minimum: float | None = None
+    maximum: float | None = None
+    enumeration: type[enum.IntEnum] | None = None
+    raster: Raster | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of entries; 1 for a scalar."""
+        return int(np.prod(self.shape, dtype=int))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Description:
+    """What a block class declares."""
+
+    name: str
+    doc: str
+    params_type: type[Any]
+    inputs_type: type[Any]
+    outputs_type: type[Any]
+    parameters: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    feedthrough: Mapping[str, tuple[str, ...]]
+    period: Fraction | None
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Parameters, inputs and outputs, in the order of their declaration."""
+        return self.parameters + self.inputs + self.outputs
+
+
+@functools.cache
+def describe(block: type[Any]) -> Description:
+    """Read a block class's declarations.
+
+    Raises:
+        DeclarationError: a field has no `parameter`, `port` or `output` declaration, or a type that is no port's.
+    """
+    params_type = _annotation(block, "__init__", "params")
+    inputs_type = _annotation(block, "step", "u")
+    outputs_type = _annotation(block, "step", "return")
+    inputs = _variables(inputs_type, Causality.INPUT)
+    outputs = _variables(outputs_type, Causality.OUTPUT)
+    feedthrough: Mapping[str, tuple[str, ...]] = block.feedthrough
+    for y, us in feedthrough.items():
+        for name, known in [(y, outputs)] + [(u, inputs) for u in us]:
+            if name not in [v.name for v in known]:
+                raise DeclarationError(block.__name__, "feedthrough", f"no such port: {name!r}")
+    return Description(
+        name=block.__name__,
+        doc=inspect.getdoc(block) or "",
+        params_type=params_type,
+        inputs_type=inputs_type,
+        outputs_type=outputs_type,
+        parameters=_variables(params_type, Causality.PARAMETER),
+        inputs=inputs,
+        outputs=outputs,
+        feedthrough=feedthrough,
+        period=block.period,
+    )
+
+
+def _annotation(block: type[Any], method: str, name: str) -> type[Any]:
+    hints = typing.get_type_hints(getattr(block, method))
+    found = hints.get(name)
+    if found is None or not dataclasses.is_dataclass(found):
+        raise DeclarationError(
+            block.__name__, method, f"{name!r} must be annotated with a dataclass of declared fields"
+        )
+    return typing.cast("type[Any]", found)
+
+
+def _variables(owner: type[Any], causality: Causality) -> tuple[Variable, ...]:
+    hints = typing.get_type_hints(owner, include_extras=True)
+    return tuple(_variable(owner.__name__, f, hints[f.name], causality) for f in dataclasses.fields(owner))
+
+
+def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality: Causality) -> Variable:
+    declaration = field.metadata.get("declaration")
+    if not isinstance(declaration, Declaration):
+        raise DeclarationError(owner, field.name, "declare it with parameter(...), port(...) or output(...)")
+    kind, facts = _facts(owner, field.name, hint)
+    made = Variable(
+        name=field.name,
+        kind=kind,
+        causality=causality,
+        description=declaration.description,
+        start=declaration.start,
+        minimum=declaration.minimum,
+        maximum=declaration.maximum,
+        **facts,
+    )
+    return dataclasses.replace(made, start=_start(made))
+
+
+def _facts(owner: str, name: str, hint: Any) -> tuple[Kind, dict[str, Any]]:
+    alias = typing.get_origin(hint)
+    if hasattr(alias, "__value__"):  # Vector3[Metre]: the alias carries the shape, its argument the unit
+        _, facts = _facts(owner, name, alias.__value__)
+        (entry,) = typing.get_args(hint)
+        _, unit = _facts(owner, name, entry)
+        return Kind.REAL, facts | unit
+    facts: dict[str, Any] = {}
+    for note in getattr(hint, "__metadata__", ()):
+        if isinstance(note, Unit):
+            facts["unit"] = note
+        elif isinstance(note, Shape):
+            facts["shape"] = note.extents
+        elif isinstance(note, Raster):
+            return Kind.BINARY, {"raster": note}
+    plain = typing.get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
+    if isinstance(plain, type) and issubclass(plain, enum.IntEnum):
+        return Kind.ENUMERATION, {"enumeration": plain}
+    kinds = {bool: Kind.BOOLEAN, int: Kind.INTEGER, float: Kind.REAL, str: Kind.STRING, bytes: Kind.BINARY}
+    if "shape" in facts:
+        return Kind.REAL, facts
+    if plain not in kinds:
+        raise DeclarationError(owner, name, f"{plain!r} is not the type of a port")
+    return kinds[plain], facts
+
+
+def _start(v: Variable) -> Any:
+    if v.kind is Kind.BINARY:
+        return b""
+    if v.kind is Kind.REAL and v.shape:
+        given = np.zeros(v.shape) if v.start is None else np.asarray(v.start, dtype=np.float64)
+        if given.shape != v.shape:
+            raise DeclarationError(v.name, "start", f"shape {given.shape} where {v.shape} is declared")
+        return given
+    if v.start is not None:
+        return v.start
+    if v.enumeration is not None:
+        return next(iter(v.enumeration))
+    return {Kind.REAL: 0.0, Kind.INTEGER: 0, Kind.BOOLEAN: False, Kind.STRING: ""}[v.kind]

@@ -1,0 +1,105 @@
+"""Kinds of port and parameter, as types and dataclass fields.
+
+A scalar port is a float with a unit (`cosim.units`), an int, a bool, a str or an `enum.IntEnum`. An array is one of the
+shapes below with the unit of its entries, as in `Vector3[Metre]`; `Polyline25[Metre]` holds 25 points in space. A
+camera picture is `Picture1280x720`.
+"""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
+
+U = TypeVar("U")
+T = TypeVar("T")
+
+Floats = NDArray[np.float64]
+"""Any array of float64: what the shapes below are to a type checker."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Extents of an array port."""
+
+    extents: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Raster:
+    """A raw picture, blue, green, red, 8 bits each, rows from the top: `width * height * 3` bytes."""
+
+    width: int
+    height: int
+
+    @property
+    def mime(self) -> str:
+        """MIME type with the picture's size as its parameters."""
+        return f"image/x-raw-bgr; width={self.width}; height={self.height}"
+
+    @property
+    def size(self) -> int:
+        """Number of bytes."""
+        return self.width * self.height * 3
+
+
+Vector2 = TypeAliasType("Vector2", Annotated[Floats, Shape((2,))], type_params=(U,))
+Vector3 = TypeAliasType("Vector3", Annotated[Floats, Shape((3,))], type_params=(U,))
+Vector4 = TypeAliasType("Vector4", Annotated[Floats, Shape((4,))], type_params=(U,))
+Vector5 = TypeAliasType("Vector5", Annotated[Floats, Shape((5,))], type_params=(U,))
+Vector6 = TypeAliasType("Vector6", Annotated[Floats, Shape((6,))], type_params=(U,))
+Vector9 = TypeAliasType("Vector9", Annotated[Floats, Shape((9,))], type_params=(U,))
+Matrix3 = TypeAliasType("Matrix3", Annotated[Floats, Shape((3, 3))], type_params=(U,))
+Polyline25 = TypeAliasType("Polyline25", Annotated[Floats, Shape((25, 3))], type_params=(U,))
+
+Picture1280x720 = Annotated[NDArray[np.uint8], Raster(1280, 720)]
+"""Array of shape (720, 1280, 3)."""
+
+BLACK_1280X720 = np.zeros((720, 1280, 3), dtype=np.uint8)
+"""Start value of a picture."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Declaration:
+    """What a field says of its port beyond its type."""
+
+    description: str
+    start: Any
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+def parameter(default: T, description: str, *, minimum: float | None = None, maximum: float | None = None) -> T:
+    """Declare a parameter, as the default of a dataclass field: its value is fixed during a run.
+
+    Bounds hold for every entry of an array and are themselves allowed.
+    """
+    d = Declaration(description=description, start=default, minimum=minimum, maximum=maximum)
+    return _field_with_default(default, d)
+
+
+def port(start: T, description: str, *, minimum: float | None = None, maximum: float | None = None) -> T:
+    """Declare an input, as the default of a dataclass field; `start` is its value before anything is connected."""
+    d = Declaration(description=description, start=start, minimum=minimum, maximum=maximum)
+    return _field_with_default(start, d)
+
+
+def output(description: str, *, minimum: float | None = None, maximum: float | None = None) -> Any:
+    """Declare an output. It has no default: a block that forgets one in its `Outputs(...)` gets a TypeError."""
+    d = Declaration(description=description, start=None, minimum=minimum, maximum=maximum)
+    return field(metadata={"declaration": d})
+
+
+def _field_with_default(default: T, declaration: Declaration) -> T:
+    metadata = {"declaration": declaration}
+    if isinstance(default, np.ndarray):
+        value: Any = default
+        array: NDArray[Any] = np.asarray(value, dtype=np.uint8 if value.dtype == np.uint8 else np.float64)
+
+        def copy() -> Any:
+            return np.array(array)
+
+        return field(default_factory=copy, metadata=metadata)
+    made: T = field(default=default, metadata=metadata)
+    return made

@@ -1,0 +1,59 @@
+"""Physical units as part of a port's type: `Metre` is a float that is known to be in metres."""
+
+from dataclasses import dataclass, fields
+from typing import Annotated
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaseExponents:
+    """Exponents of the SI base units (and the radian, as FMI counts it)."""
+
+    kg: int = 0
+    m: int = 0
+    s: int = 0
+    A: int = 0
+    K: int = 0
+    mol: int = 0
+    cd: int = 0
+    rad: int = 0
+
+    def nonzero(self) -> dict[str, int]:
+        """Return the exponents that are not zero, by base unit's name."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name)}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: value in SI = factor * value + offset, of the dimension `base`."""
+
+    symbol: str
+    base: BaseExponents = BaseExponents()
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def __str__(self) -> str:
+        return self.symbol
+
+
+ONE = Unit("1")
+
+Number = Annotated[float, ONE]
+Metre = Annotated[float, Unit("m", BaseExponents(m=1))]
+SquareMetre = Annotated[float, Unit("m2", BaseExponents(m=2))]
+MetrePerSecond = Annotated[float, Unit("m/s", BaseExponents(m=1, s=-1))]
+MetrePerSecond2 = Annotated[float, Unit("m/s2", BaseExponents(m=1, s=-2))]
+Radian = Annotated[float, Unit("rad", BaseExponents(rad=1))]
+RadianPerSecond = Annotated[float, Unit("rad/s", BaseExponents(rad=1, s=-1))]
+Second = Annotated[float, Unit("s", BaseExponents(s=1))]
+Hertz = Annotated[float, Unit("Hz", BaseExponents(s=-1))]
+PerSecond = Annotated[float, Unit("1/s", BaseExponents(s=-1))]
+Kilogram = Annotated[float, Unit("kg", BaseExponents(kg=1))]
+KilogramMetre2 = Annotated[float, Unit("kg.m2", BaseExponents(kg=1, m=2))]
+Newton = Annotated[float, Unit("N", BaseExponents(kg=1, m=1, s=-2))]
+NewtonMetre = Annotated[float, Unit("N.m", BaseExponents(kg=1, m=2, s=-2))]
+NewtonMetre2 = Annotated[float, Unit("N.m2", BaseExponents(kg=1, m=3, s=-2))]
+NewtonPerMetre = Annotated[float, Unit("N/m", BaseExponents(kg=1, s=-2))]
+NewtonSecondPerMetre = Annotated[float, Unit("N.s/m", BaseExponents(kg=1, s=-1))]
+Pixel = Annotated[float, Unit("px")]
+Levels = Annotated[float, Unit("levels")]
+"""Brightness steps of an 8-bit picture."""

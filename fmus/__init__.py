@@ -1,0 +1,1 @@
+"""Turns a block into an FMU: FMI runtime (C), slave side (Python), builder and catalog."""

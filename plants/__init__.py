@@ -1,0 +1,1 @@
+"""Physics and sensors: what happens in the world."""

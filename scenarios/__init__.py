@@ -1,0 +1,1 @@
+"""Experiments: units wired into systems, the command line, and what a run leaves behind."""
