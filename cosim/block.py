@@ -95,6 +95,11 @@ class Variable:
         """Number of entries; 1 for a scalar."""
         return int(np.prod(self.shape, dtype=int))
 
+    @property
+    def items(self) -> tuple[tuple[str, int], ...]:
+        """Names and values of an enumeration."""
+        return tuple((e.name, int(e)) for e in self.enumeration) if self.enumeration else ()
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Description:
@@ -127,8 +132,8 @@ def describe(block: type[Any]) -> Description:
     params_type = _annotation(block, "__init__", "params")
     inputs_type = _annotation(block, "step", "u")
     outputs_type = _annotation(block, "step", "return")
-    inputs = _variables(inputs_type, Causality.INPUT)
-    outputs = _variables(outputs_type, Causality.OUTPUT)
+    inputs = declared_variables(inputs_type, Causality.INPUT)
+    outputs = declared_variables(outputs_type, Causality.OUTPUT)
     feedthrough: Mapping[str, tuple[str, ...]] = block.feedthrough
     for y, us in feedthrough.items():
         for name, known in [(y, outputs)] + [(u, inputs) for u in us]:
@@ -140,7 +145,7 @@ def describe(block: type[Any]) -> Description:
         params_type=params_type,
         inputs_type=inputs_type,
         outputs_type=outputs_type,
-        parameters=_variables(params_type, Causality.PARAMETER),
+        parameters=declared_variables(params_type, Causality.PARAMETER),
         inputs=inputs,
         outputs=outputs,
         feedthrough=feedthrough,
@@ -158,7 +163,12 @@ def _annotation(block: type[Any], method: str, name: str) -> type[Any]:
     return typing.cast("type[Any]", found)
 
 
-def _variables(owner: type[Any], causality: Causality) -> tuple[Variable, ...]:
+def declared_variables(owner: type[Any], causality: Causality) -> tuple[Variable, ...]:
+    """Read the fields of one dataclass of declarations.
+
+    Raises:
+        DeclarationError: see `describe`.
+    """
     hints = typing.get_type_hints(owner, include_extras=True)
     return tuple(_variable(owner.__name__, f, hints[f.name], causality) for f in dataclasses.fields(owner))
 

@@ -94,8 +94,8 @@ def output(description: str, *, minimum: float | None = None, maximum: float | N
 def _field_with_default(default: T, declaration: Declaration) -> T:
     metadata = {"declaration": declaration}
     if isinstance(default, np.ndarray):
-        value: Any = default
-        array: NDArray[Any] = np.asarray(value, dtype=np.uint8 if value.dtype == np.uint8 else np.float64)
+        dtype = np.uint8 if default.dtype == np.uint8 else np.float64
+        array = np.asarray(default, dtype=dtype)
 
         def copy() -> Any:
             return np.array(array)

@@ -1,0 +1,50 @@
+"""What can be wrong with a file, a wiring or a running unit; each carries its data and says what would be right."""
+
+import difflib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """Return ", did you mean ...?" with the nearest valid names, or the valid names when none is near."""
+    names = sorted(valid)
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    if not names:
+        return "there are none"
+    return f"valid: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}"
+
+
+class CosimError(Exception):
+    """Base of what this engine raises on purpose."""
+
+
+class InvalidFmu(CosimError):
+    """A file that should be an FMU is missing, damaged, or not one that this machine can run."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"{path}: {fault}")
+        self.path, self.fault = path, fault
+
+
+class WiringError(CosimError):
+    """A system is wired wrongly; `faults` lists everything that is wrong with it."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        lines = "".join(f"\n  - {f}" for f in faults)
+        super().__init__(f"{len(faults)} fault{'s' if len(faults) > 1 else ''} in the system:{lines}")
+        self.faults = tuple(faults)
+
+
+class ScheduleError(CosimError):
+    """Units cannot be put in an order, or their steps do not fit one grid."""
+
+
+class UnitFailure(CosimError):
+    """A unit's call failed while running; `log` holds the unit's last lines."""
+
+    def __init__(self, unit: str, call: str, t: float, status: str, log: Sequence[str] = ()) -> None:
+        told = "".join(f"\n  {line}" for line in log)
+        super().__init__(f"{unit}: {call} at t = {t:.6g} s answered {status}{told}")
+        self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)

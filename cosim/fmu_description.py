@@ -1,0 +1,190 @@
+"""What an FMU says of itself, in this engine's words: its ports with kind, shape and unit, whatever the FMI version.
+
+FMI 2 knows no arrays: variables named `p[1]`, `p[2]`, ... (or `R[1,1]`, ...) that agree in type, causality and unit are
+taken together as one array port `p`, so that units of both standards can stand in for each other.
+"""
+
+import itertools
+import re
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Causality, Kind
+from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
+from cosim.units import ONE, BaseExponents, Unit
+
+_KINDS = {
+    "Real": Kind.REAL,
+    "Float32": Kind.REAL,
+    "Float64": Kind.REAL,
+    "Integer": Kind.INTEGER,
+    **{f"{sign}Int{bits}": Kind.INTEGER for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    "Boolean": Kind.BOOLEAN,
+    "Enumeration": Kind.ENUMERATION,
+    "String": Kind.STRING,
+    "Binary": Kind.BINARY,
+}
+_ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
+
+
+def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return the indices of an array's entries, counted from 1, in row-major order; one empty index for a scalar."""
+    return list(itertools.product(*(range(1, n + 1) for n in shape)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FmuPort:
+    """A parameter, input or output of an FMU. `references` has one value reference a scalar (FMI 2) or one in all."""
+
+    name: str
+    kind: Kind
+    causality: Causality
+    fmi_type: str
+    references: tuple[int, ...]
+    shape: tuple[int, ...] = ()
+    unit: Unit = ONE
+    start: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    items: tuple[tuple[str, int], ...] = ()
+    mime: str | None = None
+    description: str = ""
+
+    @property
+    def size(self) -> int:
+        """Number of entries; 1 for a scalar."""
+        return int(np.prod(self.shape, dtype=int))
+
+    @property
+    def signature(self) -> str:
+        """Kind, unit and shape, as in `real [3] m`, for messages."""
+        shape = f" [{','.join(map(str, self.shape))}]" if self.shape else ""
+        extra = self.mime if self.kind is Kind.BINARY else self.unit.symbol if self.kind is Kind.REAL else ""
+        return f"{self.kind.value}{shape}{' ' + extra if extra else ''}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FmuDescription:
+    """An FMU's ports and identity. `feedthrough` names, by output, the inputs it depends on at once."""
+
+    path: Path
+    fmi: int
+    name: str
+    identifier: str
+    token: str
+    step: float | None
+    parameters: Mapping[str, FmuPort]
+    inputs: Mapping[str, FmuPort]
+    outputs: Mapping[str, FmuPort]
+    feedthrough: Mapping[str, tuple[str, ...]]
+
+
+def describe_fmu(path: Path) -> FmuDescription:
+    """Read an FMU's model description (FMI 2.0 or 3.0, co-simulation).
+
+    Raises:
+        InvalidFmu: the file is missing, not an FMU, of another standard, or has no co-simulation interface.
+    """
+    md = read_description(path)
+    is_fmi2 = md.fmiVersion == "2.0"
+    units = {u.name: _unit(u) for u in md.unitDefinitions}
+    mimes = {} if is_fmi2 else mime_types(path)
+    ports = [_port(v, units, mimes) for v in md.modelVariables if v.causality in ("parameter", "input", "output")]
+    ports = [p for p in ports if p is not None]
+    grouped = _group_elements(ports) if is_fmi2 else ports
+    owner = {r: p.name for p in grouped for r in p.references}
+    by_causality: dict[Causality, dict[str, FmuPort]] = {c: {} for c in Causality}
+    for p in grouped:
+        by_causality[p.causality][p.name] = p
+    return FmuDescription(
+        path=path,
+        fmi=2 if is_fmi2 else 3,
+        name=md.modelName or md.coSimulation.modelIdentifier,
+        identifier=md.coSimulation.modelIdentifier,
+        token=md.guid or "",
+        step=float(md.defaultExperiment.stepSize) if md.defaultExperiment and md.defaultExperiment.stepSize else None,
+        parameters=by_causality[Causality.PARAMETER],
+        inputs=by_causality[Causality.INPUT],
+        outputs=by_causality[Causality.OUTPUT],
+        feedthrough=_feedthrough(md, owner, by_causality[Causality.INPUT]),
+    )
+
+
+def _unit(u: Any) -> Unit:
+    if u.baseUnit is None:
+        return Unit(u.name)
+    names = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+    base = BaseExponents(**{n: int(getattr(u.baseUnit, n) or 0) for n in names})
+    return Unit(u.name, base, float(u.baseUnit.factor or 1.0), float(u.baseUnit.offset or 0.0))
+
+
+def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
+    kind = _KINDS.get(v.type)
+    if kind is None:  # clocks and whatever later standards bring
+        return None
+    declared = v.declaredType
+    unit = v.unit or (declared.unit if declared is not None else None)
+    items: list[Any] = declared.items if declared is not None and kind is Kind.ENUMERATION else []
+    low = v.min if v.min is not None or declared is None else declared.min
+    high = v.max if v.max is not None or declared is None else declared.max
+    return FmuPort(
+        name=v.name,
+        kind=kind,
+        causality=Causality(v.causality),
+        fmi_type=v.type,
+        references=(v.valueReference,),
+        shape=tuple(v.shape or ()),
+        unit=units.get(unit, Unit(unit)) if unit else ONE,
+        start=v.start,
+        minimum=float(low) if low is not None else None,
+        maximum=float(high) if high is not None else None,
+        items=tuple((i.name, int(i.value)) for i in items),
+        mime=mimes.get(v.name),
+        description=v.description or "",
+    )
+
+
+def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
+    groups: dict[str, list[tuple[tuple[int, ...], FmuPort]]] = defaultdict(list)
+    plain: list[FmuPort] = []
+    for p in ports:
+        match = _ELEMENT.match(p.name)
+        if match:
+            groups[match["base"]].append((tuple(int(i) for i in match["indices"].split(",")), p))
+        else:
+            plain.append(p)
+    for base, members in groups.items():
+        members.sort(key=lambda m: m[0])
+        first = members[0][1]
+        shape = members[-1][0]
+        whole = [m[0] for m in members] == indices_of(shape)
+        alike = len({(p.fmi_type, p.causality, p.unit) for _, p in members}) == 1
+        if whole and alike:
+            starts = [p.start for _, p in members]
+            start = None if None in starts else " ".join(str(s) for s in starts)
+            references = tuple(p.references[0] for _, p in members)
+            plain.append(replace(first, name=base, references=references, shape=shape, start=start))
+        else:
+            plain.extend(p for _, p in members)
+    return plain
+
+
+def _feedthrough(
+    md: ModelDescription, owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
+) -> dict[str, tuple[str, ...]]:
+    found: dict[str, set[str]] = defaultdict(set)
+    for unknown in md.outputs:
+        name = owner.get(unknown.variable.valueReference)
+        if name is None:
+            continue
+        if unknown.dependencies is None:  # the standard: not given means all
+            found[name].update(inputs)
+        else:
+            sources = {owner.get(d.valueReference) for d in unknown.dependencies}
+            found[name].update(s for s in sources if s is not None and s in inputs)
+    return {y: tuple(sorted(us)) for y, us in found.items() if us}

@@ -1,0 +1,153 @@
+"""One FMU, unpacked, loaded and instantiated, behind the same few calls for FMI 2 and FMI 3."""
+
+import collections
+import ctypes
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from cosim.block import Kind
+from cosim.exceptions import UnitFailure
+from cosim.fmpy_edge import STATUS, load_fmi2, load_fmi3
+from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.signal_buffer import SignalBuffer, Views
+from cosim.start_values import numbers_of
+
+_LOG_LINES = 30
+
+
+class Instance:
+    """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
+
+    Raises:
+        InvalidFmu: the library does not load or does not instantiate.
+    """
+
+    def __init__(self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str]) -> None:
+        self.name = name
+        self.description = description
+        self.time = 0.0
+        self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
+        self._fmi = description.fmi
+        self._prefix = f"fmi{self._fmi}"
+        load = load_fmi2 if self._fmi == 2 else load_fmi3
+        d = description
+        self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
+        self._component = self._fmu.component
+        chosen = [d.inputs[i] for i in inputs]
+        self._setters = self._buffers("Set", chosen)
+        self._getters = self._buffers("Get", list(d.outputs.values()))
+        self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
+        self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
+        self._step_arguments = self._make_step_arguments()
+        self._do_step = self._function("DoStep")
+
+    def set_start(self, values: Mapping[str, Any]) -> None:
+        """Set parameters or start values of inputs, before initialisation."""
+        ports = {**self.description.parameters, **self.description.inputs}
+        for name, value in values.items():
+            self._set_one(ports[name], value)
+
+    def enter_initialization(self, t: float, stop: float | None) -> None:
+        """Enter initialisation mode at time t."""
+        self.time = t
+        if self._fmi == 2:
+            defined, until = (stop is not None), (stop or 0.0)
+            self._call("SetupExperiment", False, 0.0, t, defined, until)
+            self._call("EnterInitializationMode")
+        else:
+            self._call("EnterInitializationMode", False, 0.0, t, stop is not None, stop or 0.0)
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode; steps follow."""
+        self._call("ExitInitializationMode")
+
+    def set_inputs(self) -> None:
+        """Hand the contents of `u` to the unit."""
+        for setter in self._setters:
+            status = setter()
+            if status > 1:
+                self._fail("setting its inputs", status)
+
+    def get_outputs(self) -> None:
+        """Fetch the unit's outputs into `y`."""
+        for getter in self._getters:
+            status = getter()
+            if status > 1:
+                self._fail("getting its outputs", status)
+
+    def step(self, t: float, dt: float) -> None:
+        """Advance from t by dt.
+
+        Raises:
+            UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
+        """
+        self.time = t
+        status = self._do_step(self._component, t, dt, *self._step_arguments)
+        if status > 1:
+            self._fail(f"{self._prefix}DoStep", status)
+        if self._fmi == 3 and self._terminate.value:
+            raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
+
+    def end(self) -> None:
+        """Terminate the unit."""
+        self._call("Terminate")
+
+    def free(self) -> None:
+        """Free the unit and its library."""
+        if self._component is not None:
+            self._component = None
+            self._fmu.freeInstance()
+
+    def _make_step_arguments(self) -> tuple[Any, ...]:
+        if self._fmi == 2:
+            return (True,)
+        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._last_time = ctypes.c_double()
+        flags = (self._event, self._terminate, self._early)
+        return (True, *(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
+
+    def _buffers(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
+        by_type: dict[str, list[FmuPort]] = collections.defaultdict(list)
+        for p in ports:
+            by_type[p.fmi_type].append(p)
+        return [self._buffer(verb, group) for group in by_type.values()]
+
+    def _buffer(self, verb: str, ports: list[FmuPort]) -> SignalBuffer:
+        kind = ports[0].fmi_type
+        if kind == "Enumeration":
+            kind = "Integer" if self._fmi == 2 else "Int64"
+        return SignalBuffer(self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
+
+    def _set_one(self, port: FmuPort, value: Any) -> None:
+        buffer = self._buffer("Set", [port])
+        views = buffer.views[port.name]
+        if port.kind is Kind.STRING:
+            kept = ctypes.create_string_buffer(str(value).encode())
+            views[0][0] = ctypes.addressof(kept)
+            status = buffer()
+        elif port.kind is Kind.BINARY:
+            data = ctypes.create_string_buffer(bytes(value), len(value))
+            views[0][0], views[1][0] = ctypes.addressof(data), len(value)
+            status = buffer()
+        else:
+            views[0][:] = numbers_of(port, value)
+            status = buffer()
+        if status > 1:
+            self._fail(f"setting {port.name}", status)
+
+    def _function(self, name: str) -> Any:
+        return getattr(self._fmu.dll, self._prefix + name)
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        status = self._function(name)(self._component, *arguments)
+        if status > 1:
+            self._fail(self._prefix + name, status)
+
+    def _fail(self, call: str, status: int) -> None:
+        told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+        raise UnitFailure(self.name, call, self.time, told, tuple(self.log))
+
+    def _take_log_line(self, status: int, message: str) -> None:
+        if status > 0:
+            self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {message}")

@@ -1,0 +1,80 @@
+"""Writes the scalar signals of a run to a Parquet file, one column a signal, in groups of rows as they come."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from cosim.block import Kind
+from cosim.signals import Column, Signals
+
+_ROWS = 512
+_TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}
+
+
+class Recorder:
+    """An observer of `Master.run` that records every communication point. Use as a context manager.
+
+    The first column is `time` in seconds. A column's metadata hold its unit and description, an enumeration's also its
+    items. Leaving completes the file, also when the run was cut short.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows = 0
+        self._writer: pq.ParquetWriter | None = None
+        self._columns: list[Column] = []
+        self._schema: pa.Schema | None = None
+        self._time = np.zeros(_ROWS)
+        self._block: list[NDArray[Any]] = []
+        self._filled = 0
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._writer is not None:
+            self._flush()
+            self._writer.close()
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Record one row."""
+        if self._writer is None:
+            self._open(signals)
+        self._time[self._filled] = t
+        for column, block in zip(self._columns, self._block, strict=True):
+            block[self._filled] = column.values[column.index]
+        self._filled += 1
+        self.rows += 1
+        if self._filled == _ROWS:
+            self._flush()
+
+    def _open(self, signals: Signals) -> None:
+        self._columns = signals.columns()
+        self._block = [np.zeros(_ROWS, dtype=c.values.dtype) for c in self._columns]
+        time = pa.field("time", pa.float64(), metadata={"unit": "s", "description": "simulated time"})
+        self._schema = pa.schema([time, *(_field(c) for c in self._columns)])
+        self._writer = pq.ParquetWriter(self.path, self._schema)
+
+    def _flush(self) -> None:
+        n, self._filled = self._filled, 0
+        if n == 0 or self._writer is None or self._schema is None:
+            return
+        arrays: list[pa.Array[Any]] = [pa.array(self._time[:n])]
+        for column, block in zip(self._columns, self._block, strict=True):
+            values = block[:n].astype(bool) if column.port.kind is Kind.BOOLEAN else block[:n]
+            arrays.append(pa.array(values).cast(_TYPES[column.port.kind]))
+        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+
+
+def _field(c: Column) -> pa.Field[Any]:
+    metadata = {"unit": c.port.unit.symbol, "description": c.port.description}
+    if c.port.items:
+        metadata["items"] = ", ".join(f"{v} {n}" for n, v in c.port.items)
+    return pa.field(c.name, _TYPES[c.port.kind], metadata=metadata)

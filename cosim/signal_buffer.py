@@ -1,0 +1,74 @@
+"""Preallocated buffers through which an FMU's variables of one type are set or read in one call."""
+
+import ctypes
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.fmu_description import FmuPort
+
+_POINTER: Callable[[Any], Any] = ctypes.POINTER
+
+Views = tuple[NDArray[Any], ...]
+"""Where a port's value lives. Plain values: one array. Binary: addresses and sizes. Strings: addresses."""
+
+_VALUES: dict[str, Any] = {
+    "Real": ctypes.c_double,
+    "Integer": ctypes.c_int32,
+    "Float32": ctypes.c_float,
+    "Float64": ctypes.c_double,
+    **{f"Int{b}": getattr(ctypes, f"c_int{b}") for b in (8, 16, 32, 64)},
+    **{f"UInt{b}": getattr(ctypes, f"c_uint{b}") for b in (8, 16, 32, 64)},
+}
+
+
+class SignalBuffer:
+    """The variables of one FMI type of one instance, in the order given, in one block of memory.
+
+    Calling it carries out the FMI call with arguments made once. `views[name]` is the part that belongs to a port, in
+    row-major order; a connection copies one port's views into another's.
+    """
+
+    def __init__(self, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
+        first = ports[0].fmi_type
+        references = [r for p in ports for r in p.references]
+        n = sum(p.size for p in ports)
+        self._function = function
+        vrs = (ctypes.c_uint * len(references))(*references)
+        self._arrays, arguments = _arrays(first, fmi, n)
+        count = () if fmi == 2 else (n,)
+        self._arguments = (component, vrs, len(references), *arguments, *count)
+        self.views: dict[str, Views] = {}
+        at = 0
+        for p in ports:
+            self.views[p.name] = tuple(a[at : at + p.size] for a in self._arrays)
+            at += p.size
+
+    def __call__(self) -> int:
+        """Set or get all values; return the FMI status."""
+        return self._function(*self._arguments)
+
+
+def _arrays(fmi_type: str, fmi: int, n: int) -> tuple[Views, tuple[Any, ...]]:
+    """Return numpy arrays and the same memory as arguments of an FMI call."""
+    if fmi_type == "Binary":
+        sizes, addresses = np.zeros(n, dtype=np.uint64), np.zeros(n, dtype=np.uint64)
+        pointer = ctypes.POINTER(ctypes.POINTER(ctypes.c_uint8))
+        return (addresses, sizes), (_pointer(sizes, ctypes.c_size_t), ctypes.cast(addresses.ctypes.data, pointer))
+    if fmi_type == "String":
+        addresses = np.zeros(n, dtype=np.uint64)
+        return (addresses,), (_pointer(addresses, ctypes.c_char_p),)
+    if fmi_type == "Boolean":
+        c_type = ctypes.c_int32 if fmi == 2 else ctypes.c_bool
+    elif fmi_type == "Enumeration":
+        c_type = ctypes.c_int32 if fmi == 2 else ctypes.c_int64
+    else:
+        c_type = _VALUES[fmi_type]
+    values = np.zeros(n, dtype=np.dtype(c_type))
+    return (values,), (_pointer(values, c_type),)
+
+
+def _pointer(array: NDArray[Any], c_type: Any) -> Any:
+    return ctypes.cast(array.ctypes.data, _POINTER(c_type))

@@ -1,0 +1,66 @@
+"""The outputs of a running system by name: `signals["arm.p_WG"]`, or flattened to scalars for a record."""
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.block import Kind
+from cosim.exceptions import nearest
+from cosim.fmu_description import FmuPort, indices_of
+from cosim.signal_buffer import Views
+
+
+@dataclass(frozen=True)
+class Column:
+    """A scalar signal: its name in a record (`arm.p_WG[1]`, counted from 1 as in FMI), and where its value lives."""
+
+    name: str
+    port: FmuPort
+    values: NDArray[Any]
+    index: int
+
+
+class Signals:
+    """Live values of all outputs; they change as the system steps, so copy what is kept."""
+
+    def __init__(self, outputs: Mapping[str, Mapping[str, Views]], ports: Mapping[str, Mapping[str, FmuPort]]) -> None:
+        self._views = {f"{unit}.{port}": views for unit, ys in outputs.items() for port, views in ys.items()}
+        self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return a copy of a signal's value in its shape; a picture or other binary as an array of bytes.
+
+        Raises:
+            KeyError: there is no such output.
+        """
+        if name not in self._views:
+            raise KeyError(f"no output {name!r}; {nearest(name, self._views)}")
+        views, port = self._views[name], self._ports[name]
+        if port.kind is Kind.BINARY:
+            data = ctypes.string_at(int(views[0][0]), int(views[1][0]))
+            raw: NDArray[np.uint8] = np.frombuffer(data, dtype=np.uint8)
+            return raw
+        return np.array(views[0]).reshape(port.shape)
+
+    def text(self, name: str) -> str:
+        """Return a string signal, or the item's name of an enumeration."""
+        views, port = self._views[name], self._ports[name]
+        if port.kind is Kind.STRING:
+            return ctypes.string_at(int(views[0][0])).decode() if views[0][0] else ""
+        return {v: n for n, v in port.items}.get(int(views[0][0]), str(views[0][0]))
+
+    def columns(self) -> list[Column]:
+        """Return all real, integer, boolean and enumeration outputs as scalars."""
+        made: list[Column] = []
+        for name, port in self._ports.items():
+            if port.kind in (Kind.BINARY, Kind.STRING):
+                continue
+            values = self._views[name][0]
+            for i, index in enumerate(indices_of(port.shape)):
+                subscript = f"[{','.join(map(str, index))}]" if index else ""
+                made.append(Column(name + subscript, port, values, i))
+        return made

@@ -1,0 +1,81 @@
+"""Checks a value that a user gave for a parameter or an input against what the port declares, and flattens it."""
+
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Kind, Variable
+from cosim.fmu_description import FmuPort
+from cosim.ports import Floats
+
+Declared = FmuPort | Variable
+"""A declaration of a port or a parameter, be it an FMU's or a block's."""
+
+
+def fault_of(port: Declared, value: Any) -> str | None:
+    """Return what is wrong with a value for a port, saying what would be right, or None."""
+    if port.kind in (Kind.STRING, Kind.BINARY):
+        wanted = str if port.kind is Kind.STRING else (bytes, bytearray, memoryview)
+        return None if isinstance(value, wanted) else f"{_told(value)} is not a {port.kind.value}"
+    if port.kind is Kind.BOOLEAN and not isinstance(value, (bool, np.bool_)):
+        return f"{_told(value)} is neither true nor false"
+    if port.kind is Kind.ENUMERATION and isinstance(value, str):
+        if value.upper() not in [name.upper() for name, _ in port.items]:
+            return f"{_told(value)} is none of {', '.join(name for name, _ in port.items)}"
+        return None
+    try:
+        numbers = numbers_of(port, value)
+    except (TypeError, ValueError):
+        return f"{_told(value)} is not {_wanted(port)}"
+    if not np.all(np.isfinite(numbers)):
+        return f"{_told(value)} is not finite"
+    if port.kind is not Kind.REAL and not np.all(numbers == np.round(numbers)):
+        return f"{_told(value)} is not {_wanted(port)}"
+    if port.kind is Kind.ENUMERATION and int(numbers[0]) not in [v for _, v in port.items]:
+        return f"{_told(value)} is none of {', '.join(f'{v} ({n})' for n, v in port.items)}"
+    return _range_fault(port, value, numbers)
+
+
+def numbers_of(port: Declared, value: Any) -> Floats:
+    """Return a value as float64 numbers in row-major order; enumerations may be given by name.
+
+    Raises:
+        ValueError: not as many numbers as the port has, or not numbers.
+    """
+    if port.kind is Kind.ENUMERATION and isinstance(value, str):
+        value = {name.upper(): v for name, v in port.items}[value.upper()]
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != port.shape:
+        raise ValueError(f"shape {array.shape} where {port.shape} is wanted")
+    return array.reshape(-1)
+
+
+def range_of(port: Declared) -> str:
+    """Return the range that a value must lie in, in words, with the unit; empty where there is none."""
+    low, high = port.minimum, port.maximum
+    unit = "" if port.unit.symbol == "1" else f" {port.unit.symbol}"
+    if low is not None and high is not None:
+        return f"from {low:g} to {high:g}{unit}"
+    if low is not None:
+        return f"at least {low:g}{unit}"
+    return "" if high is None else f"at most {high:g}{unit}"
+
+
+def _wanted(port: Declared) -> str:
+    what = "a whole number" if port.kind in (Kind.INTEGER, Kind.ENUMERATION) else "a number"
+    unit = f" in {port.unit.symbol}" if port.unit.symbol != "1" else ""
+    if port.shape:
+        return f"an array of shape [{','.join(map(str, port.shape))}] of numbers{unit}"
+    return what + unit
+
+
+def _range_fault(port: Declared, value: Any, numbers: Floats) -> str | None:
+    low, high = port.minimum, port.maximum
+    if (low is None or np.all(numbers >= low)) and (high is None or np.all(numbers <= high)):
+        return None
+    return f"{_told(value)} is out of range: {range_of(port)}"
+
+
+def _told(value: Any) -> str:
+    told = repr(value.tolist() if isinstance(value, np.ndarray) else value)
+    return told if len(told) < 80 else told[:77] + "..."

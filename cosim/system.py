@@ -1,0 +1,176 @@
+"""Units, their parameters and the connections between them, checked before anything starts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from cosim.block import Kind
+from cosim.exceptions import WiringError, nearest
+from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
+from cosim.start_values import fault_of
+
+
+@dataclass(frozen=True)
+class PortName:
+    """One end of a connection: a port of a unit in a system."""
+
+    unit: str
+    port: str
+
+    def __str__(self) -> str:
+        return f"{self.unit}.{self.port}"
+
+
+class PortNames:
+    """Makes port names by attribute: `arm.y.p_WG`. Whether there is such a port is found out by `System.check`."""
+
+    def __init__(self, unit: str) -> None:
+        self._unit = unit
+
+    def __getattr__(self, port: str) -> PortName:
+        if port.startswith("__"):
+            raise AttributeError(port)
+        return PortName(self._unit, port)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of a system: what its FMU says, the values it starts with, and its communication step in seconds."""
+
+    name: str
+    description: FmuDescription
+    start: Mapping[str, Any]
+    period: Fraction
+
+    @property
+    def u(self) -> PortNames:
+        """Its inputs, by attribute."""
+        return PortNames(self.name)
+
+    @property
+    def y(self) -> PortNames:
+        """Its outputs, by attribute."""
+        return PortNames(self.name)
+
+
+@dataclass(frozen=True)
+class Connection:
+    """An output that feeds an input."""
+
+    source: PortName
+    target: PortName
+
+
+class System:
+    """Units and connections. Nothing is loaded: files are read for what they declare, and wiring is checked on that."""
+
+    def __init__(self) -> None:
+        self.units: dict[str, Unit] = {}
+        self.connections: list[Connection] = []
+        self._faults: list[str] = []
+        self._descriptions: dict[Path, FmuDescription] = {}
+
+    def add(self, name: str, fmu: Path, *, period: Fraction | None = None, **start: Any) -> Unit:
+        """Add a unit under a name, with start values of its parameters and inputs.
+
+        `period` is its communication step in seconds; by default the step that its FMU proposes.
+
+        Raises:
+            InvalidFmu: the file cannot be used.
+        """
+        if fmu not in self._descriptions:
+            self._descriptions[fmu] = describe_fmu(fmu)
+        description = self._descriptions[fmu]
+        if name in self.units:
+            self._faults.append(f"two units are called {name!r}")
+        if period is None:
+            period = _proposed_step(description.step)
+        if period is None or period <= 0:
+            self._faults.append(f"{name}: its FMU proposes no communication step; give one that is above 0 s")
+            period = Fraction(1, 100)
+        unit = Unit(name, description, start, period)
+        self.units[name] = unit
+        return unit
+
+    def connect(self, source: PortName, target: PortName) -> None:
+        """Let an output feed an input."""
+        self.connections.append(Connection(source, target))
+
+    def check(self) -> None:
+        """Check all names, values and connections.
+
+        Raises:
+            WiringError: with every fault of the system.
+        """
+        faults = list(self._faults)
+        for unit in self.units.values():
+            faults += _value_faults(unit)
+        fed: dict[PortName, PortName] = {}
+        for c in self.connections:
+            faults += self._connection_faults(c)
+            if c.target in fed:
+                faults.append(f"{c.target} is fed twice: by {fed[c.target]} and by {c.source}")
+            fed[c.target] = c.source
+        if faults:
+            raise WiringError(faults)
+
+    def sources_of(self, unit: str) -> dict[str, PortName]:
+        """Return, by input's name, the outputs that feed a unit."""
+        return {c.target.port: c.source for c in self.connections if c.target.unit == unit}
+
+    def _connection_faults(self, c: Connection) -> list[str]:
+        a, fault_a = self._find(c.source, "output")
+        b, fault_b = self._find(c.target, "input")
+        if a is None or b is None:
+            return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
+        reason = _mismatch(a, b)
+        if reason is None:
+            return []
+        return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
+
+    def _find(self, end: PortName, role: str) -> tuple[FmuPort | None, str | None]:
+        unit = self.units.get(end.unit)
+        if unit is None:
+            return None, f"there is no unit {end.unit!r}; {nearest(end.unit, self.units)}"
+        d = unit.description
+        wanted, other = (d.outputs, d.inputs) if role == "output" else (d.inputs, d.outputs)
+        if end.port in wanted:
+            return wanted[end.port], None
+        if end.port in other or end.port in d.parameters:
+            what = "parameter" if end.port in d.parameters else "input" if role == "output" else "output"
+            return None, f"{end} is an {what}, not an {role}" if what != "parameter" else f"{end} is a parameter"
+        return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, wanted)}"
+
+
+def _value_faults(unit: Unit) -> list[str]:
+    ports = {**unit.description.parameters, **unit.description.inputs}
+    faults: list[str] = []
+    for name, value in unit.start.items():
+        if name not in ports:
+            faults.append(f"{unit.name} has no parameter {name!r}; {nearest(name, unit.description.parameters)}")
+            continue
+        fault = fault_of(ports[name], value)
+        if fault:
+            faults.append(f"{unit.name}.{name}: {fault}")
+    return faults
+
+
+def _mismatch(a: FmuPort, b: FmuPort) -> str | None:
+    if a.kind is not b.kind:
+        return f"a {a.kind.value} cannot feed a {b.kind.value}"
+    if a.shape != b.shape:
+        return "their shapes differ"
+    if a.kind is Kind.REAL and a.unit != b.unit:
+        same = a.unit.base == b.unit.base
+        return "their units differ" + (" (same dimension: convert before connecting)" if same else " in dimension")
+    if a.kind is Kind.ENUMERATION and a.items != b.items:
+        return "their enumerations have other items"
+    if a.kind is Kind.BINARY and a.mime != b.mime:
+        return "their MIME types differ"
+    return None
+
+
+def _proposed_step(step: float | None) -> Fraction | None:
+    return Fraction(step).limit_denominator(1_000_000) if step else None
