@@ -1,5 +1,6 @@
 """Runs a system of FMUs: loads them, wires their buffers, steps them on the schedule's grid."""
 
+import array
 import contextlib
 import tempfile
 import time
@@ -46,8 +47,8 @@ class Master:
         self.system = system
         self.schedule = Schedule(system, algorithm)
         self.time = 0.0
-        self.steps: dict[str, int] = dict.fromkeys(system.units, 0)
-        self.cpu: dict[str, float] = dict.fromkeys(system.units, 0.0)
+        self.cpu: dict[str, "array.array[float]"] = {name: array.array("d") for name in system.units}
+        """CPU seconds of every step, by unit."""
         self._instances: dict[str, Instance] = {}
         self._copies: dict[str, _Copies] = {}
         self._cleanup = contextlib.ExitStack()
@@ -126,8 +127,7 @@ class Master:
     def _step(self, slot: Slot) -> None:
         began = time.process_time()
         self._instances[slot.unit].step(self.time, float(slot.period))
-        self.cpu[slot.unit] += time.process_time() - began
-        self.steps[slot.unit] += 1
+        self.cpu[slot.unit].append(time.process_time() - began)
 
     def _load(self, cleanup: contextlib.ExitStack) -> None:
         folder = Path(

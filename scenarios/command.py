@@ -1,0 +1,160 @@
+"""The command `handover`."""
+
+import signal
+import sys
+import time
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import click
+from fmus.build import build, cached
+from fmus.catalog import UNITS
+
+from cosim.exceptions import CosimError, UnitFailure, nearest
+from scenarios.catalog import SCENARIOS
+from scenarios.experiment import Experiment
+from scenarios.listing import print_catalog, print_scenario, print_summary
+from scenarios.parameters import BadParameter, parse_parameters
+from scenarios.progress import progress_bar
+from scenarios.run_folder import BadRunFolder, RunFolder
+from scenarios.runner import Task, carry_out
+
+_PATH = click.Path(path_type=Path)
+
+TASK_FAILED, BAD_CALL, UNIT_FAILED = 1, 2, 3
+
+
+class BadCall(click.ClickException):
+    """A call that cannot be carried out, told in one line."""
+
+    exit_code = BAD_CALL
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="handover-cosim")
+def main() -> None:
+    r"""Robots that hand objects over, co-simulated as Functional Mock-up Units.
+
+    \b
+    handover list                          what there is
+    handover run helix_handover            one run; leaves a folder with a report
+    handover build TendonArm --fmi both    units for other tools
+
+    Exit status: 0 the task succeeded, 1 the run ended but the task failed, 2 bad call or bad input, 3 a unit failed.
+    """
+
+
+@main.command("list")
+@click.argument("scenario", required=False)
+def list_(scenario: str | None) -> None:
+    """List scenarios and units, or the parameters of one SCENARIO."""
+    if scenario is None:
+        print_catalog()
+    else:
+        print_scenario(_scenario(scenario))
+
+
+@main.command("build")
+@click.argument("units", nargs=-1, metavar="[UNIT]...")
+@click.option("--fmi", type=click.Choice(["2", "3", "both"]), default="both", show_default=True, help="FMI version.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("fmus-built"),
+    show_default=True,
+    help="Folder for the files.",
+)
+def build_(units: Sequence[str], fmi: str, out: Path) -> None:
+    """Build UNITs (all by default) as FMUs for other tools.
+
+    A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
+    """
+    unknown = [u for u in units if u not in UNITS]
+    if unknown:
+        raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown))
+    with _told_in_one_line():
+        for line in _build_all(units or list(UNITS), fmi, out, named=bool(units)):
+            click.echo(line)
+
+
+@main.command("run", context_settings={"show_default": True})
+@click.argument("scenario")
+@click.option(
+    "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
+@click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Let another FMU take a unit's place.")
+@click.option("--out", type=_PATH, help="Folder for the results [default: a new one in runs/].")
+def run_(scenario: str, parameters: Sequence[str], seed: int, replaced: Sequence[str], out: Path | None) -> None:
+    """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
+
+    Ctrl-C ends the run; what was recorded until then is kept.
+    """
+    experiment = _scenario(scenario)
+    with _told_in_one_line():
+        values = parse_parameters(experiment, parameters)
+        folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{scenario}"))
+        others = _replacements(experiment, replaced)
+        fmus = {name: others.get(name) or cached(unit, 3) for name, unit in experiment.units.items()}
+        task = Task(experiment=experiment(), parameters=values, seed=seed, fmus=fmus, folder=folder)
+        with _interruptible() as interrupted, progress_bar(sys.stderr) as progress:
+            ended = carry_out(task, progress, lambda: bool(interrupted))
+    print_summary(ended, folder)
+    sys.exit(UNIT_FAILED if ended.failure else 0 if ended.outcome.success else TASK_FAILED)
+
+
+def _scenario(name: str) -> type[Experiment]:
+    if name not in SCENARIOS:
+        raise BadCall(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
+    return SCENARIOS[name]
+
+
+def _replacements(experiment: type[Experiment], given: Sequence[str]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for text in given:
+        name, equals, file = text.partition("=")
+        if not equals or not file:
+            raise BadCall(f"--unit {text!r} is not of the form NAME=FILE")
+        if name not in experiment.units:
+            raise BadCall(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
+        found[name] = Path(file)
+    return found
+
+
+def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Iterator[str]:
+    for name in units:
+        for version in (2, 3) if fmi == "both" else (int(fmi),):
+            if version == 2 and has_binary_ports(UNITS[name]):
+                if named and fmi == "2":
+                    raise BadCall(f"{name} has picture ports, so it has no FMI 2 form; build it with --fmi 3")
+                continue
+            yield str(build(UNITS[name], version, out))
+
+
+@contextmanager
+def _told_in_one_line() -> Generator[None, None, None]:
+    try:
+        yield
+    except UnitFailure as e:
+        click.echo(f"Error: {e}", err=True)
+        sys.exit(UNIT_FAILED)
+    except (CosimError, BadParameter, BadRunFolder, BuildError) as e:
+        raise BadCall(str(e)) from e
+
+
+@contextmanager
+def _interruptible() -> Generator[list[int], None, None]:
+    """Let Ctrl-C ask the run to end; a unit's step that is under way is finished, so that the record stays whole."""
+    asked: list[int] = []
+
+    def ask(number: int, _frame: FrameType | None) -> None:
+        asked.append(number)
+
+    before: Any = signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)

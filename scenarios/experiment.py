@@ -1,0 +1,94 @@
+"""What a scenario is: parameters, a system of units, a verdict, figures."""
+
+import abc
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+from cosim.block import Causality, Variable, declared_variables
+from cosim.signals import Signals
+from cosim.system import System
+from scenarios.record import Record
+
+FmuOf = Callable[[str], Path]
+"""Gives a unit's FMU by the unit's name in the system."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A figure of a run's summary."""
+
+    value: float
+    unit: str = "1"
+    description: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """How a task ended: whether it succeeded, in a sentence why, and its figures."""
+
+    success: bool
+    reason: str
+    metrics: Mapping[str, Metric] = field(default_factory=dict[str, Metric])
+
+
+class Watch(abc.ABC):
+    """Follows one run as the experimenter does, who sees everything: says when it is over and how it went."""
+
+    @abc.abstractmethod
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Look at the signals at time t."""
+
+    @property
+    @abc.abstractmethod
+    def over(self) -> bool:
+        """Whether the task has ended, well or not."""
+
+    @abc.abstractmethod
+    def outcome(self) -> Outcome:
+        """Return the verdict on what was seen so far."""
+
+
+class Experiment(abc.ABC):
+    """A scenario. Subclasses name it, declare its parameters, wire its system and judge its runs."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    parameters_type: ClassVar[type[Any]]
+    units: ClassVar[Mapping[str, str]]
+    """The catalogued unit behind each of the system's units, by name in the system."""
+
+    @classmethod
+    def parameters(cls) -> tuple[Variable, ...]:
+        """Return the declared parameters."""
+        return declared_variables(cls.parameters_type, Causality.PARAMETER)
+
+    @abc.abstractmethod
+    def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
+        """Wire the units into a system."""
+
+    @abc.abstractmethod
+    def stop_time(self, parameters: Any) -> Fraction:
+        """Return the time at which a run ends at the latest, in seconds."""
+
+    @abc.abstractmethod
+    def watch(self, parameters: Any) -> Watch:
+        """Return an observer of one run."""
+
+    @abc.abstractmethod
+    def cycle(self) -> tuple[str, ...]:
+        """Return the units that make up one control cycle, whose CPU time the summary tells."""
+
+    @abc.abstractmethod
+    def draw(self, parameters: Any, watch: Watch, record: Record, folder: Path) -> list["Figure"]:
+        """Draw the run's figures into a folder."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a run: file name within the figures folder, without suffix, and caption."""
+
+    name: str
+    caption: str

@@ -1,0 +1,120 @@
+"""Figures of a Helix handover: error and phases, paths, tendons, and the camera pictures of three moments."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from cosim.pinhole import Pinhole
+from scenarios.experiment import Figure
+from scenarios.helix_handover.parameters import Parameters
+from scenarios.helix_handover.rig import camera_of
+from scenarios.helix_handover.snapshot import Snapshot
+from scenarios.plotting import COLOURS, figure
+from scenarios.record import Record
+
+_PHASES = ("WAIT", "APPROACH", "DESCEND", "GRASP", "HOLD", "GIVEN_UP")
+_TITLES = {"WAIT": "start", "APPROACH": "start", "DESCEND": "above the ball", "GRASP": "at the ball", "HOLD": "end"}
+
+
+def draw_handover(parameters: Parameters, snapshots: Sequence[Snapshot], record: Record, folder: Path) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    made = [_pictures(snapshots, folder)] if snapshots else []
+    return [*made, _error(parameters, record, folder), _paths(record, folder), _tendons(record, folder)]
+
+
+def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
+    t = record.time
+    true = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
+    with figure(folder / "error", 1) as (axes,):
+        _shade_phases(axes, t, record["servo.phase"])
+        seen = record["servo.phase"] > 0
+        axes.plot(
+            t[seen],
+            record["servo.error"][seen] * 1000,
+            color=COLOURS[0],
+            label="to the goal, as the controller sees it",
+        )
+        axes.plot(t, true * 1000, color=COLOURS[1], label="gripper to ball, ground truth")
+        axes.axhline(parameters.threshold * 1000, color="#4d5866", lw=0.8, ls="--")
+        axes.axhline(parameters.threshold_grasp * 1000, color="#4d5866", lw=0.8, ls=":")
+        axes.set(xlabel="time (s)", ylabel="distance (mm)", ylim=(0, None), xlim=(t[0], t[-1]))
+        axes.legend(loc="upper right")
+    return Figure("error", "Distance to the goal over time. Dashed: threshold for the descent; dotted: for the grasp.")
+
+
+def _paths(record: Record, folder: Path) -> Figure:
+    with figure(folder / "paths", 3, size=(8.0, 6.0)) as axes:
+        for i, (axis, name) in enumerate(zip(axes, "xyz", strict=True)):
+            known = record["servo.phase"] > 0
+            axis.plot(record.time, record["arm.p_WG"][:, i] * 1000, color=COLOURS[0], label="gripper")
+            axis.plot(record.time, record["hand.p_WO"][:, i] * 1000, color=COLOURS[2], label="ball")
+            estimates = (
+                ("servo.p_WG_est", COLOURS[0], "gripper, estimated"),
+                ("servo.p_WO_est", COLOURS[2], "ball, estimated"),
+            )
+            for signal, colour, label in estimates:
+                values = record[signal][:, i] * 1000
+                axis.plot(record.time[known], values[known], color=colour, ls="--", lw=1, label=label)
+            axis.set(ylabel=f"{name} in W (mm)", xlim=(record.time[0], record.time[-1]))
+        axes[-1].set(xlabel="time (s)")
+        axes[0].legend(ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return Figure("paths", "Positions of gripper and ball in the world, true and as estimated from the pictures.")
+
+
+def _tendons(record: Record, folder: Path) -> Figure:
+    with figure(folder / "tendons", 2, size=(8.0, 5.0)) as (lengths, tensions):
+        for k in range(9):
+            style: dict[str, Any] = {"color": COLOURS[k // 3], "ls": ("-", "--", ":")[k % 3], "lw": 1.2}
+            label = f"segment {k // 3 + 1}, {120 * (k % 3)}°"
+            lengths.plot(record.time, record["servo.dl_t"][:, k] * 1000, drawstyle="steps-post", label=label, **style)
+            tensions.plot(record.time, record["arm.tension"][:, k], **style)
+        lengths.set(ylabel="commanded change (mm)", xlim=(record.time[0], record.time[-1]))
+        tensions.set(ylabel="tension (N)", xlabel="time (s)", xlim=(record.time[0], record.time[-1]))
+        lengths.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return Figure("tendons", "Commanded tendon lengths, from calibration, and tendon forces. A slack tendon is at 0 N.")
+
+
+def _pictures(snapshots: Sequence[Snapshot], folder: Path) -> Figure:
+    chosen = [snapshots[0], *[s for s in snapshots[1:] if s.phase == "GRASP"][:1], snapshots[-1]]
+    with figure(folder / "pictures", 2, len(chosen), size=(4.0 * len(chosen), 4.7)) as axes:
+        for i, shot in enumerate(chosen):
+            for side, axis in (("left", axes[i]), ("right", axes[i + len(chosen)])):
+                _show(axis, shot, side)
+            axes[i].set_title(f"{shot.t:.1f} s, {_TITLES.get(shot.phase, shot.phase.lower())}")
+    caption = "Left (above) and right camera. Marked as estimated: ball (circle), wrist (cross), gripper (plus)."
+    return Figure("pictures", caption)
+
+
+def _show(axis: Axes, shot: Snapshot, side: str) -> None:
+    picture: NDArray[np.uint8] = getattr(shot, side)
+    axis.imshow(picture[:, :, ::-1])
+    axis.set_axis_off()
+    camera = camera_of(side)
+    if not np.any(shot.p_WG_est):
+        return
+    ball, wrist, gripper = (_pixel(camera, p) for p in (shot.p_WO_est, shot.p_WR_est, shot.p_WG_est))
+    axis.plot(*ball, "o", ms=16, mfc="none", mec="#ffd23f", mew=1.6)
+    axis.plot(*wrist, "x", ms=8, color="#2c5fff", mew=1.8)
+    axis.plot(*gripper, "+", ms=11, color="#ff3b30", mew=1.8)
+    axis.set(xlim=(0, picture.shape[1]), ylim=(picture.shape[0], 0))
+
+
+def _pixel(camera: Pinhole, p_WP: NDArray[np.float64]) -> tuple[float, float]:
+    u, v = camera.project(p_WP)
+    return float(u), float(v)
+
+
+def _shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64]) -> None:
+    edges = np.flatnonzero(np.diff(phase)) + 1
+    starts = [0, *edges.tolist()]
+    ends = [*edges.tolist(), len(t) - 1]
+    for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
+        if k % 2:
+            axes.axvspan(t[a], t[b], color="#eef2f7", lw=0, zorder=0)
+        if t[b] - t[a] > 0.06 * (t[-1] - t[0]):
+            name = _PHASES[int(phase[a])].replace("_", " ").lower()
+            axes.text((t[a] + t[b]) / 2, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color="#4d5866")

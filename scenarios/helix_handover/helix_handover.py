@@ -1,0 +1,90 @@
+"""A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.system import System
+from scenarios.experiment import Experiment, Figure, FmuOf, Watch
+from scenarios.helix_handover.figures import draw_handover
+from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.rig import calibration
+from scenarios.helix_handover.watch import HandoverWatch
+from scenarios.record import Record
+
+
+class HelixHandover(Experiment):
+    """The thesis's first experiment: one automated human-to-robot handover."""
+
+    name: ClassVar[str] = "helix_handover"
+    title: ClassVar[str] = "the Helix takes a ball from a hand by visual servoing"
+    parameters_type: ClassVar[type[Parameters]] = Parameters
+    units: ClassVar[Mapping[str, str]] = {
+        "camera": "StereoCamera",
+        "vision": "HandoverVision",
+        "servo": "VisualServo",
+        "arm": "TendonArm",
+        "hand": "HandoverPartner",
+    }
+
+    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+        """Wire arm, hand, cameras, vision and controller."""
+        p = parameters
+        hand_seed, camera_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
+        left, right = p.covered(Cover.LEFT), p.covered(Cover.RIGHT)
+        s = System()
+        camera = s.add(
+            "camera",
+            fmu("camera"),
+            **calibration(),
+            seed=camera_seed,
+            cover_left_from=left[0],
+            cover_left_until=left[1],
+            cover_right_from=right[0],
+            cover_right_until=right[1],
+        )
+        vision = s.add("vision", fmu("vision"), **calibration())
+        servo = s.add(
+            "servo",
+            fmu("servo"),
+            period=p.period,
+            alpha=p.alpha,
+            threshold=p.threshold,
+            threshold_grasp=p.threshold_grasp,
+        )
+        arm = s.add("arm", fmu("arm"))
+        hand = s.add("hand", fmu("hand"), seed=hand_seed, p_WO_0=p.p_WO)
+        for name in ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip"):
+            s.connect(getattr(arm.y, name), getattr(camera.u, name))
+        for name in ("p_WO", "p_WH"):
+            s.connect(getattr(hand.y, name), getattr(camera.u, name))
+        s.connect(camera.y.left, vision.u.left)
+        s.connect(camera.y.right, vision.u.right)
+        for name in ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"):
+            s.connect(getattr(vision.y, name), getattr(servo.u, name))
+        s.connect(servo.y.dl_t, arm.u.dl_t)
+        s.connect(servo.y.closure, arm.u.closure)
+        s.connect(hand.y.f_G, arm.u.f_G)
+        for name in ("p_WG", "q_WG", "grip"):
+            s.connect(getattr(arm.y, name), getattr(hand.u, name))
+        return s
+
+    def stop_time(self, parameters: Parameters) -> Fraction:
+        """Return the patience for the approach and time for closing the gripper."""
+        return Fraction(round(parameters.patience)) + 15
+
+    def watch(self, parameters: Parameters) -> Watch:
+        """Return the judge of one handover."""
+        return HandoverWatch(parameters)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the robot's own computing: seeing and controlling."""
+        return ("vision", "servo")
+
+    def draw(self, parameters: Parameters, watch: Watch, record: Record, folder: Path) -> list[Figure]:
+        """Draw errors, paths and tendons over time, and the camera pictures of three moments."""
+        snapshots = watch.snapshots if isinstance(watch, HandoverWatch) else []
+        return draw_handover(parameters, snapshots, record, folder)

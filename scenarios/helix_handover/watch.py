@@ -1,0 +1,110 @@
+"""Judges a Helix handover by ground truth, which the arm's controller does not see."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.ports import Floats
+from cosim.signals import Signals
+from scenarios.experiment import Metric, Outcome, Watch
+from scenarios.helix_handover.parameters import Parameters
+from scenarios.helix_handover.snapshot import Snapshot
+
+_SETTLING = 1.0
+"""How long the ball must stay in the closed gripper, s (assumed)."""
+
+_NOTHING_SEEN = 10.0
+"""How long the controller may wait for its first sight of ball and ring, s (assumed)."""
+
+_TAKEN_WITHIN = 0.05
+"""Largest distance between gripper and ball at the end, m (assumed: the thesis's threshold)."""
+
+
+class HandoverWatch(Watch):
+    """Follows one handover, keeps pictures of three moments and tells how it ended."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.snapshots: list[Snapshot] = []
+        self.phases: dict[str, float] = {}
+        self._t = 0.0
+        self._phase = ""
+        self._holder = ""
+        self._p_WG: Floats = np.zeros(3)
+        self._p_WO: Floats = np.zeros(3)
+        self._error = 0.0
+        self._control_steps = 0
+        self._released_at: float | None = None
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Follow phases and positions."""
+        phase, holder = signals.text("servo.phase"), signals.text("hand.holder")
+        self._p_WG, self._p_WO = signals["arm.p_WG"], signals["hand.p_WO"]
+        self._error = float(signals["servo.error"])
+        self._t = t
+        if phase != self._phase:
+            self.phases.setdefault(phase, t)
+            if phase in ("DESCEND", "GRASP") or not self.snapshots:
+                self.snapshots.append(Snapshot.take(t, phase, signals))
+        if holder == "GRIPPER" and self._released_at is None:
+            self._released_at = t
+        self._phase, self._holder = phase, holder
+        if self.over:
+            self.snapshots.append(Snapshot.take(t, phase, signals))
+
+    @property
+    def over(self) -> bool:
+        """Whether the ball changed hands, the gripper closed beside it, or the controller gave up."""
+        if self._phase == "GIVEN_UP" or self._t >= self._deadline:
+            return True
+        if self._released_at is not None:
+            return self._t >= self._released_at + _SETTLING
+        closed = self.phases.get("HOLD")
+        return closed is not None and self._t >= closed + _SETTLING
+
+    @property
+    def _deadline(self) -> float:
+        if self._phase == "WAIT":
+            return _NOTHING_SEEN
+        return self.parameters.patience if "GRASP" not in self.phases else np.inf
+
+    @property
+    def distance(self) -> float:
+        """Distance between gripper and ball by ground truth, m."""
+        return float(np.linalg.norm(self._p_WG - self._p_WO))
+
+    def outcome(self) -> Outcome:
+        """Return whether the gripper has the ball, why, and the figures."""
+        held = self._holder == "GRIPPER"
+        success = held and self.distance <= _TAKEN_WITHIN
+        begun = self.phases.get("GRASP")
+        metrics = {
+            "final_distance": Metric(self.distance, "m", "gripper to ball at the end, ground truth"),
+            "controller_error": Metric(self._error, "m", "error that the controller saw last"),
+        }
+        if begun is not None:
+            steps = round(begun / float(self.parameters.period)) + 1
+            metrics["arm_time"] = Metric(begun, "s", "from the start until the gripper begins to close")
+            metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
+        if self._released_at is not None:
+            metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the hand lets go")
+        return Outcome(success=success, reason=self._reason(success, held), metrics=metrics)
+
+    def _reason(self, success: bool, held: bool) -> str:
+        if success:
+            return f"the hand let go at {self._released_at:.1f} s and the gripper holds the ball"
+        if held:
+            return f"the ball is {self.distance:.3f} m from the gripper, more than {_TAKEN_WITHIN} m"
+        where = f"ball at {_told(self._p_WO)} m, gripper at {_told(self._p_WG)} m"
+        if self._phase == "WAIT":
+            return f"the cameras did not see both ball and arm within {_NOTHING_SEEN:.0f} s; {where}"
+        if self._phase == "GIVEN_UP":
+            return f"out of reach: the arm came no nearer than {self._error:.2f} m to its goal; {where}"
+        if "HOLD" in self.phases:
+            return f"the gripper closed {self.distance:.3f} m beside the ball; the hand kept it"
+        if self._t < self._deadline:
+            return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"
+        return f"no grasp within {self.parameters.patience:.0f} s: error {self._error:.3f} m; {where}"
+
+
+def _told(p: NDArray[np.float64]) -> str:
+    return "(" + ", ".join(f"{x:.2f}" for x in p) + ")"

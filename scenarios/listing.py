@@ -1,0 +1,70 @@
+"""What `handover` prints: the catalog, a scenario's parameters, a run's summary."""
+
+from typing import Any
+
+import numpy as np
+from fmus.catalog import UNITS
+from rich.console import Console
+from rich.table import Table
+
+from cosim.start_values import range_of
+from scenarios.catalog import SCENARIOS
+from scenarios.experiment import Experiment
+from scenarios.report import told
+from scenarios.run_folder import RunFolder
+from scenarios.runner import Ended
+
+_SHOWN = ("final_distance", "steps", "arm_time", "handover_time", "cpu_per_cycle", "peak_memory")
+
+
+def print_catalog() -> None:
+    """Print scenarios and units, a line each."""
+    console = _console()
+    console.print("Scenarios", style="bold")
+    _print_rows(console, [(e.name, e.title) for e in SCENARIOS.values()])
+    console.print("Units", style="bold")
+    _print_rows(console, [(name, unit.description) for name, unit in UNITS.items()])
+
+
+def print_scenario(experiment: type[Experiment]) -> None:
+    """Print a scenario's parameters with defaults and ranges, and its units."""
+    console = _console()
+    console.print(f"{experiment.name}: {experiment.title}", style="bold")
+    console.print("Parameters, to be set with -p name=value")
+    rows: list[tuple[str, ...]] = []
+    for v in experiment.parameters():
+        allowed = " | ".join(n.lower() for n, _ in v.items) if v.items else range_of(v)
+        rows.append((v.name, _plain(v.start), allowed, v.description))
+    _print_rows(console, rows)
+    console.print("Units, to be replaced with --unit name=file.fmu")
+    _print_rows(console, list(experiment.units.items()))
+
+
+def print_summary(ended: Ended, folder: RunFolder) -> None:
+    """Print how a run ended, its main figures, and where the report is."""
+    console = _console()
+    summary = ended.summary
+    verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
+    console.print(f"{summary['scenario']} {verdict}: ", end="")
+    console.print(summary["reason"], markup=False)
+    rows = [(m["description"] or n, told(m)) for n, m in summary["metrics"].items() if n in _SHOWN]
+    rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
+    _print_rows(console, rows)
+    console.print(f"report: {folder.report}", markup=False)
+
+
+def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
+    table = Table.grid(padding=(0, 2))
+    for row in rows:
+        table.add_row("", *row)
+    console.print(table)
+
+
+def _console() -> Console:
+    return Console(highlight=False, soft_wrap=True)
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return ",".join(f"{x:g}" for x in value.reshape(-1).tolist())
+    return str(getattr(value, "name", value)).lower()

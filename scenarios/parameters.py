@@ -1,0 +1,71 @@
+"""Turns `name=value` texts into a scenario's parameters; every fault is told at once, with what would be right."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Kind, Variable
+from cosim.exceptions import nearest
+from cosim.start_values import fault_of, range_of
+from scenarios.experiment import Experiment
+
+
+class BadParameter(ValueError):
+    """Parameters that a scenario does not have, or values that they cannot take; `faults` lists them."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("; ".join(faults))
+        self.faults = tuple(faults)
+
+
+def parse_parameters(experiment: type[Experiment], given: Sequence[str]) -> Any:
+    """Return the scenario's parameters with the given ones set.
+
+    Numbers are in SI units; arrays are numbers between commas; enumerations are given by name.
+
+    Raises:
+        BadParameter: with every fault of the given texts.
+    """
+    known = {v.name: v for v in experiment.parameters()}
+    values: dict[str, Any] = {}
+    faults: list[str] = []
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals:
+            faults.append(f"{text!r} is not of the form name=value")
+        elif name not in known:
+            faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
+        elif name in values:
+            faults.append(f"{name} is given twice")
+        else:
+            values[name], fault = _parse(known[name], value)
+            if fault:
+                faults.append(f"{name}: {fault}")
+    if faults:
+        raise BadParameter(faults)
+    return experiment.parameters_type(**values)
+
+
+def _parse(variable: Variable, text: str) -> tuple[Any, str | None]:
+    value: Any = text
+    if variable.kind is Kind.BOOLEAN:
+        value = {"true": True, "false": False}.get(text.lower(), text)
+    elif variable.kind in (Kind.REAL, Kind.INTEGER):
+        try:
+            numbers = [float(part) for part in text.split(",")]
+        except ValueError:
+            numbers = []
+        if variable.shape and numbers:
+            value = np.array(numbers).reshape(variable.shape) if len(numbers) == variable.size else np.array(numbers)
+        elif len(numbers) == 1:
+            value = numbers[0]
+    fault = fault_of(variable, value)
+    if fault is None and variable.enumeration is not None:
+        value = next(e for e in variable.enumeration if e.name == str(text).upper())
+    if fault is None and variable.kind is Kind.INTEGER:
+        value = int(value)
+    wanted = range_of(variable)
+    if fault and wanted and wanted not in fault:
+        fault += f", {wanted}"
+    return value, fault

@@ -1,0 +1,47 @@
+"""Reads the signals of a run back, array by array: `record["arm.p_WG"]` is of shape (rows, 3)."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from cosim.exceptions import nearest
+
+_SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
+
+
+class Record:
+    """The signals of a run. `time` is in seconds, shape (rows,)."""
+
+    def __init__(self, path: Path) -> None:
+        self._table = pq.read_table(path)
+        self._columns: dict[str, list[str]] = {}
+        for name in self._table.column_names:
+            self._columns.setdefault(_SUBSCRIPT.sub("", name), []).append(name)
+        self.time = self._values("time")
+
+    def __getitem__(self, signal: str) -> NDArray[Any]:
+        """Return a signal over time; an array port has its shape after the first axis.
+
+        Raises:
+            KeyError: no such signal was recorded.
+        """
+        if signal not in self._columns:
+            raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
+        names = self._columns[signal]
+        last = _SUBSCRIPT.search(names[-1])
+        if last is None:
+            return self._values(names[0])
+        shape = tuple(int(i) for i in last[1].split(","))
+        return np.column_stack([self._values(n) for n in names]).reshape(-1, *shape)
+
+    def unit(self, signal: str) -> str:
+        """Return a signal's unit."""
+        metadata = self._table.schema.field(self._columns[signal][0]).metadata or {}
+        return metadata.get(b"unit", b"1").decode()
+
+    def _values(self, name: str) -> NDArray[Any]:
+        return self._table.column(name).to_numpy()

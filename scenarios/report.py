@@ -1,0 +1,44 @@
+"""Writes the report page of a run: one HTML file that opens offline, with its figures inside."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import Any
+
+import jinja2
+
+from scenarios.experiment import Figure
+from scenarios.run_folder import RunFolder
+
+
+def write_report(
+    folder: RunFolder,
+    title: str,
+    summary: Mapping[str, Any],
+    units: Sequence[tuple[str, str, str, int, float]],
+    figures: Sequence[Figure],
+) -> None:
+    """Write `report.html`: verdict, figures of merit, parameters, units with their CPU time, and the figures."""
+    source = resources.files("scenarios").joinpath("report.html").read_text(encoding="utf-8")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    environment.filters["figure"] = told
+    pictures = [(f, _inline(folder, f)) for f in figures]
+    page = environment.from_string(source).render(title=title, summary=summary, units=units, pictures=pictures)
+    folder.report.write_text(page, encoding="utf-8")
+
+
+def told(metric: Mapping[str, Any]) -> str:
+    """Write a metric with a unit that reads well: mm for small lengths, ms for small times, MB for memory."""
+    value, unit = metric["value"], metric["unit"]
+    if unit == "m" and abs(value) < 1:
+        return f"{value * 1000:.1f} mm"
+    if unit == "s" and abs(value) < 0.1:
+        return f"{value * 1000:.2f} ms"
+    if unit == "B":
+        return f"{value / 1e6:.0f} MB"
+    return f"{value:.4g}" + ("" if unit == "1" else f" {unit}")
+
+
+def _inline(folder: RunFolder, figure: Figure) -> str:
+    data = (folder.figures / f"{figure.name}.png").read_bytes()
+    return "data:image/png;base64," + base64.b64encode(data).decode()

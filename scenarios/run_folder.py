@@ -1,0 +1,82 @@
+"""The folder that a run leaves behind: checked before the run, written to during and after it."""
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+_PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
+
+
+class BadRunFolder(ValueError):
+    """The output folder cannot be used."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"output folder {path}: {fault}")
+        self.path, self.fault = path, fault
+
+
+class RunFolder:
+    """Paths of what a run leaves: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `figures/`.
+
+    Raises:
+        BadRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if path.exists():
+            if not path.is_dir():
+                raise BadRunFolder(path, "there is a file of that name; name a new or an empty folder")
+            if any(path.iterdir()):
+                raise BadRunFolder(path, "it is not empty; name a new or an empty folder")
+        existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
+        if not existing.is_dir():
+            raise BadRunFolder(path, f"{existing} is a file, so no folder can be made in it")
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise BadRunFolder(path, f"no permission to write to {existing}")
+
+    @property
+    def signals(self) -> Path:
+        """The record."""
+        return self.path / "signals.parquet"
+
+    @property
+    def figures(self) -> Path:
+        """The folder of figures."""
+        return self.path / "figures"
+
+    @property
+    def report(self) -> Path:
+        """The report page."""
+        return self.path / "report.html"
+
+    def make(self) -> None:
+        """Make the folder.
+
+        Raises:
+            BadRunFolder: it cannot be made.
+        """
+        try:
+            self.figures.mkdir(parents=True)
+        except OSError as e:
+            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Write `summary.json`."""
+        _write_json(self.path / "summary.json", summary)
+
+    def write_run(self, configuration: Mapping[str, Any], fmus: Mapping[str, Path]) -> None:
+        """Write `run.json`: configuration, versions, and name and hash of every unit's FMU."""
+        units = {n: {"fmu": p.name, "sha256": hashlib.sha256(p.read_bytes()).hexdigest()} for n, p in fmus.items()}
+        versions = {"python": platform.python_version(), "platform": platform.platform()}
+        versions |= {p: importlib.metadata.version(p) for p in _PACKAGES}
+        _write_json(self.path / "run.json", {**configuration, "units": units, "versions": versions})
+
+
+def _write_json(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")

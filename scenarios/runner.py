@@ -1,0 +1,146 @@
+"""Carries out one run of a scenario: everything is checked, then the folder is made, then it runs and is reported."""
+
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.exceptions import UnitFailure
+from cosim.master import Master
+from cosim.recorder import Recorder
+from cosim.signals import Signals
+from scenarios.experiment import Experiment, Metric, Outcome, Watch
+from scenarios.record import Record
+from scenarios.report import write_report
+from scenarios.run_folder import RunFolder
+
+Progress = Callable[[float, float], None]
+"""Told the simulated time and the time at which the run ends at the latest, in seconds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What to run: scenario, parameters, seed, the FMU of each unit, the folder for what it leaves."""
+
+    experiment: Experiment
+    parameters: Any
+    seed: int
+    fmus: Mapping[str, Path]
+    folder: RunFolder
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ended:
+    """How a run ended. `failure` is set when a unit failed; the record then ends there."""
+
+    outcome: Outcome
+    summary: Mapping[str, Any]
+    failure: UnitFailure | None = None
+
+
+def carry_out(task: Task, progress: Progress, interrupted: Callable[[], bool]) -> Ended:
+    """Run a scenario to its end, its failure or its interruption and write its folder.
+
+    Raises:
+        WiringError, ScheduleError, InvalidFmu, BadRunFolder: before anything was written.
+        UnitFailure: a unit could not be initialised; nothing was written.
+    """
+    experiment, parameters = task.experiment, task.parameters
+    stop = experiment.stop_time(parameters)
+    watch = experiment.watch(parameters)
+    failure: UnitFailure | None = None
+    began, cpu_began = time.perf_counter(), time.process_time()
+    system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
+    with Master(system) as master:
+        task.folder.make()
+        with Recorder(task.folder.signals) as recorder:
+
+            def tell(t: float, _signals: Signals) -> None:
+                progress(t, float(stop))
+
+            try:
+                master.run(stop, [recorder, watch, tell], until=lambda: watch.over or interrupted())
+            except UnitFailure as e:
+                failure = e
+    spent = {"wall": time.perf_counter() - began, "cpu": time.process_time() - cpu_began}
+    outcome = _outcome(watch, failure, interrupted())
+    metrics = {**outcome.metrics, **_speed(experiment, master)}
+    summary = _summary(task, outcome, metrics, master, spent)
+    task.folder.write_summary(summary)
+    task.folder.write_run(_configuration(task), {n: u.description.path for n, u in system.units.items()})
+    _present(task, watch, summary, system_rows(master))
+    return Ended(outcome=outcome, summary=summary, failure=failure)
+
+
+def system_rows(master: Master) -> list[tuple[str, str, str, int, float]]:
+    """Return name, FMU, period, steps and CPU seconds of each unit."""
+    rows: list[tuple[str, str, str, int, float]] = []
+    for name, unit in master.system.units.items():
+        d = unit.description
+        period = f"{float(unit.period) * 1000:.4g} ms"
+        rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
+    return rows
+
+
+def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Outcome:
+    seen = watch.outcome()
+    if failure is not None:
+        first = str(failure).splitlines()[0]
+        return Outcome(success=False, reason=f"a unit failed: {first}", metrics=seen.metrics)
+    if interrupted and not watch.over:
+        return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
+    return seen
+
+
+def _speed(experiment: Experiment, master: Master) -> dict[str, Metric]:
+    cycle = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    units = " + ".join(experiment.cycle())
+    metrics = {"peak_memory": Metric(float(peak), "B", "largest resident memory of the process")}
+    if cycle:
+        metrics["cpu_per_cycle"] = Metric(sum(cycle), "s", f"median CPU time of a control cycle ({units})")
+    for name, spent in master.cpu.items():
+        metrics[f"cpu_{name}"] = Metric(float(np.sum(spent)), "s", f"CPU time of {name} in all")
+    return metrics
+
+
+def _configuration(task: Task) -> dict[str, Any]:
+    values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
+    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed}
+
+
+def _summary(
+    task: Task, outcome: Outcome, metrics: Mapping[str, Metric], master: Master, spent: Mapping[str, float]
+) -> dict[str, Any]:
+    return {
+        **_configuration(task),
+        "success": outcome.success,
+        "reason": outcome.reason,
+        "metrics": {k: {"value": m.value, "unit": m.unit, "description": m.description} for k, m in metrics.items()},
+        "simulated_seconds": master.time,
+        "wall_seconds": spent["wall"],
+        "cpu_seconds": spent["cpu"],
+    }
+
+
+def _present(
+    task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[tuple[str, str, str, int, float]]
+) -> None:
+    figures = []
+    if task.folder.signals.exists():
+        record = Record(task.folder.signals)
+        figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
+    write_report(task.folder, task.experiment.title, summary, units, figures)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    name = getattr(value, "name", None)
+    return name if name is not None else value

@@ -1,0 +1,200 @@
+"""Small blocks with answers known in closed form, built as FMUs by the tests of the master."""
+
+import enum
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.ports import Raster, Vector2, output, parameter, port
+from cosim.units import Kilogram, Metre, MetrePerSecond, Newton, NewtonPerMetre, Number
+
+TinyPicture = Annotated[NDArray[np.uint8], Raster(4, 2)]
+
+
+class Light(enum.IntEnum):
+    RED = 1
+    GREEN = 2
+
+
+class Stateless:
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class MassParams:
+    m: Kilogram = parameter(1.0, "mass", minimum=0.001, maximum=100.0)
+    x_0: Metre = parameter(1.0, "position at the start")
+
+
+@dataclass(kw_only=True)
+class MassInputs:
+    f: Newton = port(0.0, "force")
+
+
+@dataclass(kw_only=True)
+class MassOutputs:
+    x: Metre = output("position")
+    v: MetrePerSecond = output("speed")
+
+
+class Mass:
+    """Moves by m x'' = f, exactly for a force that is held over the step."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: MassParams) -> None:
+        self.m, self.x, self.v = params.m, params.x_0, 0.0
+
+    def outputs(self, t: float, u: MassInputs) -> MassOutputs:  # noqa: ARG002
+        return MassOutputs(x=self.x, v=self.v)
+
+    def step(self, t: float, dt: float, u: MassInputs) -> MassOutputs:
+        a = u.f / self.m
+        self.x += self.v * dt + a * dt * dt / 2
+        self.v += a * dt
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return pickle.dumps((self.x, self.v))
+
+    def set_state(self, state: bytes) -> None:
+        self.x, self.v = pickle.loads(state)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringParams:
+    k: NewtonPerMetre = parameter(4.0, "stiffness", minimum=0.0)
+
+
+@dataclass(kw_only=True)
+class SpringInputs:
+    x: Metre = port(0.0, "stretch")
+
+
+@dataclass(kw_only=True)
+class SpringOutputs:
+    f: Newton = output("force")
+
+
+class Spring(Stateless):
+    """Pulls back by f = -k x, at once."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"f": ("x",)}
+
+    def __init__(self, params: SpringParams) -> None:
+        self.k = params.k
+
+    def outputs(self, t: float, u: SpringInputs) -> SpringOutputs:  # noqa: ARG002
+        return SpringOutputs(f=-self.k * u.x)
+
+    def step(self, t: float, dt: float, u: SpringInputs) -> SpringOutputs:  # noqa: ARG002
+        return self.outputs(t, u)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CounterParams:
+    fails_at: int = parameter(10**6, "count at which it raises", minimum=1)
+
+
+@dataclass(kw_only=True)
+class CounterInputs:
+    pass
+
+
+@dataclass(kw_only=True)
+class CounterOutputs:
+    n: int = output("number of steps")
+    at: Number = output("time at the end of the last step")
+    odd: bool = output("whether the number is odd")
+    light: Light = output("green after an odd number")
+    pair: Vector2[Number] = output("number and its square")
+    picture: TinyPicture = output("all pixels have the number as their value")
+
+
+class Counter:
+    """Counts its steps and tells in all kinds of port."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: CounterParams) -> None:
+        self.fails_at, self.n = params.fails_at, 0
+
+    def outputs(self, t: float, u: CounterInputs) -> CounterOutputs:  # noqa: ARG002
+        n = self.n
+        odd = n % 2 == 1
+        return CounterOutputs(
+            n=n,
+            at=t,
+            odd=odd,
+            light=Light.GREEN if odd else Light.RED,
+            pair=np.array([n, n * n], dtype=np.float64),
+            picture=np.full((2, 4, 3), n % 256, dtype=np.uint8),
+        )
+
+    def step(self, t: float, dt: float, u: CounterInputs) -> CounterOutputs:
+        self.n += 1
+        if self.n == self.fails_at:
+            raise RuntimeError(f"count {self.n} was asked to fail")
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return pickle.dumps(self.n)
+
+    def set_state(self, state: bytes) -> None:
+        self.n = pickle.loads(state)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EchoParams:
+    pass
+
+
+@dataclass(kw_only=True)
+class EchoInputs:
+    n: int = port(0, "a number")
+    odd: bool = port(False, "a truth")
+    light: Light = port(Light.RED, "a light")
+    pair: Vector2[Number] = port(np.zeros(2), "two numbers")
+    picture: TinyPicture = port(np.zeros((2, 4, 3), dtype=np.uint8), "a picture")
+
+
+@dataclass(kw_only=True)
+class EchoOutputs:
+    n: int = output("the number")
+    odd: bool = output("the truth")
+    light: Light = output("the light")
+    pair: Vector2[Number] = output("the numbers")
+    brightness: Number = output("mean of the picture's pixels")
+
+
+class Echo(Stateless):
+    """Gives back what it gets, at once."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "n": ("n",),
+        "odd": ("odd",),
+        "light": ("light",),
+        "pair": ("pair",),
+        "brightness": ("picture",),
+    }
+
+    def __init__(self, params: EchoParams) -> None: ...
+
+    def outputs(self, t: float, u: EchoInputs) -> EchoOutputs:  # noqa: ARG002
+        return EchoOutputs(n=u.n, odd=u.odd, light=u.light, pair=np.array(u.pair), brightness=float(u.picture.mean()))
+
+    def step(self, t: float, dt: float, u: EchoInputs) -> EchoOutputs:  # noqa: ARG002
+        return self.outputs(t, u)

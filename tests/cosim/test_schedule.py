@@ -1,0 +1,89 @@
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from cosim.block import Causality, Kind
+from cosim.exceptions import ScheduleError
+from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.schedule import Schedule
+from cosim.system import PortName, System, Unit
+
+
+def description(feedthrough: dict[str, tuple[str, ...]]) -> FmuDescription:
+    def ports(causality: Causality, *names: str) -> dict[str, FmuPort]:
+        made = [
+            FmuPort(name=n, kind=Kind.REAL, causality=causality, fmi_type="Float64", references=(0,)) for n in names
+        ]
+        return {p.name: p for p in made}
+
+    return FmuDescription(
+        path=Path("none.fmu"),
+        fmi=3,
+        name="None",
+        identifier="None",
+        token="",
+        step=None,
+        parameters={},
+        inputs=ports(Causality.INPUT, "u"),
+        outputs=ports(Causality.OUTPUT, "y"),
+        feedthrough=feedthrough,
+    )
+
+
+def system(direct: str, plain: str = "", period: Fraction = Fraction(1, 10)) -> System:
+    s = System()
+    for name in direct.split():
+        s.units[name] = Unit(name, description({"y": ("u",)}), {}, period)
+    for name in plain.split():
+        s.units[name] = Unit(name, description({}), {}, period)
+    return s
+
+
+def connect(s: System, *pairs: str) -> None:
+    for pair in pairs:
+        a, b = pair.split(">")
+        s.connect(PortName(a, "y"), PortName(b, "u"))
+
+
+def test_a_chain_of_feedthrough_is_ordered_from_its_source():
+    s = system("c b a", plain="plant")
+    connect(s, "plant>a", "a>b", "b>c", "c>plant")
+    schedule = Schedule(s)
+    assert [x.unit for x in schedule.algebraic] == ["a", "b", "c"]
+    assert [x.unit for x in schedule.integrating] == ["plant"]
+
+
+def test_units_that_do_not_depend_on_each_other_keep_their_order():
+    s = system("z y x", plain="n m")
+    assert [x.unit for x in Schedule(s).slots] == ["z", "y", "x", "n", "m"]
+
+
+def test_an_algebraic_loop_is_spelled_out():
+    s = system("a b c")
+    connect(s, "a>b", "b>c", "c>a")
+    with pytest.raises(ScheduleError) as caught:
+        Schedule(s)
+    loops = ("a -> b -> c -> a", "b -> c -> a -> b", "c -> a -> b -> c")
+    assert str(caught.value).endswith(loops)
+
+
+def test_a_loop_through_a_plant_is_no_algebraic_loop():
+    s = system("controller", plain="plant")
+    connect(s, "controller>plant", "plant>controller")
+    assert [x.unit for x in Schedule(s).slots] == ["controller", "plant"]
+
+
+def test_the_tick_divides_all_periods_exactly():
+    s = system("a", period=Fraction(1, 30))
+    s.units |= system("", plain="b", period=Fraction(1, 50)).units
+    schedule = Schedule(s)
+    assert schedule.tick == Fraction(1, 150)
+    assert {x.unit: x.every for x in schedule.slots} == {"a": 5, "b": 3}
+
+
+def test_time_does_not_drift():
+    schedule = Schedule(system("a", period=Fraction(1, 10)))
+    assert schedule.time(3) == 0.3
+    assert schedule.time(10**9) == 1e8
+    assert schedule.ticks(Fraction(1, 3)) == 4

@@ -1,0 +1,67 @@
+import enum
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.block import Causality, Kind, Variable
+from cosim.start_values import fault_of, numbers_of, range_of
+from cosim.units import BaseExponents, Unit
+
+METRE = Unit("m", BaseExponents(m=1))
+
+
+class Place(enum.IntEnum):
+    FRONT = 0
+    LEFT = 4
+
+
+def variable(kind: Kind, **facts: Any) -> Variable:
+    return Variable(name="x", kind=kind, causality=Causality.PARAMETER, description="", start=None, **facts)
+
+
+@pytest.mark.parametrize(
+    ("given", "value", "told"),
+    [
+        (variable(Kind.REAL, unit=METRE, minimum=0.0, maximum=2.0), 2.5, "out of range: from 0 to 2 m"),
+        (variable(Kind.REAL, unit=METRE, minimum=0.0), -1, "at least 0 m"),
+        (variable(Kind.REAL, unit=METRE, maximum=0.0), 1, "at most 0 m"),
+        (variable(Kind.REAL, unit=METRE), "far", "'far' is not a number in m"),
+        (variable(Kind.REAL), float("nan"), "not finite"),
+        (variable(Kind.REAL, shape=(3,), unit=METRE), [1.0, 2.0], "an array of shape [3] of numbers in m"),
+        (variable(Kind.REAL, shape=(2,), minimum=0.0), [1.0, -2.0], "out of range"),
+        (variable(Kind.INTEGER), 1.5, "a whole number"),
+        (variable(Kind.BOOLEAN), "maybe", "neither true nor false"),
+        (variable(Kind.ENUMERATION, enumeration=Place), "behind", "none of FRONT, LEFT"),
+        (variable(Kind.ENUMERATION, enumeration=Place), 3, "none of 0 (FRONT), 4 (LEFT)"),
+        (variable(Kind.STRING), 5, "5 is not a string"),
+    ],
+)
+def test_a_bad_value_is_told_with_what_would_be_right(given: Variable, value: Any, told: str):
+    fault = fault_of(given, value)
+    assert fault is not None
+    assert told in fault
+
+
+@pytest.mark.parametrize(
+    ("given", "value"),
+    [
+        (variable(Kind.REAL, unit=METRE, minimum=0.0, maximum=2.0), 2.0),
+        (variable(Kind.REAL, shape=(3,)), np.ones(3)),
+        (variable(Kind.INTEGER, minimum=0.0), 7),
+        (variable(Kind.BOOLEAN), True),
+        (variable(Kind.ENUMERATION, enumeration=Place), "left"),
+        (variable(Kind.STRING), "a word"),
+    ],
+)
+def test_a_good_value_has_no_fault(given: Variable, value: Any):
+    assert fault_of(given, value) is None
+
+
+def test_numbers_come_in_row_major_order():
+    assert numbers_of(variable(Kind.REAL, shape=(2, 2)), [[1, 2], [3, 4]]).tolist() == [1, 2, 3, 4]
+    assert numbers_of(variable(Kind.ENUMERATION, enumeration=Place), "Left").tolist() == [4]
+
+
+def test_no_range_is_told_where_there_is_none():
+    assert range_of(variable(Kind.REAL)) == ""

@@ -1,0 +1,40 @@
+import pytest
+
+from scenarios.helix_handover.helix_handover import HelixHandover
+from scenarios.helix_handover.parameters import Cover, Place
+from scenarios.parameters import BadParameter, parse_parameters
+
+
+def test_values_are_parsed_by_their_declared_kind():
+    p = parse_parameters(HelixHandover, ["alpha=0.1", "place=back_left", "cover=right"])
+    assert (p.alpha, p.place, p.cover) == (0.1, Place.BACK_LEFT, Cover.RIGHT)
+
+
+def test_what_is_not_given_has_its_default():
+    assert parse_parameters(HelixHandover, []) == HelixHandover.parameters_type()
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ("alfa=0.1", "did you mean alpha"),
+        ("alpha=1.5", "from 0.01 to 1"),
+        ("alpha=fast", "is not a number, from 0.01 to 1"),
+        ("alpha=", "is not a number"),
+        ("alpha=nan", "not finite"),
+        ("alpha=1e999", "not finite"),
+        ("alpha=0.1,0.2", "is not a number"),
+        ("place=behind", "none of FRONT"),
+        ("alpha", "not of the form name=value"),
+    ],
+)
+def test_a_bad_parameter_is_refused_with_what_would_be_right(given: str, told: str):
+    with pytest.raises(BadParameter) as caught:
+        parse_parameters(HelixHandover, [given])
+    assert told in str(caught.value)
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(BadParameter) as caught:
+        parse_parameters(HelixHandover, ["alpha=2", "radius=-1", "nothing=3", "alpha=0.1"])
+    assert len(caught.value.faults) == 4
