@@ -1,0 +1,73 @@
+"""Why a hand that holds something still does not."""
+
+import math
+import pickle
+
+import numpy as np
+
+from cosim.ports import Floats
+
+
+class HandTremor:
+    """Displacement of a held-out hand: band-limited tremor and slow drift, both stationary Gaussian processes.
+
+    Tremor, per axis: x'' + 2 zeta w x' + w^2 x = white noise, w = 2 pi frequency, zeta = bandwidth / (2 frequency).
+    Drift, per axis: first-order Gauss-Markov, x' = -x / T + white noise. Both are advanced by their exact transition,
+    so their statistics do not depend on the steps. Both start at 0.
+
+    Args:
+        tremor_rms: root mean square length of the tremor, in m.
+        frequency: middle of the tremor's band, in Hz.
+        bandwidth: width of the band at half power, in Hz, less than twice the frequency.
+        drift_rms: root mean square length of the drift, in m.
+        drift_time: correlation time T of the drift, in s.
+        seed: of the random numbers.
+    """
+
+    def __init__(
+        self, tremor_rms: float, frequency: float, bandwidth: float, drift_rms: float, drift_time: float, seed: int
+    ) -> None:
+        self._omega = 2.0 * math.pi * frequency
+        self._zeta = bandwidth / (2.0 * frequency)
+        sigma = tremor_rms / math.sqrt(3.0)
+        self._covariance = np.diag([sigma**2, (sigma * self._omega) ** 2])  # stationary: of displacement and velocity
+        self._drift_sigma = drift_rms / math.sqrt(3.0)
+        self._drift_time = drift_time
+        self._rng = np.random.default_rng(seed)
+        self._tremor: Floats = np.zeros((2, 3))
+        self._drift: Floats = np.zeros(3)
+
+    @property
+    def displacement(self) -> Floats:
+        """Where the hand is, seen from where it wants to be, (3,), in m."""
+        return self._tremor[0] + self._drift
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt; the noise gathered in it has the covariance P - F P F^T, P the stationary one."""
+        F = self._transition(dt)
+        gathered = self._covariance - F @ self._covariance @ np.transpose(F)
+        self._tremor = F @ self._tremor + _root(gathered) @ self._rng.standard_normal((2, 3))
+        a = math.exp(-dt / self._drift_time)
+        fresh = self._drift_sigma * math.sqrt(1.0 - a * a)
+        self._drift = a * self._drift + fresh * self._rng.standard_normal(3)
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        return pickle.dumps((self._tremor, self._drift, self._rng.bit_generator.state))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this process or of one with equal arguments."""
+        self._tremor, self._drift, self._rng.bit_generator.state = pickle.loads(state)
+
+    def _transition(self, dt: float) -> Floats:
+        """Return the matrix that takes displacement and velocity, undisturbed, from t to t + dt."""
+        decay, damped = self._zeta * self._omega, self._omega * math.sqrt(1.0 - self._zeta**2)
+        c, s = math.cos(damped * dt), math.sin(damped * dt) / damped
+        return math.exp(-decay * dt) * np.array([[c + decay * s, s], [-(self._omega**2) * s, c - decay * s]])
+
+
+def _root(covariance: Floats) -> Floats:
+    """Return the lower L of L L^T = covariance, (2, 2), also for one that is 0."""
+    first = math.sqrt(max(covariance[0, 0], 0.0))
+    mixed = covariance[1, 0] / first if first > 0.0 else 0.0
+    return np.array([[first, 0.0], [mixed, math.sqrt(max(covariance[1, 1] - mixed**2, 0.0))]])
