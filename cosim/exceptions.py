@@ -48,3 +48,9 @@ class UnitFailure(CosimError):
         told = "".join(f"\n  {line}" for line in log)
         super().__init__(f"{unit}: {call} at t = {t:.6g} s answered {status}{told}")
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)
+
+    @property
+    def cause(self) -> str:
+        """One line: unit, call, time, and the last thing that the unit logged."""
+        told = [line.strip() for entry in self.log for line in entry.splitlines() if line.strip()]
+        return f"{self.unit}: {self.call} at t = {self.t:.6g} s answered {self.status}" + (f": {told[-1]}" if told else "")

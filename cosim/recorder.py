@@ -73,7 +73,7 @@ class Recorder:
         self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
 
 
-def _field(c: Column) -> pa.Field[Any]:
+def _field(c: Column) -> "pa.Field[Any]":
     metadata = {"unit": c.port.unit.symbol, "description": c.port.description}
     if c.port.items:
         metadata["items"] = ", ".join(f"{v} {n}" for n, v in c.port.items)

@@ -10,10 +10,12 @@ from types import FrameType
 from typing import Any
 
 import click
-from fmus.build import build, cached
-from fmus.catalog import UNITS
 
 from cosim.exceptions import CosimError, UnitFailure, nearest
+from fmus.binaries import NotCompiled
+from fmus.build import build, cached
+from fmus.catalog import UNITS
+from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.listing import print_catalog, print_scenario, print_summary
@@ -102,6 +104,8 @@ def run_(scenario: str, parameters: Sequence[str], seed: int, replaced: Sequence
         task = Task(experiment=experiment(), parameters=values, seed=seed, fmus=fmus, folder=folder)
         with _interruptible() as interrupted, progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, lambda: bool(interrupted))
+    if ended.failure:
+        click.echo(str(ended.failure), err=True)
     print_summary(ended, folder)
     sys.exit(UNIT_FAILED if ended.failure else 0 if ended.outcome.success else TASK_FAILED)
 
@@ -127,11 +131,11 @@ def _replacements(experiment: type[Experiment], given: Sequence[str]) -> dict[st
 def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Iterator[str]:
     for name in units:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
-            if version == 2 and has_binary_ports(UNITS[name]):
+            try:
+                yield str(build(UNITS[name], version, out))
+            except NoFmi2Form as e:
                 if named and fmi == "2":
-                    raise BadCall(f"{name} has picture ports, so it has no FMI 2 form; build it with --fmi 3")
-                continue
-            yield str(build(UNITS[name], version, out))
+                    raise BadCall(str(e)) from e
 
 
 @contextmanager
@@ -141,7 +145,7 @@ def _told_in_one_line() -> Generator[None, None, None]:
     except UnitFailure as e:
         click.echo(f"Error: {e}", err=True)
         sys.exit(UNIT_FAILED)
-    except (CosimError, BadParameter, BadRunFolder, BuildError) as e:
+    except (CosimError, BadParameter, BadRunFolder, NotCompiled) as e:
         raise BadCall(str(e)) from e
 
 

@@ -3,11 +3,11 @@
 from typing import Any
 
 import numpy as np
-from fmus.catalog import UNITS
 from rich.console import Console
 from rich.table import Table
 
 from cosim.start_values import range_of
+from fmus.catalog import UNITS
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.report import told
@@ -23,7 +23,7 @@ def print_catalog() -> None:
     console.print("Scenarios", style="bold")
     _print_rows(console, [(e.name, e.title) for e in SCENARIOS.values()])
     console.print("Units", style="bold")
-    _print_rows(console, [(name, unit.description) for name, unit in UNITS.items()])
+    _print_rows(console, [(name, unit.summary) for name, unit in UNITS.items()])
 
 
 def print_scenario(experiment: type[Experiment]) -> None:

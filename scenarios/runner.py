@@ -91,8 +91,7 @@ def system_rows(master: Master) -> list[tuple[str, str, str, int, float]]:
 def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Outcome:
     seen = watch.outcome()
     if failure is not None:
-        first = str(failure).splitlines()[0]
-        return Outcome(success=False, reason=f"a unit failed: {first}", metrics=seen.metrics)
+        return Outcome(success=False, reason=f"a unit failed: {failure.cause}", metrics=seen.metrics)
     if interrupted and not watch.over:
         return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
     return seen

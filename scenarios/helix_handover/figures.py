@@ -17,6 +17,7 @@ from scenarios.plotting import COLOURS, figure
 from scenarios.record import Record
 
 _PHASES = ("WAIT", "APPROACH", "DESCEND", "GRASP", "HOLD", "GIVEN_UP")
+_SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
 _TITLES = {"WAIT": "start", "APPROACH": "start", "DESCEND": "above the ball", "GRASP": "at the ball", "HOLD": "end"}
 
 
@@ -93,6 +94,7 @@ def _show(axis: Axes, shot: Snapshot, side: str) -> None:
     picture: NDArray[np.uint8] = getattr(shot, side)
     axis.imshow(picture[:, :, ::-1])
     axis.set_axis_off()
+    axis.set(xlim=_SHOWN_COLUMNS, ylim=_SHOWN_ROWS)
     camera = camera_of(side)
     if not np.any(shot.p_WG_est):
         return
@@ -100,7 +102,6 @@ def _show(axis: Axes, shot: Snapshot, side: str) -> None:
     axis.plot(*ball, "o", ms=16, mfc="none", mec="#ffd23f", mew=1.6)
     axis.plot(*wrist, "x", ms=8, color="#2c5fff", mew=1.8)
     axis.plot(*gripper, "+", ms=11, color="#ff3b30", mew=1.8)
-    axis.set(xlim=(0, picture.shape[1]), ylim=(picture.shape[0], 0))
 
 
 def _pixel(camera: Pinhole, p_WP: NDArray[np.float64]) -> tuple[float, float]:

@@ -38,8 +38,8 @@ class Parameters:
 
     alpha: Number = parameter(0.4, "step size of the Jacobian control, eq. (21)", minimum=0.01, maximum=1.0)
     place: Place = parameter(Place.FRONT, "where the hand offers the ball")
-    radius: Metre = parameter(0.18, "distance of the offered ball from the arm's axis", minimum=0.0, maximum=2.0)
-    height: Metre = parameter(-0.62, "height of the offered ball in W", minimum=-2.0, maximum=0.0)
+    radius: Metre = parameter(0.16, "distance of the offered ball from the arm's axis", minimum=0.0, maximum=2.0)
+    height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-2.0, maximum=0.0)
     control_period: Second = parameter(0.5, "period of the controller", minimum=0.1, maximum=10.0)
     threshold: Metre = parameter(0.05, "error at which the arm descends onto the ball", minimum=0.001, maximum=0.2)
     threshold_grasp: Metre = parameter(0.02, "error at which the gripper closes", minimum=0.001, maximum=0.2)

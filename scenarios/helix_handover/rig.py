@@ -1,7 +1,7 @@
 """The two calibrated cameras of the experiment: what the camera unit takes pictures by and the detector measures by.
 
-The thesis calibrates with a box of known corners and gets both cameras' places from it ([Vervloet2025] sec. 3.2.2); here
-the calibration is taken as perfect, which is an assumption. Values are listed in `paper.toml`.
+The thesis calibrates with a box of known corners and gets both cameras' places from it ([Vervloet2025] sec. 3.2.2);
+here the calibration is taken as perfect, which is an assumption. Values are listed in `paper.toml`.
 """
 
 from typing import Any
@@ -13,10 +13,10 @@ from cosim.pinhole import Pinhole
 
 _P_WC = {"left": np.array([-0.95, 0.25, -0.70]), "right": np.array([-0.95, -0.25, -0.70])}
 _LOOKED_AT = np.array([0.0, 0.0, -0.60])
-_INTRINSICS = {"left": np.array([907.0, 907.0, 640.0, 360.0]), "right": np.array([907.0, 907.0, 640.0, 360.0])}
+_INTRINSICS = {"left": np.array([907.0, 906.0, 642.5, 357.0]), "right": np.array([908.5, 907.5, 636.0, 361.5])}
 _DISTORTION = {
-    "left": np.array([-0.05, 0.02, 0.0005, -0.0004, 0.0]),
-    "right": np.array([-0.05, 0.02, 0.0005, -0.0004, 0.0]),
+    "left": np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]),
+    "right": np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]),
 }
 
 
