@@ -53,4 +53,6 @@ class UnitFailure(CosimError):
     def cause(self) -> str:
         """One line: unit, call, time, and the last thing that the unit logged."""
         told = [line.strip() for entry in self.log for line in entry.splitlines() if line.strip()]
-        return f"{self.unit}: {self.call} at t = {self.t:.6g} s answered {self.status}" + (f": {told[-1]}" if told else "")
+        return f"{self.unit}: {self.call} at t = {self.t:.6g} s answered {self.status}" + (
+            f": {told[-1]}" if told else ""
+        )

@@ -64,7 +64,8 @@ class FmuPort:
     def signature(self) -> str:
         """Kind, unit and shape, as in `real [3] m`, for messages."""
         shape = f" [{','.join(map(str, self.shape))}]" if self.shape else ""
-        extra = self.mime if self.kind is Kind.BINARY else self.unit.symbol if self.kind is Kind.REAL else ""
+        unit = self.unit.symbol if self.kind is Kind.REAL and self.unit != ONE else ""
+        extra = self.mime if self.kind is Kind.BINARY else unit
         return f"{self.kind.value}{shape}{' ' + extra if extra else ''}"
 
 

@@ -47,7 +47,7 @@ class Master:
         self.system = system
         self.schedule = Schedule(system, algorithm)
         self.time = 0.0
-        self.cpu: dict[str, "array.array[float]"] = {name: array.array("d") for name in system.units}
+        self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit."""
         self._instances: dict[str, Instance] = {}
         self._copies: dict[str, _Copies] = {}

@@ -159,7 +159,7 @@ def _value_faults(unit: Unit) -> list[str]:
 
 def _mismatch(a: FmuPort, b: FmuPort) -> str | None:
     if a.kind is not b.kind:
-        return f"a {a.kind.value} cannot feed a {b.kind.value}"
+        return f"{a.kind.value} cannot feed {b.kind.value}"
     if a.shape != b.shape:
         return "their shapes differ"
     if a.kind is Kind.REAL and a.unit != b.unit:

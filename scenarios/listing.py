@@ -1,5 +1,6 @@
 """What `handover` prints: the catalog, a scenario's parameters, a run's summary."""
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -46,11 +47,11 @@ def print_summary(ended: Ended, folder: RunFolder) -> None:
     summary = ended.summary
     verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
     console.print(f"{summary['scenario']} {verdict}: ", end="")
-    console.print(summary["reason"], markup=False)
+    console.print(summary["reason"], markup=False, soft_wrap=True)
     rows = [(m["description"] or n, told(m)) for n, m in summary["metrics"].items() if n in _SHOWN]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
     _print_rows(console, rows)
-    console.print(f"report: {folder.report}", markup=False)
+    console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
 
 
 def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
@@ -61,7 +62,7 @@ def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
 
 
 def _console() -> Console:
-    return Console(highlight=False, soft_wrap=True)
+    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 
 
 def _plain(value: Any) -> str:

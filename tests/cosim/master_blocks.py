@@ -173,10 +173,10 @@ class EchoInputs:
 
 @dataclass(kw_only=True)
 class EchoOutputs:
-    n: int = output("the number")
-    odd: bool = output("the truth")
-    light: Light = output("the light")
-    pair: Vector2[Number] = output("the numbers")
+    n_back: int = output("the number")
+    odd_back: bool = output("the truth")
+    light_back: Light = output("the light")
+    pair_back: Vector2[Number] = output("the numbers")
     brightness: Number = output("mean of the picture's pixels")
 
 
@@ -184,17 +184,23 @@ class Echo(Stateless):
     """Gives back what it gets, at once."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "n": ("n",),
-        "odd": ("odd",),
-        "light": ("light",),
-        "pair": ("pair",),
+        "n_back": ("n",),
+        "odd_back": ("odd",),
+        "light_back": ("light",),
+        "pair_back": ("pair",),
         "brightness": ("picture",),
     }
 
     def __init__(self, params: EchoParams) -> None: ...
 
     def outputs(self, t: float, u: EchoInputs) -> EchoOutputs:  # noqa: ARG002
-        return EchoOutputs(n=u.n, odd=u.odd, light=u.light, pair=np.array(u.pair), brightness=float(u.picture.mean()))
+        return EchoOutputs(
+            n_back=u.n,
+            odd_back=u.odd,
+            light_back=u.light,
+            pair_back=np.array(u.pair),
+            brightness=float(u.picture.mean()),
+        )
 
     def step(self, t: float, dt: float, u: EchoInputs) -> EchoOutputs:  # noqa: ARG002
         return self.outputs(t, u)

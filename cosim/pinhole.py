@@ -1,0 +1,108 @@
+"""A calibrated camera: pinhole projection with the radial and tangential distortion of its lens (Brown and Conrady)."""
+
+import numpy as np
+
+from cosim.geometry import rotation_of
+from cosim.ports import Floats
+
+_UNIT_TOLERANCE = 1e-6
+_NEAR = 0.02  # m; what is nearer to the lens, or behind it, has no picture
+
+
+class UnusableCalibration(ValueError):
+    """A camera's calibration has no meaning: quaternion not of unit length, or focal length not positive."""
+
+    def __init__(self, camera: str, quantity: str, value: Floats, wanted: str) -> None:
+        super().__init__(f"camera {camera!r}: {quantity} = {np.asarray(value).tolist()}; it must be {wanted}")
+        self.camera, self.quantity, self.value, self.wanted = camera, quantity, value, wanted
+
+
+class Pinhole:
+    """Projects points p_WP to pixels, and pixels back to rays. The middle of the upper left pixel is at (0, 0).
+
+    With (x, y) = (X, Y) / Z in the camera's frame C and r^2 = x^2 + y^2, a pixel is (fx x_d + cx, fy y_d + cy),
+    x_d = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y_d likewise with p1 and p2 exchanged.
+
+    Args:
+        name: what messages call the camera.
+        p_WC: position in the world, shape (3,), in m.
+        q_WC: orientation, shape (4,), scalar first.
+        intrinsics: fx, fy, cx, cy, in px.
+        distortion: k1, k2, p1, p2, k3.
+
+    Raises:
+        UnusableCalibration: q_WC is not of unit length, fx or fy is not positive, or an entry is not finite.
+    """
+
+    def __init__(self, name: str, p_WC: Floats, q_WC: Floats, intrinsics: Floats, distortion: Floats) -> None:
+        quantities = {"p_WC": p_WC, "q_WC": q_WC, "intrinsics": intrinsics, "distortion": distortion}
+        for quantity, value in quantities.items():
+            if not np.isfinite(value).all():
+                raise UnusableCalibration(name, quantity, value, "finite")
+        if abs(float(np.linalg.norm(q_WC)) - 1.0) > _UNIT_TOLERANCE:
+            raise UnusableCalibration(name, "q_WC", q_WC, "a quaternion of unit length, scalar first")
+        if min(intrinsics[:2]) <= 0.0:
+            raise UnusableCalibration(name, "intrinsics", intrinsics, "(fx, fy, cx, cy) with fx and fy positive")
+        self.p_WC = np.array(p_WC)
+        self.R_WC = rotation_of(q_WC)
+        self.R_CW = np.transpose(self.R_WC)
+        self.f = np.array(intrinsics[:2])
+        self.c = np.array(intrinsics[2:])
+        self.distortion = np.array(distortion)
+
+    def depth(self, p_WP: Floats) -> Floats:
+        """Return the distance along the optical axis, in m, of points of shape (..., 3)."""
+        return (p_WP - self.p_WC) @ self.R_WC[:, 2]
+
+    def project(self, p_WP: Floats) -> Floats:
+        """Return pixels, shape (..., 2), of points of shape (..., 3); NaN for what is behind the camera."""
+        p_CP = (p_WP - self.p_WC) @ self.R_WC
+        Z = np.where(p_CP[..., 2:] > _NEAR, p_CP[..., 2:], np.nan)
+        return self.f * self._distorted(p_CP[..., :2] / Z) + self.c
+
+    def project_with_slope(self, p_WP: Floats) -> tuple[Floats, Floats]:
+        """Return pixels, shape (n, 2), of points of shape (n, 3), and d pixel / d p_WP, shape (n, 2, 3), in px/m."""
+        p_CP = (p_WP - self.p_WC) @ self.R_WC
+        Z = np.where(p_CP[:, 2:] > _NEAR, p_CP[:, 2:], np.nan)
+        xy = p_CP[:, :2] / Z
+        slope = self.f[:, None] * self._slope(xy)  # d pixel / d (x, y)
+        by_point = np.concatenate([slope, -slope @ xy[:, :, None]], axis=2) / Z[:, :, None]
+        return self.f * self._distorted(xy) + self.c, by_point @ self.R_CW
+
+    def undistorted(self, pixels: Floats) -> Floats:
+        """Return (x, y) = (X, Y) / Z, shape (n, 2), of pixels of shape (n, 2), by Newton's method."""
+        wanted = (pixels - self.c) / self.f
+        xy = wanted
+        for _ in range(4):
+            slope, missing = self._slope(xy), wanted - self._distorted(xy)
+            xy = xy + np.linalg.solve(slope, missing[:, :, None])[:, :, 0]
+        return xy
+
+    def rays(self, pixels: Floats) -> Floats:
+        """Return unit directions in W, shape (n, 3), of the light that meets the pixels, shape (n, 2)."""
+        xy = self.undistorted(pixels)
+        d = np.column_stack([xy, np.ones(len(xy))]) @ self.R_CW
+        return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+    def _distorted(self, xy: Floats) -> Floats:
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = xy[..., 0], xy[..., 1]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        skew = 2.0 * (p1 * y + p2 * x)
+        return xy * (radial + skew)[..., None] + r2[..., None] * np.array([p2, p1])
+
+    def _slope(self, xy: Floats) -> Floats:
+        """Return d (x_d, y_d) / d (x, y), shape (n, 2, 2)."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = xy[:, 0], xy[:, 1]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        by_r2 = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+        skew = 2.0 * (p1 * y + p2 * x)
+        cross = by_r2 * x * y + 2.0 * (p1 * x + p2 * y)
+        slope = np.empty((len(xy), 2, 2))
+        slope[:, 0, 0] = radial + skew + by_r2 * x * x + 4.0 * p2 * x
+        slope[:, 1, 1] = radial + skew + by_r2 * y * y + 4.0 * p1 * y
+        slope[:, 0, 1] = slope[:, 1, 0] = cross
+        return slope

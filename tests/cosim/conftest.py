@@ -1,0 +1,26 @@
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_block
+
+sys.path.insert(0, str(Path(__file__).parent))  # master_blocks
+
+FmuOf = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> FmuOf:
+    """Build an FMU of one of master_blocks, once a session."""
+    folder = tmp_path_factory.mktemp("blocks")
+    made: dict[tuple[str, int], Path] = {}
+
+    def build(block: str, fmi: int = 3) -> Path:
+        if (block, fmi) not in made:
+            made[block, fmi] = build_block(f"master_blocks:{block}", fmi, folder, step=Fraction(1, 10))
+        return made[block, fmi]
+
+    return build

@@ -1,0 +1,175 @@
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.exceptions import InvalidFmu, UnitFailure, WiringError
+from cosim.master import Master
+from cosim.recorder import Recorder
+from cosim.schedule import Algorithm
+from cosim.signals import Signals
+from cosim.system import System
+from scenarios.record import Record
+
+FmuOf = Callable[..., Path]
+
+
+def oscillator(fmu: FmuOf, fmi: int = 3, period: Fraction = Fraction(1, 100)) -> System:
+    s = System()
+    mass = s.add("mass", fmu("Mass", fmi), m=1.0, x_0=1.0, period=period)
+    spring = s.add("spring", fmu("Spring", fmi), k=4.0, period=period)
+    s.connect(mass.y.x, spring.u.x)
+    s.connect(spring.y.f, mass.u.f)
+    return s
+
+
+def positions(system: System, stop: Fraction, algorithm: Algorithm = Algorithm.GAUSS_SEIDEL) -> dict[float, float]:
+    seen: dict[float, float] = {}
+
+    def observe(t: float, signals: Signals) -> None:
+        seen[t] = float(signals["mass.x"])
+
+    with Master(system, algorithm) as master:
+        master.run(stop, [observe])
+    return seen
+
+
+def held_force(n: int, dt: float, delay: int) -> list[float]:
+    """The oscillator of `oscillator`, its force held over each step, known `delay` steps late."""
+    x, v, forces, xs = 1.0, 0.0, [-4.0] * (delay + 1), [1.0]
+    for _ in range(n):
+        f = forces[-1 - delay]
+        x, v = x + (v * dt + f * dt * dt / 2), v + f * dt
+        forces.append(-4.0 * x)
+        xs.append(x)
+    return xs
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_gauss_seidel_gives_the_force_of_the_present_position(fmu: FmuOf, fmi: int):
+    seen = list(positions(oscillator(fmu, fmi), Fraction(1)).values())
+    assert seen == held_force(100, 0.01, delay=0)
+
+
+def test_jacobi_gives_the_force_one_step_late(fmu: FmuOf):
+    seen = list(positions(oscillator(fmu), Fraction(1), Algorithm.JACOBI).values())
+    assert seen == held_force(100, 0.01, delay=1)
+
+
+def test_the_coupling_error_shrinks_with_the_step(fmu: FmuOf):
+    errors: list[float] = []
+    for n in (50, 100, 200):
+        seen = positions(oscillator(fmu, period=Fraction(1, n)), Fraction(1))
+        errors.append(abs(seen[1.0] - np.cos(2.0)))
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.1)
+
+
+def test_units_of_both_standards_work_together(fmu: FmuOf):
+    s = System()
+    mass, spring = s.add("mass", fmu("Mass", 2)), s.add("spring", fmu("Spring", 3))
+    s.connect(mass.y.x, spring.u.x)
+    s.connect(spring.y.f, mass.u.f)
+    assert list(positions(s, Fraction(1)).values()) == held_force(10, 0.1, delay=0)
+
+
+def test_every_kind_of_port_reaches_its_reader(fmu: FmuOf):
+    s = System()
+    counter, echo = s.add("counter", fmu("Counter")), s.add("echo", fmu("Echo"))
+    for name in ("n", "odd", "light", "pair", "picture"):
+        s.connect(getattr(counter.y, name), getattr(echo.u, name))
+    told: list[tuple[object, ...]] = []
+
+    def observe(t: float, y: Signals) -> None:  # noqa: ARG001
+        pair, mean = y["echo.pair_back"].tolist(), float(y["echo.brightness"])
+        told.append((int(y["echo.n_back"]), bool(y["echo.odd_back"]), y.text("echo.light_back"), pair, mean))
+
+    with Master(s) as master:
+        master.run(Fraction(3, 10), [observe])
+    assert told == [
+        (0, False, "RED", [0.0, 0.0], 0.0),
+        (1, True, "GREEN", [1.0, 1.0], 1.0),
+        (2, False, "RED", [2.0, 4.0], 2.0),
+        (3, True, "GREEN", [3.0, 9.0], 3.0),
+    ]
+
+
+def test_each_unit_steps_at_its_own_rate_and_time_does_not_drift(fmu: FmuOf):
+    s = System()
+    s.add("fast", fmu("Counter"), period=Fraction(1, 30))
+    s.add("slow", fmu("Counter"), period=Fraction(1, 7))
+    with Master(s) as master:
+        master.run(Fraction(100))
+        assert int(master.signals["fast.n"]) == 3000
+        assert int(master.signals["slow.n"]) == 700
+        assert float(master.signals["slow.at"]) == pytest.approx(100.0, abs=1e-12)
+
+
+def test_a_run_ends_when_it_is_told_to(fmu: FmuOf):
+    s = System()
+    s.add("counter", fmu("Counter"))
+    with Master(s) as master:
+        master.run(Fraction(100), until=lambda: int(master.signals["counter.n"]) == 7)
+        assert master.time == 0.7
+
+
+def test_a_failure_names_unit_call_and_time_and_keeps_the_record(fmu: FmuOf, tmp_path: Path):
+    s = System()
+    s.add("steady", fmu("Counter"))
+    s.add("failing", fmu("Counter"), fails_at=5)
+    file = tmp_path / "signals.parquet"
+    with (
+        pytest.raises(UnitFailure, match=r"failing: fmi3DoStep at t = 0\.4 s") as caught,
+        Master(s) as master,
+        Recorder(file) as recorder,
+    ):
+        master.run(Fraction(1), [recorder])
+    assert any("count 5 was asked to fail" in line for line in caught.value.log)
+    assert Record(file)["steady.n"].tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_record_has_all_scalars_with_their_units(fmu: FmuOf, tmp_path: Path):
+    s = System()
+    s.add("counter", fmu("Counter"))
+    s.add("mass", fmu("Mass"))
+    file = tmp_path / "signals.parquet"
+    with Master(s) as master, Recorder(file) as recorder:
+        master.run(Fraction(2), [recorder])
+    record = Record(file)
+    assert record.time.tolist() == [k / 10 for k in range(21)]
+    assert record["counter.pair"].tolist() == [[k, k * k] for k in range(21)]
+    assert record["counter.odd"].tolist() == [k % 2 == 1 for k in range(21)]
+    assert record["counter.light"].tolist() == [1 + k % 2 for k in range(21)]
+    assert record.unit("mass.v") == "m/s"
+    with pytest.raises(KeyError, match=r"did you mean mass\.x or mass\.v"):
+        record["mass.w"]
+
+
+def test_the_same_system_gives_the_same_bytes(fmu: FmuOf, tmp_path: Path):
+    for name in ("a", "b"):
+        with Master(oscillator(fmu)) as master, Recorder(tmp_path / name) as recorder:
+            master.run(Fraction(10), [recorder])
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_a_wrong_system_does_not_start(fmu: FmuOf):
+    s = oscillator(fmu)
+    s.connect(s.units["mass"].y.v, s.units["spring"].u.x)
+    with pytest.raises(WiringError):
+        Master(s)
+
+
+def test_an_fmu_with_a_damaged_binary_is_refused(fmu: FmuOf, tmp_path: Path):
+    import zipfile
+
+    broken = tmp_path / "Mass.fmu"
+    with zipfile.ZipFile(fmu("Mass")) as source, zipfile.ZipFile(broken, "w") as target:
+        for item in source.infolist():
+            content = source.read(item)
+            target.writestr(item, b"not a library" if item.filename.startswith("binaries/") else content)
+    s = System()
+    s.add("mass", broken)
+    with pytest.raises(InvalidFmu, match="could not be instantiated"), Master(s):
+        pass

@@ -1,0 +1,109 @@
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from cosim.exceptions import InvalidFmu, WiringError
+from cosim.system import System
+
+FmuOf = Callable[..., Path]
+
+
+def faults_of(system: System) -> tuple[str, ...]:
+    with pytest.raises(WiringError) as caught:
+        system.check()
+    return caught.value.faults
+
+
+def test_a_sound_system_passes(fmu: FmuOf):
+    s = System()
+    mass, spring = s.add("mass", fmu("Mass"), m=2.0), s.add("spring", fmu("Spring"))
+    s.connect(mass.y.x, spring.u.x)
+    s.connect(spring.y.f, mass.u.f)
+    s.check()
+
+
+def test_units_and_kinds_and_shapes_must_agree(fmu: FmuOf):
+    s = System()
+    mass, counter, echo = s.add("mass", fmu("Mass")), s.add("counter", fmu("Counter")), s.add("echo", fmu("Echo"))
+    s.connect(mass.y.x, mass.u.f)
+    s.connect(counter.y.at, echo.u.n)
+    s.connect(counter.y.at, echo.u.pair)
+    unit, kind, shape = faults_of(s)
+    assert unit == "mass.x (real m) -> mass.f (real N): their units differ in dimension"
+    assert kind == "counter.at (real) -> echo.n (integer): real cannot feed integer"
+    assert shape == "counter.at (real) -> echo.pair (real [2]): their shapes differ"
+
+
+def test_unknown_names_are_told_with_the_nearest_valid_ones(fmu: FmuOf):
+    s = System()
+    mass, spring = s.add("mass", fmu("Mass"), mas=1.0), s.add("spring", fmu("Spring"))
+    s.connect(mass.y.xx, spring.u.x)
+    s.connect(mass.y.x, spring.u.stretch)
+    s.connect(mass.u.f, spring.u.x)
+    s.connect(mass.y.x, spring.y.f)
+    told = "\n".join(faults_of(s))
+    assert "mass has no parameter 'mas'; did you mean m" in told
+    assert "mass has no output 'xx'; did you mean x?" in told
+    assert "spring has no input 'stretch'; valid: x" in told
+    assert "mass.f is an input, not an output" in told
+    assert "spring.f is an output, not an input" in told
+
+
+def test_a_connection_to_a_unit_that_is_not_there_is_told(fmu: FmuOf):
+    s, other = System(), System()
+    s.add("spring", fmu("Spring"))
+    spring = other.add("sprint", fmu("Spring"))
+    s.connect(spring.y.f, spring.u.x)
+    told = "\n".join(faults_of(s))
+    assert "there is no unit 'sprint'; did you mean spring?" in told
+
+
+def test_an_input_is_fed_once(fmu: FmuOf):
+    s = System()
+    a, b, spring = s.add("a", fmu("Mass")), s.add("b", fmu("Mass")), s.add("spring", fmu("Spring"))
+    s.connect(a.y.x, spring.u.x)
+    s.connect(b.y.x, spring.u.x)
+    assert faults_of(s) == ("spring.x is fed twice: by a.x and by b.x",)
+
+
+def test_values_out_of_range_or_of_the_wrong_kind_are_told(fmu: FmuOf):
+    s = System()
+    s.add("a", fmu("Mass"), m=-1.0)
+    s.add("b", fmu("Mass"), m="heavy")
+    s.add("a", fmu("Mass"), period=Fraction(0))
+    told = "\n".join(faults_of(s))
+    assert "a.m" not in told  # the second a took its place, and is what is wrong
+    assert "b.m: 'heavy' is not a number in kg" in told
+    assert "two units are called 'a'" in told
+    assert "give one that is above 0 s" in told
+
+
+def test_range_faults_name_the_range(fmu: FmuOf):
+    s = System()
+    s.add("a", fmu("Mass"), m=-1.0)
+    assert faults_of(s) == ("a.m: -1.0 is out of range: from 0.001 to 100 kg",)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [(None, "no such file"), (b"no zip", "not an FMU"), (b"", "not an FMU")],
+)
+def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path, content: bytes | None, told: str):
+    file = tmp_path / "some.fmu"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(InvalidFmu, match=told):
+        System().add("x", file)
+
+
+def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
+    s = System()
+    for name in ("Mass", "Spring"):
+        a, b = (s.add(f"{name}{v}", fmu(name, v)).description for v in (2, 3))
+        for x, y in ((a.inputs, b.inputs), (a.outputs, b.outputs), (a.parameters, b.parameters)):
+            assert [(p.name, p.signature, p.minimum, p.maximum) for p in x.values()] == [
+                (p.name, p.signature, p.minimum, p.maximum) for p in y.values()
+            ]
+        assert a.feedthrough == b.feedthrough

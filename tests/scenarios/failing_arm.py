@@ -1,0 +1,12 @@
+"""An arm that fails while it runs, to see what a run makes of it."""
+
+from plants.tendon_arm import Inputs, Outputs, TendonArm
+
+
+class FailingArm(TendonArm):
+    """The Helix until a tendon tears."""
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        if t > 0.29:
+            raise RuntimeError("a tendon tore")
+        return super().step(t, dt, u)

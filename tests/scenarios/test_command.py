@@ -1,0 +1,102 @@
+import json
+import sys
+import zipfile
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fmus.build import build_block, cached
+from scenarios.command import main
+from scenarios.record import Record
+
+sys.path.insert(0, str(Path(__file__).parent))  # failing_arm
+
+
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def assert_refused(result: Result, told: str, *untouched: Path) -> None:
+    assert result.exit_code == 2, result.output
+    assert told in result.output
+    assert "Traceback" not in result.output
+    for path in untouched:
+        assert not path.exists()
+
+
+def test_list_names_scenarios_and_units():
+    shown = call("list").output
+    for name in ("helix_handover", "TendonArm", "HandoverPartner", "StereoCamera", "HandoverVision", "VisualServo"):
+        assert name in shown
+
+
+def test_list_of_a_scenario_shows_ranges_and_units():
+    shown = call("list", "helix_handover").output
+    assert "from 0.01 to 1" in shown
+    assert "front | front_left | left | back_left" in " ".join(shown.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("run", "helix_hand"), "did you mean helix_handover?"),
+        (("list", "nothing_like_it"), "valid: helix_handover"),
+        (("run", "helix_handover", "-p", "alfa=0.2"), "did you mean alpha"),
+        (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
+        (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),
+        (("run", "helix_handover", "--seed", "-1"), "x>=0"),
+        (("run", "helix_handover", "--unit", "arms=x.fmu"), "did you mean arm?"),
+        (("run", "helix_handover", "--unit", "arm"), "NAME=FILE"),
+        (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
+        (("build", "TendonArms"), "did you mean TendonArm?"),
+        (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
+    ],
+)
+def test_a_bad_call_is_refused_with_what_would_be_right(tmp_path: Path, arguments: tuple[str, ...], told: str):
+    out = tmp_path / "out"
+    assert_refused(call(*arguments, "--out", out) if arguments[0] != "list" else call(*arguments), told, out)
+
+
+def test_a_folder_in_use_is_refused_before_anything_runs(tmp_path: Path):
+    (tmp_path / "mine").write_text("precious")
+    assert_refused(call("run", "helix_handover", "--out", tmp_path), "not empty")
+    assert [p.name for p in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_broken_fmu_is_refused(tmp_path: Path):
+    out, broken = tmp_path / "out", tmp_path / "broken.fmu"
+    broken.write_bytes(cached("TendonArm", 3).read_bytes()[:5000])
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "not one", out)
+    with zipfile.ZipFile(broken, "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription")
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "not valid", out)
+
+
+def test_an_fmu_that_does_not_fit_is_refused_with_every_fault(tmp_path: Path):
+    out = tmp_path / "out"
+    result = call("run", "helix_handover", "--unit", f"arm={cached('HandoverPartner', 3)}", "--out", out)
+    assert_refused(result, "arm has no output 'backbone'", out)
+    assert "arm has no input 'dl_t'" in result.output
+
+
+def test_build_writes_the_files_it_names(tmp_path: Path):
+    result = call("build", "TendonArm", "VisualServo", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    names = sorted(Path(line).name for line in result.output.split())
+    assert names == ["TendonArm.fmi2.fmu", "TendonArm.fmi3.fmu", "VisualServo.fmi2.fmu", "VisualServo.fmi3.fmu"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == names
+
+
+def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(tmp_path: Path):
+    failing = build_block("failing_arm:FailingArm", 3, tmp_path, step=Fraction(1, 50))
+    out = tmp_path / "out"
+    result = call("run", "helix_handover", "--unit", f"arm={failing}", "--out", out)
+    assert result.exit_code == 3, result.output
+    assert "a tendon tore" in result.output
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["success"] is False
+    assert summary["reason"].startswith("a unit failed: arm: fmi3DoStep at t = 0.3 s")
+    assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.3)
+    assert (out / "report.html").is_file()
