@@ -1,0 +1,134 @@
+"""An instance's variables in memory: what the C runtime copies to and from, and the block's side sees as arrays."""
+
+import struct
+import sys
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.block import Causality, Variable
+from cosim.ports import Floats, Raster
+from fmus.layout import Buffer, Layout, Slot, capacity
+
+
+class UnfitState(ValueError):
+    """A saved state does not fit the unit that is to take it."""
+
+    is_refusal = True
+
+    def __init__(self) -> None:
+        super().__init__("the state was saved by another unit, or by another version of this one")
+
+
+class Buffers:
+    """The buffers of one instance. Their addresses never change.
+
+    Attributes:
+        floats: the time, the step size, then the real variables.
+        strings: UTF-8, as the host sees them.
+        binaries: a buffer of fixed capacity for each of `binary_variables`, of which `sizes` are in use.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.floats = np.zeros(layout.lengths[Buffer.FLOAT64])
+        self.integers = np.zeros(layout.lengths[Buffer.INT64], dtype=np.int64)
+        self.booleans = np.zeros(layout.lengths[Buffer.BOOLEAN], dtype=np.bool_)
+        self.strings = [b""] * layout.lengths[Buffer.STRING]
+        self.binary_variables = [slot.variable for slot in layout.in_buffer(Buffer.BINARY)]
+        self.binaries = [np.zeros(capacity(v), dtype=np.uint8) for v in self.binary_variables]
+        self.sizes = np.zeros(len(self.binaries), dtype=np.uint64)
+        self.reset()
+
+    def reset(self) -> None:
+        """Give all variables their start values; the time is 0, pictures are black."""
+        self.floats[:] = 0.0
+        for slot in self.layout.slots.values():
+            self._start(slot, slot.variable.start)
+
+    def _start(self, slot: Slot, start: Any) -> None:
+        if slot.buffer is Buffer.FLOAT64:
+            self.floats[slot.entries] = np.ravel(start)
+        elif slot.buffer is Buffer.INT64:
+            self.integers[slot.offset] = int(start)
+        elif slot.buffer is Buffer.BOOLEAN:
+            self.booleans[slot.offset] = start
+        elif slot.buffer is Buffer.STRING:
+            self.strings[slot.offset] = str(start).encode()
+        else:
+            self.binaries[slot.offset][:] = 0
+            self.sizes[slot.offset] = capacity(slot.variable) if slot.variable.raster else 0
+
+    def array(self, slot: Slot, *, writeable: bool) -> Floats:
+        """Return a real array variable as a view of the buffer."""
+        view = self.floats[slot.entries].reshape(slot.variable.shape)
+        view.flags.writeable = writeable
+        return view
+
+    def picture(self, slot: Slot, raster: Raster, *, writeable: bool) -> NDArray[np.uint8]:
+        """Return a picture as a view of its buffer, shape (height, width, 3)."""
+        view = self.binaries[slot.offset].reshape(raster.height, raster.width, 3)
+        view.flags.writeable = writeable
+        return view
+
+    def parameters(self) -> bytes:
+        """Return the values of all parameters as bytes: equal bytes make equal blocks."""
+        arrays = {Buffer.FLOAT64: self.floats, Buffer.INT64: self.integers, Buffer.BOOLEAN: self.booleans}
+        parts = [array[self.layout.span(Causality.PARAMETER, buffer)].tobytes() for buffer, array in arrays.items()]
+        return join(parts + self.strings[self.layout.span(Causality.PARAMETER, Buffer.STRING)])
+
+    def to_bytes(self) -> bytes:
+        """Return the values of all variables and the time."""
+        used = [buffer[: int(n)].tobytes() for buffer, n in zip(self.binaries, self.sizes, strict=True)]
+        return join([self.floats.tobytes(), self.integers.tobytes(), self.booleans.tobytes(), *used, *self.strings])
+
+    def from_bytes(self, state: bytes) -> None:
+        """Take over what `to_bytes` gave.
+
+        Raises:
+            UnfitState: the bytes are of other variables; nothing has changed.
+        """
+        parts = split(state)
+        if len(parts) != 3 + len(self.binaries) + len(self.strings):
+            raise UnfitState
+        numbers, rest = parts[:3], parts[3:]
+        used, strings = rest[: len(self.binaries)], rest[len(self.binaries) :]
+        arrays = (self.floats, self.integers, self.booleans)
+        fit = all(a.nbytes == len(p) for a, p in zip(arrays, numbers, strict=True))
+        if not fit or not all(_fits(v, p) for v, p in zip(self.binary_variables, used, strict=True)):
+            raise UnfitState
+        for array, part in zip(arrays, numbers, strict=True):
+            array[:] = np.frombuffer(part, dtype=array.dtype)
+        for i, part in enumerate(used):
+            self.binaries[i][: len(part)] = np.frombuffer(part, dtype=np.uint8)
+            self.sizes[i] = len(part)
+        self.strings[:] = strings
+
+
+def _fits(variable: Variable, part: bytes) -> bool:
+    return len(part) == capacity(variable) if variable.raster else len(part) <= capacity(variable)
+
+
+def join(parts: Iterable[bytes]) -> bytes:
+    """Return parts as one, each led by its length."""
+    return b"".join(struct.pack("=Q", len(part)) + part for part in parts)
+
+
+def split(whole: bytes) -> list[bytes]:
+    """Return the parts that `join` put together.
+
+    Raises:
+        UnfitState: the bytes were not made by `join`.
+    """
+    parts: list[bytes] = []
+    at = 0
+    while at < len(whole):
+        start = at + 8
+        n = int.from_bytes(whole[at:start], sys.byteorder)
+        at = start + n
+        if at > len(whole):
+            raise UnfitState
+        parts.append(whole[start:at])
+    return parts

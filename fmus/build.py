@@ -1,0 +1,167 @@
+"""Turns a unit into a file: an FMU of FMI 2.0 or FMI 3.0 for co-simulation."""
+
+import hashlib
+import importlib
+import importlib.util
+import json
+import os
+import uuid
+from collections.abc import Mapping
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from cosim.block import describe
+from fmus import interpreter
+from fmus.archive import write_archive
+from fmus.binaries import binaries
+from fmus.catalog import Entry, find_unit
+from fmus.compile import cache_folder
+from fmus.documentation import page
+from fmus.fmi2_description import fmi2_description
+from fmus.fmi3_description import fmi3_description
+from fmus.layout import Layout
+from fmus.model_description import Model
+from fmus.sources import Carried, UnknownBlock, closure
+
+
+class UnknownVersion(ValueError):
+    """Only FMI 2 and 3 are offered."""
+
+    def __init__(self, fmi: object) -> None:
+        super().__init__(f"FMI version {fmi!r}; there are 2 (FMI 2.0) and 3 (FMI 3.0)")
+        self.fmi = fmi
+
+
+class UnusableName(ValueError):
+    """An FMU's name is also that of its library and, in FMI, an identifier of C."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"an FMU cannot be named {name!r}: letters of ASCII, digits and underscores make a name")
+        self.name = name
+
+
+def cached(name: str, fmi: int) -> Path:
+    """Return a catalog unit's FMU, built unless the cache has the one of the present sources.
+
+    The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit at once.
+
+    Raises:
+        UnknownUnit: no unit has this name.
+        NoFmi2Form: an FMI 2 is wanted of a unit with binary ports.
+    """
+    entry = find_unit(name)
+    carried = closure(entry.block)
+    folder = cache_folder() / "fmus" / _content_key(entry, fmi, carried)
+    wanted = folder / file_name(name, fmi)
+    return wanted if wanted.is_file() else build(entry, fmi, folder)
+
+
+def build_block(
+    block: str, fmi: int, out_dir: Path, *, step: Fraction = Fraction(1, 100), summary: str = "", name: str = ""
+) -> Path:
+    """Build an FMU of any block class, wherever its module lies.
+
+    Args:
+        block: path of the class, such as `package.module:Class`; its module must be importable.
+        fmi: 2 or 3.
+        out_dir: folder of the FMU.
+        step: communication step that suits it, in seconds.
+        summary: one line of description; without it the first line of the class's docstring.
+        name: the FMU's name, without it the class's.
+    """
+    return build(Entry(name or block.rpartition(":")[2], block, step, summary), fmi, out_dir)
+
+
+def build(entry: Entry, fmi: int, out_dir: Path) -> Path:
+    """Build a unit's FMU. The same sources, packages and interpreter give the same bytes.
+
+    Raises:
+        UnknownBlock: the entry's block does not exist.
+        UnknownVersion, UnusableName: the standard's version or the name is not one that can be.
+        DeclarationError, DuplicateName: the block's declarations are not in order.
+        NoFmi2Form: FMI 2 and the block has binary ports.
+        NotCompiled: there is no runtime and no compiler.
+    """
+    if fmi not in (2, 3):
+        raise UnknownVersion(fmi)
+    carried = closure(entry.block)
+    if not (entry.name.isidentifier() and entry.name.isascii()):
+        raise UnusableName(entry.name)
+    sources = {path: file.read_bytes() for path, file in carried.files.items()}
+    packages = carried.packages()
+    describe_in_xml = fmi2_description if fmi == 2 else fmi3_description
+    without_token = _model(entry, "")
+    model = _model(entry, _token({**sources, "modelDescription.xml": describe_in_xml(without_token)}))
+    unit = {
+        "unit": entry.name,
+        "block": entry.block,
+        "fmi": fmi,
+        "token": model.token,
+        "prefix": f"_fmu_{_digest(sources)[:16]}",
+        "packages": [asdict(package) for package in packages],
+    }
+    files = {
+        "modelDescription.xml": describe_in_xml(model),
+        "documentation/index.html": page(model, packages),
+        "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
+        "resources/python.txt": os.fsencode(interpreter.describe()),
+        **{f"resources/sources/{path}": content for path, content in sources.items()},
+        **binaries(entry.name, fmi),
+    }
+    return write_archive(out_dir / file_name(entry.name, fmi), files)
+
+
+def file_name(name: str, fmi: int) -> str:
+    """Return the name of a unit's file, such as `TendonArm.fmi3.fmu`."""
+    return f"{name}.fmi{fmi}.fmu"
+
+
+def _model(entry: Entry, token: str) -> Model:
+    description = describe(_import_block(entry.block))
+    return Model(
+        name=entry.name,
+        summary=entry.summary or description.doc.partition("\n")[0],
+        step=entry.step,
+        token=token,
+        description=description,
+        layout=Layout(description),
+    )
+
+
+def _import_block(path: str) -> type[Any]:
+    module, _, name = path.partition(":")
+    found = getattr(importlib.import_module(module), name, None)
+    if not isinstance(found, type):
+        raise UnknownBlock(path, f"module {module!r} has no class {name!r}")
+    return found
+
+
+def _content_key(entry: Entry, fmi: int, carried: Carried) -> str:
+    """Return what changes whenever the FMU would: sources, packages, interpreter, runtime, and the builder itself."""
+    builder = sorted(Path(__file__).parent.glob("*.*"))
+    parts = {path: file.read_bytes() for path, file in carried.files.items()}
+    parts |= {f"builder/{file.name}": file.read_bytes() for file in builder if file.is_file()}
+    parts |= binaries(entry.name, fmi)
+    parts |= {f"environment/{module}": _version_mark(module) for module in carried.modules}
+    parts |= {"interpreter": os.fsencode(interpreter.describe()), "entry": repr((entry, fmi)).encode()}
+    return _digest(parts)
+
+
+def _version_mark(module: str) -> bytes:
+    """Return what changes when a package is replaced; asking for its version takes too long."""
+    spec = importlib.util.find_spec(module)
+    origin = Path(spec.origin) if spec and spec.origin else None
+    return f"{origin} {origin.stat().st_mtime_ns if origin and origin.is_file() else ''}".encode()
+
+
+def _digest(parts: Mapping[str, bytes]) -> str:
+    digest = hashlib.sha256()
+    for name, content in sorted(parts.items()):
+        digest.update(f"{name}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
+
+
+def _token(parts: Mapping[str, bytes]) -> str:
+    return f"{{{uuid.UUID(_digest(parts)[:32])}}}"

@@ -1,0 +1,57 @@
+"""The units: robots, sensors and controllers that are offered as FMUs.
+
+Blocks are named, not imported: looking at the catalog loads no physics engine.
+"""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+
+class UnknownUnit(LookupError):
+    """No unit has this name."""
+
+    def __init__(self, name: str, valid: list[str]) -> None:
+        near = difflib.get_close_matches(name, valid) or sorted(valid)
+        super().__init__(f"there is no unit {name!r}; did you mean {' or '.join(near)}?")
+        self.name, self.valid = name, valid
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A unit.
+
+    Attributes:
+        name: the FMU's name; letters, digits and underscores.
+        block: path of the block's class.
+        step: the communication step that suits it, in seconds.
+        summary: one line for lists.
+    """
+
+    name: str
+    block: str
+    step: Fraction
+    summary: str
+
+
+_ENTRIES = (
+    Entry("TendonArm", "plants.tendon_arm:TendonArm", Fraction(1, 50), "tendon-driven soft arm with a gripper"),
+    Entry("HandoverPartner", "plants.handover_partner:HandoverPartner", Fraction(1, 50), "hand that offers a ball"),
+    Entry("StereoCamera", "plants.stereo_camera:StereoCamera", Fraction(1, 30), "pictures of two cameras"),
+    Entry("HandoverVision", "controllers.handover_vision:HandoverVision", Fraction(1, 30), "finds ball and markers"),
+    Entry("VisualServo", "controllers.visual_servo:VisualServo", Fraction(1, 2), "moves the arm by what vision sees"),
+)
+
+UNITS: Mapping[str, Entry] = {entry.name: entry for entry in _ENTRIES}
+
+
+def find_unit(name: str) -> Entry:
+    """Return a unit's entry.
+
+    Raises:
+        UnknownUnit: there is no unit of this name.
+    """
+    if name not in UNITS:
+        raise UnknownUnit(name, list(UNITS))
+    return UNITS[name]

@@ -1,0 +1,141 @@
+"""modelDescription.xml of FMI 2.0: arrays become scalars, `p_WG[1]`, `cov_O[1,1]`, in row-major order."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+
+import numpy as np
+
+from cosim.block import Causality, Kind, Variable
+from fmus.model_description import (
+    GENERATOR,
+    Model,
+    add_default_experiment,
+    add_log_categories,
+    add_units,
+    boolean,
+    bounds,
+    enumerations,
+    known_at_start,
+    number,
+    text,
+    variability,
+)
+from fmus.table import element_names
+
+
+class NoFmi2Form(ValueError):
+    """A unit has binary ports, for which FMI 2 has no type."""
+
+    def __init__(self, unit: str, ports: list[str]) -> None:
+        super().__init__(f"{unit} has no FMI 2 form: FMI 2 knows no binary variables ({', '.join(ports)}); use FMI 3")
+        self.unit, self.ports = unit, ports
+
+
+def fmi2_description(model: Model) -> bytes:
+    """Return the model description as XML.
+
+    Raises:
+        NoFmi2Form: the block has binary ports.
+    """
+    binaries = [v.name for v in model.description.variables if v.kind is Kind.BINARY]
+    if binaries:
+        raise NoFmi2Form(model.name, binaries)
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=model.name,
+        guid=model.token,
+        description=model.summary,
+        generationTool=GENERATOR,
+        variableNamingConvention="structured",
+        numberOfEventIndicators="0",
+    )
+    ET.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=model.name,
+        needsExecutionTool="true",  # Python
+        canHandleVariableCommunicationStepSize=boolean(model.description.period is None),
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true",
+        canSerializeFMUstate="true",
+    )
+    add_units(root, model.description.variables)
+    _add_types(root, model.description.variables)
+    add_log_categories(root)
+    add_default_experiment(root, model)
+    variables = ET.SubElement(root, "ModelVariables")
+    for v in model.description.variables:
+        _add_variable(variables, model, v)
+    _add_structure(root, model)
+    return text(root)
+
+
+def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
+    used = enumerations(variables)
+    if not used:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for enumeration in used:
+        simple = ET.SubElement(definitions, "SimpleType", name=enumeration.__name__)
+        items = ET.SubElement(simple, "Enumeration")
+        for item in enumeration:
+            ET.SubElement(items, "Item", name=item.name, value=str(int(item)))
+
+
+def _add_variable(variables: ET.Element, model: Model, v: Variable) -> None:
+    first = model.layout.references(2)[v.name]
+    is_parameter, is_output = v.causality is Causality.PARAMETER, v.causality is Causality.OUTPUT
+    for i, name in enumerate(element_names(v)):
+        scalar = ET.SubElement(
+            variables,
+            "ScalarVariable",
+            name=name,
+            valueReference=str(first + i),
+            description=v.description,
+            causality=v.causality.value,
+            variability="fixed" if is_parameter else variability(model, v),
+            attrib={"initial": "exact"} if is_parameter else {"initial": "calculated"} if is_output else {},
+        )
+        tag, facts = _type(v)
+        start = {} if is_output else {"start": _start(v, i)}
+        ET.SubElement(scalar, tag, {**facts, **start})
+
+
+def _type(v: Variable) -> tuple[str, dict[str, str]]:
+    if v.kind is Kind.REAL:
+        return "Real", {"unit": v.unit.symbol, **bounds(v, as_integer=False)}
+    if v.kind is Kind.INTEGER:
+        return "Integer", bounds(v, as_integer=True)
+    if v.enumeration is not None:
+        return "Enumeration", {"declaredType": v.enumeration.__name__}
+    return {Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}[v.kind], {}
+
+
+def _start(v: Variable, i: int) -> str:
+    if v.kind is Kind.REAL:
+        return number(np.ravel(v.start)[i])
+    if v.kind is Kind.BOOLEAN:
+        return boolean(v.start)
+    return str(v.start) if v.kind is Kind.STRING else str(int(v.start))
+
+
+def _add_structure(root: ET.Element, model: Model) -> None:
+    """Indices here count the scalar variables from 1."""
+    sizes = {v.name: v.size for v in model.description.variables}
+    references = model.layout.references(2)
+
+    def indices(names: Iterable[str]) -> list[int]:
+        return [references[name] + i + 1 for name in names for i in range(sizes[name])]
+
+    structure = ET.SubElement(root, "ModelStructure")
+    outputs = ET.SubElement(structure, "Outputs")
+    initial = ET.SubElement(structure, "InitialUnknowns")
+    for v in model.description.outputs:
+        now = " ".join(map(str, sorted(indices(model.description.feedthrough.get(v.name, ())))))
+        first = " ".join(map(str, sorted(indices(known_at_start(model, v.name)))))
+        for index in indices([v.name]):
+            ET.SubElement(outputs, "Unknown", index=str(index), dependencies=now)
+            ET.SubElement(initial, "Unknown", index=str(index), dependencies=first)
+    for empty in (e for e in (outputs, initial) if len(e) == 0):
+        structure.remove(empty)

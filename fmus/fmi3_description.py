@@ -1,0 +1,141 @@
+"""modelDescription.xml of FMI 3.0: arrays with dimensions, values in row-major order; pictures as binary variables."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+
+import numpy as np
+
+from cosim.block import Causality, Kind, Variable
+from fmus.layout import capacity
+from fmus.model_description import (
+    GENERATOR,
+    Model,
+    add_default_experiment,
+    add_log_categories,
+    add_units,
+    boolean,
+    bounds,
+    enumerations,
+    known_at_start,
+    number,
+    text,
+    variability,
+)
+
+BYTES_MIME_TYPE = "application/octet-stream"
+
+
+def fmi3_description(model: Model) -> bytes:
+    """Return the model description as XML."""
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=model.name,
+        instantiationToken=model.token,
+        description=model.summary,
+        generationTool=GENERATOR,
+        variableNamingConvention="structured",
+    )
+    period = model.description.period
+    ET.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=model.name,
+        needsExecutionTool="true",  # Python
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize=boolean(period is None),
+        attrib={} if period is None else {"fixedInternalStepSize": number(float(period))},
+    )
+    add_units(root, model.description.variables)
+    _add_types(root, model.description.variables)
+    add_log_categories(root)
+    add_default_experiment(root, model)
+    variables = ET.SubElement(root, "ModelVariables")
+    ET.SubElement(
+        variables,
+        "Float64",
+        name="time",
+        valueReference="0",
+        description="time",
+        causality="independent",
+        variability="continuous",
+    )
+    for v in model.description.variables:
+        _add_variable(variables, model, v)
+    _add_structure(root, model)
+    return text(root)
+
+
+def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
+    used = enumerations(variables)
+    if not used:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for enumeration in used:
+        items = ET.SubElement(definitions, "EnumerationType", name=enumeration.__name__)
+        for item in enumeration:
+            ET.SubElement(items, "Item", name=item.name, value=str(int(item)))
+
+
+def _add_variable(variables: ET.Element, model: Model, v: Variable) -> None:
+    is_parameter, is_output = v.causality is Causality.PARAMETER, v.causality is Causality.OUTPUT
+    tag, facts = _type(v)
+    attributes = {
+        "name": v.name,
+        "valueReference": str(model.layout.references(3)[v.name]),
+        "description": v.description,
+        "causality": v.causality.value,
+        "variability": "fixed" if is_parameter else variability(model, v),
+    }
+    if is_parameter or is_output:
+        attributes["initial"] = "exact" if is_parameter else "calculated"
+    attributes.update(facts)
+    start = None if is_output else _start(v)
+    in_attribute = v.kind not in (Kind.STRING, Kind.BINARY)
+    if start is not None and in_attribute:
+        attributes["start"] = start
+    element = ET.SubElement(variables, tag, attributes)
+    for extent in v.shape:
+        ET.SubElement(element, "Dimension", start=str(extent))
+    if start is not None and not in_attribute:
+        ET.SubElement(element, "Start", value=start)
+
+
+def _type(v: Variable) -> tuple[str, dict[str, str]]:
+    if v.kind is Kind.REAL:
+        return "Float64", {"unit": v.unit.symbol, **bounds(v, as_integer=False)}
+    if v.kind is Kind.INTEGER:
+        return "Int64", bounds(v, as_integer=True)
+    if v.enumeration is not None:
+        return "Enumeration", {"declaredType": v.enumeration.__name__}
+    if v.kind is Kind.BINARY:
+        mime = v.raster.mime if v.raster else BYTES_MIME_TYPE
+        return "Binary", {"mimeType": mime, "maxSize": str(capacity(v))}
+    return {Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}[v.kind], {}
+
+
+def _start(v: Variable) -> str:
+    """Return the start value; a picture's is empty, which the runtime takes for black."""
+    if v.kind is Kind.REAL:
+        return " ".join(number(entry) for entry in np.ravel(v.start))
+    if v.kind is Kind.BOOLEAN:
+        return boolean(v.start)
+    if v.kind is Kind.BINARY:
+        return ""
+    return str(v.start) if v.kind is Kind.STRING else str(int(v.start))
+
+
+def _add_structure(root: ET.Element, model: Model) -> None:
+    references = model.layout.references(3)
+
+    def listed(names: Iterable[str]) -> str:
+        return " ".join(map(str, sorted(references[name] for name in names)))
+
+    structure = ET.SubElement(root, "ModelStructure")
+    for v in model.description.outputs:
+        now = listed(model.description.feedthrough.get(v.name, ()))
+        ET.SubElement(structure, "Output", valueReference=str(references[v.name]), dependencies=now)
+    for v in model.description.outputs:
+        first = listed(known_at_start(model, v.name))
+        ET.SubElement(structure, "InitialUnknown", valueReference=str(references[v.name]), dependencies=first)

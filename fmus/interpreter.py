@@ -1,0 +1,43 @@
+"""What a host that is not Python must know of an interpreter to run FMUs in it.
+
+The builder notes it in each FMU (resources/python.txt). Carried in the FMU and run as a script it tells of the
+interpreter that runs it: that is how the runtime asks the `python3` on the PATH. Standard library only.
+"""
+
+import os
+import sys
+import sysconfig
+
+
+def describe() -> str:
+    """Return lines `name = value`: executable, library (empty if Python was built without one), version, site."""
+    folders = [p for p in sys.path if os.path.basename(p) in ("site-packages", "dist-packages") and os.path.isdir(p)]
+    facts = [
+        ("executable", sys.executable),
+        ("library", library()),
+        ("version", f"{sys.version_info.major}.{sys.version_info.minor}"),
+        *[("site", folder) for folder in folders],
+    ]
+    return "".join(f"{name} = {value}\n" for name, value in facts)
+
+
+def library() -> str:
+    """Return the path of the interpreter's shared library, or an empty string."""
+    if os.name == "nt":
+        names = [f"python{sys.version_info.major}{sys.version_info.minor}.dll"]
+        folders = [sys.base_prefix, os.path.dirname(sys.executable)]
+    else:
+        names = [str(sysconfig.get_config_var(v) or "") for v in ("INSTSONAME", "LDLIBRARY")]
+        variables = ("LIBDIR", "LIBPL", "PYTHONFRAMEWORKPREFIX")
+        folders = [str(sysconfig.get_config_var(v) or "") for v in variables] + [os.path.join(sys.base_prefix, "lib")]
+        folders.insert(1, os.path.join(folders[0], str(sysconfig.get_config_var("MULTIARCH") or "")))
+    for name in names:
+        for folder in folders:
+            path = os.path.join(folder, name)
+            if name and folder and not name.endswith(".a") and os.path.isfile(path):
+                return path
+    return ""
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(os.fsencode(describe()))

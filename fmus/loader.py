@@ -1,0 +1,189 @@
+"""Starts an FMU's Python side inside a host: the first of its files that runs, and the only one not imported.
+
+An FMU's modules live in `sys.modules` under a prefix made of their content's hash, as in `_fmu_8d3f.plants.tendon_arm`;
+their imports are resolved by an `__import__` of their own. So the host's modules of the same names, and those of other
+FMUs or of other versions of this one, are neither seen nor touched. Standard library only.
+"""
+
+import builtins
+import importlib
+import importlib.machinery
+import importlib.util
+import json
+import linecache
+import os
+import site
+import sys
+import threading
+import traceback
+import types
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+_builtin_import = builtins.__import__
+
+
+class Refusal(Exception):
+    """The host or its installation is at fault; the message says all, a traceback would only distract."""
+
+    is_refusal = True
+
+
+def start(resources: str, token: str) -> Any:
+    """Make an instance's Python side, a `fmus.slave.Slave`.
+
+    Args:
+        resources: the FMU's folder of that name, unpacked.
+        token: the GUID or instantiation token that the host read in the model description.
+
+    Raises:
+        Refusal: the token is that of another FMU, or packages are missing.
+    """
+    with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
+        unit = json.load(file)
+    if token != unit["token"]:
+        raise Refusal(f"the model description's token {token} is not this unit's, which is {unit['token']}")
+    _require(unit, resources)
+    modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
+    module, _, name = unit["block"].partition(":")
+    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["fmi"])
+
+
+def explain(error: BaseException) -> str:
+    """Return what the log says of an exception: its message if that is enough, else the traceback."""
+    if getattr(error, "is_refusal", False):
+        return str(error)
+    return "".join(traceback.format_exception(type(error), error, error.__traceback__)).rstrip()
+
+
+def _require(unit: dict[str, Any], resources: str) -> None:
+    """Make sure that the packages are importable; those of the environment that built the FMU are the last resort."""
+    if not _missing(unit):
+        return
+    noted = _noted(os.path.join(resources, "python.txt"))
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    if noted.get("version") == [version]:
+        for folder in noted.get("site", []):
+            if os.path.isdir(folder):
+                site.addsitedir(folder)
+        importlib.invalidate_caches()
+    missing = _missing(unit)
+    if missing:
+        names = ", ".join(f"{p['distribution']} (built with version {p['version']})" for p in missing)
+        wanted = " ".join(f"{p['distribution']}=={p['version']}" for p in missing)
+        raise Refusal(
+            f"unit {unit['unit']} needs packages that this Python does not have: {names}."
+            f" This is Python {sys.version.split()[0]}, prefix {sys.prefix}, executable {sys.executable or 'unknown'}."
+            f" Cure: install them into it, for instance with `python -m pip install {wanted}`,"
+            " or choose another Python with the environment variable FMU_LIBPYTHON (hosts that are not Python)."
+        )
+
+
+def _missing(unit: dict[str, Any]) -> list[dict[str, str]]:
+    return [p for p in unit["packages"] if p["module"] not in sys.modules and not _findable(p["module"])]
+
+
+def _findable(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except (ImportError, ValueError):
+        return False
+
+
+def _noted(path: str) -> dict[str, list[str]]:
+    """Return python.txt's lines `name = value` as lists of values by name."""
+    noted: dict[str, list[str]] = {}
+    if os.path.isfile(path):
+        with open(path, encoding="utf-8", errors="surrogateescape") as file:
+            for line in file:
+                name, _, value = line.rstrip("\n").partition(" = ")
+                noted.setdefault(name, []).append(value)
+    return noted
+
+
+def _modules(prefix: str, folder: str) -> "_PrivateModules":
+    """Return the modules under a prefix; those already loaded by another instance of the same FMU are shared."""
+    root = types.ModuleType(prefix, "Modules of an FMU.")
+    root.__path__ = []
+    vars(root)["modules"] = _PrivateModules(prefix)
+    modules: _PrivateModules = vars(sys.modules.setdefault(prefix, root))["modules"]
+    modules.folder = folder  # an earlier instance's folder may be gone
+    return modules
+
+
+class _PrivateModules:
+    """The modules of one FMU. Names in the methods' arguments are without the prefix."""
+
+    def __init__(self, prefix: str) -> None:
+        self.prefix = prefix
+        self.folder = ""
+        self.lock = threading.RLock()
+        self.builtins = {**vars(builtins), "__import__": self.import_from}
+
+    def load(self, name: str) -> types.ModuleType:
+        """Return a module, loaded if need be, its packages before it."""
+        with self.lock:
+            full = f"{self.prefix}.{name}"
+            if full not in sys.modules:
+                package, _, last = name.rpartition(".")
+                parent = self.load(package) if package else sys.modules[self.prefix]
+                setattr(parent, last, self._execute(name, full))
+            return sys.modules[full]
+
+    def import_from(
+        self,
+        name: str,
+        globals: Mapping[str, Any] | None = None,  # noqa: A002 - the names that __import__ has
+        locals: Mapping[str, Any] | None = None,  # noqa: A002
+        fromlist: Sequence[str] | None = (),
+        level: int = 0,
+    ) -> types.ModuleType:
+        """Stand in for `__import__` in the FMU's modules."""
+        if level and globals:
+            name = importlib.util.resolve_name("." * level + name, globals["__package__"])[len(self.prefix) + 1 :]
+        elif self._place(name.partition(".")[0]) is None:
+            return _builtin_import(name, globals, locals, fromlist or (), level)
+        module = self.load(name)
+        if not fromlist:
+            return self.load(name.partition(".")[0])
+        for item in fromlist:
+            if item != "*" and not hasattr(module, item) and self._place(f"{name}.{item}"):
+                self.load(f"{name}.{item}")
+        return module
+
+    def _place(self, name: str) -> str | None:
+        """Return the file that a module is made of; of a package its `__init__.py`, or else its folder."""
+        base = os.path.join(self.folder, *name.split("."))
+        candidates = (f"{base}.py", os.path.join(base, "__init__.py"), base)
+        return next((c for c in candidates if os.path.exists(c)), None)
+
+    def _execute(self, name: str, full: str) -> types.ModuleType:
+        path = self._place(name)
+        if path is None:
+            raise ModuleNotFoundError(f"the FMU has no module {name!r}", name=name)
+        is_package = not path.endswith(f"{name.rpartition('.')[2]}.py")
+        source = _source(path)
+        module = types.ModuleType(full)
+        module.__file__ = path
+        module.__package__ = full if is_package else full.rpartition(".")[0]
+        module.__spec__ = importlib.machinery.ModuleSpec(full, None, origin=path, is_package=is_package)
+        vars(module)["__builtins__"] = self.builtins
+        if is_package:
+            module.__path__ = []
+        sys.modules[full] = module
+        try:
+            exec(compile(source, path, "exec", dont_inherit=True), vars(module))
+        except BaseException:
+            del sys.modules[full]
+            raise
+        return module
+
+
+def _source(path: str) -> str:
+    """Return a module's source; tracebacks keep its lines though the host may delete the FMU's folder."""
+    if os.path.isdir(path):
+        return ""
+    with open(path, encoding="utf-8") as file:
+        source = file.read()
+    linecache.cache[path] = (len(source), None, source.splitlines(keepends=True), path)
+    return source

@@ -1,0 +1,87 @@
+"""Values as a block is to see them, and the parameters from which it is made."""
+
+import enum
+import math
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Kind, Variable
+from fmus.buffers import Buffers
+from fmus.layout import Buffer, Slot
+
+
+class ParameterOutOfRange(ValueError):
+    """A parameter's value is outside the range that its declaration allows."""
+
+    is_refusal = True
+
+    def __init__(self, variable: Variable, value: float) -> None:
+        low = "-inf" if variable.minimum is None else f"{variable.minimum:g}"
+        high = "inf" if variable.maximum is None else f"{variable.maximum:g}"
+        super().__init__(
+            f"parameter '{variable.name}' ({variable.description}) is {value!r} {variable.unit};"
+            f" it must be from {low} to {high} {variable.unit}"
+        )
+        self.variable, self.value = variable, value
+
+
+class UnknownItem(ValueError):
+    """An enumeration was set to a number that is none of its items."""
+
+    is_refusal = True
+
+    def __init__(self, variable: Variable, items: type[enum.IntEnum], value: int) -> None:
+        listed = ", ".join(f"{int(item)} {item.name}" for item in items)
+        super().__init__(f"{variable.causality.value} '{variable.name}' is {value}; its items are {listed}")
+        self.variable, self.value = variable, value
+
+
+def read_parameters(buffers: Buffers) -> Any:
+    """Make a block's parameters from the buffers.
+
+    Raises:
+        ParameterOutOfRange, UnknownItem: a value is not one that its declaration allows.
+    """
+    layout = buffers.layout
+    values: dict[str, Any] = {}
+    for v in layout.description.parameters:
+        values[v.name] = read_value(buffers, layout.slots[v.name])
+        if v.kind in (Kind.REAL, Kind.INTEGER):
+            _check_range(v, values[v.name])
+    return layout.description.params_type(**values)
+
+
+def _check_range(variable: Variable, value: Any) -> None:
+    low = -math.inf if variable.minimum is None else variable.minimum
+    high = math.inf if variable.maximum is None else variable.maximum
+    for entry in np.ravel(value).tolist():
+        if not (low <= entry <= high and math.isfinite(entry)):
+            raise ParameterOutOfRange(variable, entry)
+
+
+def read_value(buffers: Buffers, slot: Slot) -> Any:
+    """Return a variable's value as the type it is declared with, not shared with the buffers.
+
+    Raises:
+        UnknownItem: an enumeration's number is none of its items.
+    """
+    v = slot.variable
+    if slot.buffer is Buffer.FLOAT64:
+        values = buffers.floats[slot.entries]
+        return np.array(values).reshape(v.shape) if v.shape else values.item()
+    if slot.buffer is Buffer.INT64:
+        number = int(buffers.integers[slot.offset])
+        return number if v.enumeration is None else _item(v, v.enumeration, number)
+    if slot.buffer is Buffer.BOOLEAN:
+        return bool(buffers.booleans[slot.offset])
+    if slot.buffer is Buffer.STRING:
+        return buffers.strings[slot.offset].decode()
+    return buffers.binaries[slot.offset][: int(buffers.sizes[slot.offset])].tobytes()
+
+
+def _item(variable: Variable, items: type[enum.IntEnum], value: int) -> enum.IntEnum:
+    try:
+        return items(value)
+    except ValueError:
+        raise UnknownItem(variable, items, value) from None

@@ -1,0 +1,213 @@
+/* FMI 2.0: the standard's functions for a co-simulation slave. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi.h"
+#include "instance.h"
+#include "platform.h"
+
+#define ASYNCHRONOUS "steps are done when fmi2DoStep returns"
+#define DERIVATIVES "derivatives of inputs and outputs are not provided"
+#define MODEL_EXCHANGE "this unit is a co-simulation slave, it has no model-exchange form"
+
+/* A logger's message is a printf format in which # begins a reference to a variable: both are doubled. */
+static void log_message(const Instance *instance, Status status, const char *category, const char *message) {
+    char *escaped = malloc(2 * strlen(message) + 1);
+    if (!escaped) return;
+    char *to = escaped;
+    for (; *message; *to++ = *message++)
+        if (*message == '%' || *message == '#') *to++ = *message;
+    *to = 0;
+    fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->host_logger;
+    logger(instance->host_environment, instance->name, (fmi2Status)status, category, escaped);
+    free(escaped);
+}
+
+#define BEGIN(modes)        \
+    Instance *instance = c; \
+    if (!allowed(instance, __func__, modes)) return fmi2Error
+
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+
+const char *fmi2GetVersion(void) { return "2.0"; }
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]) {
+    return (fmi2Status)set_logging(c, __func__, on, n, categories);
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *host, fmi2Boolean visible, fmi2Boolean logging) {
+    (void)visible;
+    if (!host) return NULL;
+    Instance *instance =
+        instance_new(name, log_message, (void (*)(void))host->logger, host->componentEnvironment, logging);
+    if (!instance) return NULL;
+    bool started = false;
+    if (type != fmi2CoSimulation)
+        refuse_unsupported(instance, __func__, MODEL_EXCHANGE);
+    else if (given(instance, __func__, guid, "fmuGUID") &&
+             given(instance, __func__, resources, "fmuResourceLocation")) {
+        char *folder = platform_path(resources);
+        started = folder && slave_start(instance, __func__, folder, guid);
+        free(folder);
+    }
+    if (started) return instance;
+    instance_free(instance);
+    return NULL;
+}
+
+void fmi2FreeInstance(fmi2Component c) { instance_free(c); }
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
+                               fmi2Boolean stop_defined, fmi2Real stop) {
+    (void)tolerance_defined;
+    (void)tolerance;
+    BEGIN(INSTANTIATED);
+    return (fmi2Status)instance_set_times(instance, __func__, start, stop_defined, stop);
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    BEGIN(INSTANTIATED);
+    return (fmi2Status)instance_enter_initialisation(instance, __func__);
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    BEGIN(INITIALISATION);
+    return (fmi2Status)instance_exit_initialisation(instance, __func__);
+}
+
+fmi2Status fmi2Terminate(fmi2Component c) {
+    BEGIN(STEPPING);
+    return (fmi2Status)instance_terminate(instance, __func__);
+}
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    BEGIN(ANY_MODE);
+    return (fmi2Status)instance_reset(instance, __func__);
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real values[]) {
+    return (fmi2Status)get_floats(c, __func__, vr, n, values, n);
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real values[]) {
+    return (fmi2Status)set_floats(c, __func__, vr, n, values, n);
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer values[]) {
+    Instance *instance = c;
+    if (!may_get(instance, __func__, INT64, vr, n, values, n)) return fmi2Error;
+    for (size_t i = 0; i < n; i++) {
+        int64_t value = instance->integers[variable_of(instance, vr[i])->offset];
+        if (value < INT32_MIN || value > INT32_MAX)
+            return (fmi2Status)refuse(instance, __func__, "the value %lld of variable %u has no place in 32 bits",
+                                      (long long)value, vr[i]);
+        values[i] = (fmi2Integer)value;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer values[]) {
+    Instance *instance = c;
+    if (!may_set(instance, __func__, INT64, vr, n, values, n)) return fmi2Error;
+    for (size_t i = 0; i < n; i++) instance->integers[variable_of(instance, vr[i])->offset] = values[i];
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean values[]) {
+    Instance *instance = c;
+    if (!may_get(instance, __func__, BOOLEAN, vr, n, values, n)) return fmi2Error;
+    for (size_t i = 0; i < n; i++) values[i] = instance->booleans[variable_of(instance, vr[i])->offset] != 0;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean values[]) {
+    Instance *instance = c;
+    if (!may_set(instance, __func__, BOOLEAN, vr, n, values, n)) return fmi2Error;
+    for (size_t i = 0; i < n; i++) instance->booleans[variable_of(instance, vr[i])->offset] = values[i] != 0;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String values[]) {
+    return (fmi2Status)get_strings(c, __func__, vr, n, values, n);
+}
+
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String values[]) {
+    return (fmi2Status)set_strings(c, __func__, vr, n, values, n);
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    return (fmi2Status)state_get(c, __func__, state);
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) { return (fmi2Status)state_set(c, __func__, state); }
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    return (fmi2Status)state_free(c, __func__, state);
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    return (fmi2Status)state_size(c, __func__, state, size);
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+    return (fmi2Status)state_serialise(c, __func__, state, bytes, size);
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
+    return (fmi2Status)state_deserialise(c, __func__, bytes, size, state);
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real dt, fmi2Boolean no_set_state_prior) {
+    (void)no_set_state_prior;
+    BEGIN(STEPPING);
+    return (fmi2Status)instance_step(instance, __func__, t, dt);
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    BEGIN(STEPPING | TERMINATED | FAILED);
+    if (!given(instance, __func__, value, "value")) return fmi2Error;
+    if (kind != fmi2LastSuccessfulTime)
+        return (fmi2Status)refuse(instance, __func__, "only fmi2LastSuccessfulTime is a real status");
+    *value = instance->floats[0];
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    BEGIN(STEPPING | TERMINATED | FAILED);
+    if (!given(instance, __func__, value, "value")) return fmi2Error;
+    if (kind != fmi2Terminated)
+        return (fmi2Status)refuse(instance, __func__, "only fmi2Terminated is a boolean status");
+    *value = 0; /* a unit never asks for the end of the simulation */
+    return fmi2OK;
+}
+
+#define UNSUPPORTED(reason, function, ...)                                     \
+    fmi2Status function(fmi2Component c, __VA_ARGS__) {                        \
+        return (fmi2Status)refuse_unsupported(c, __func__, reason);            \
+    }
+#define UNSUPPORTED_BARE(reason, function)                                     \
+    fmi2Status function(fmi2Component c) {                                     \
+        return (fmi2Status)refuse_unsupported(c, __func__, reason);            \
+    }
+
+UNSUPPORTED_BARE(ASYNCHRONOUS, fmi2CancelStep)
+UNSUPPORTED(ASYNCHRONOUS, fmi2GetStatus, const fmi2StatusKind k, fmi2Status *v)
+UNSUPPORTED(ASYNCHRONOUS, fmi2GetIntegerStatus, const fmi2StatusKind k, fmi2Integer *v)
+UNSUPPORTED(ASYNCHRONOUS, fmi2GetStringStatus, const fmi2StatusKind k, fmi2String *v)
+UNSUPPORTED(DERIVATIVES, fmi2GetDirectionalDerivative, const fmi2ValueReference u[], size_t nu,
+            const fmi2ValueReference k[], size_t nk, const fmi2Real seed[], fmi2Real sensitivity[])
+UNSUPPORTED(DERIVATIVES, fmi2SetRealInputDerivatives, const fmi2ValueReference vr[], size_t n,
+            const fmi2Integer order[], const fmi2Real v[])
+UNSUPPORTED(DERIVATIVES, fmi2GetRealOutputDerivatives, const fmi2ValueReference vr[], size_t n,
+            const fmi2Integer order[], fmi2Real v[])
+UNSUPPORTED_BARE(MODEL_EXCHANGE, fmi2EnterEventMode)
+UNSUPPORTED_BARE(MODEL_EXCHANGE, fmi2EnterContinuousTimeMode)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2NewDiscreteStates, fmi2EventInfo *info)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2CompletedIntegratorStep, fmi2Boolean no_set, fmi2Boolean *event, fmi2Boolean *end)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2SetTime, fmi2Real t)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2SetContinuousStates, const fmi2Real x[], size_t n)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2GetDerivatives, fmi2Real x[], size_t n)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2GetEventIndicators, fmi2Real z[], size_t n)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2GetContinuousStates, fmi2Real x[], size_t n)
+UNSUPPORTED(MODEL_EXCHANGE, fmi2GetNominalsOfContinuousStates, fmi2Real x[], size_t n)

@@ -1,0 +1,173 @@
+/* FMI 3.0: life, time and states of a co-simulation slave. */
+#include <stdlib.h>
+
+#include "fmi.h"
+#include "instance.h"
+#include "platform.h"
+
+static void log_message(const Instance *instance, Status status, const char *category, const char *message) {
+    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category, message);
+}
+
+#define BEGIN(modes)             \
+    Instance *instance = handle; \
+    if (!allowed(instance, __func__, modes)) return fmi3Error
+
+const char *fmi3GetVersion(void) { return "3.0"; }
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance handle, fmi3Boolean on, size_t n, const fmi3String categories[]) {
+    return (fmi3Status)set_logging(handle, __func__, on, n, categories);
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const fmi3ValueReference intermediate[], size_t n_intermediate,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+                                         fmi3IntermediateUpdateCallback update) {
+    (void)visible;
+    (void)early_return; /* a step is never cut short, whether that is allowed or not */
+    (void)intermediate;
+    (void)update;
+    Instance *instance = instance_new(name, log_message, (void (*)(void))logger, environment, logging);
+    if (!instance) return NULL;
+    instance->event_mode_used = event_mode;
+    if (n_intermediate > 0)
+        warn(instance, __func__, "steps have no intermediate points: the %zu variables will not be updated within them",
+             n_intermediate);
+    bool started = false;
+    if (given(instance, __func__, token, "instantiationToken") &&
+        given(instance, __func__, resources, "resourcePath")) {
+        char *folder = platform_path(resources);
+        started = folder && slave_start(instance, __func__, folder, token);
+        free(folder);
+    }
+    if (started) return instance;
+    instance_free(instance);
+    return NULL;
+}
+
+static fmi3Instance refuse_kind(const char *function, const char *kind, fmi3String name,
+                                fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger) {
+    Instance *instance = instance_new(name, log_message, (void (*)(void))logger, environment, false);
+    if (!instance) return NULL;
+    refuse(instance, function, "not supported: this unit is a co-simulation slave, it has no %s form", kind);
+    instance_free(instance);
+    return NULL;
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                          fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback logger) {
+    (void)token, (void)resources, (void)visible, (void)logging;
+    return refuse_kind(__func__, "model-exchange", name, environment, logger);
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
+                                               fmi3Boolean visible, fmi3Boolean logging,
+                                               fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+                                               fmi3ClockUpdateCallback update, fmi3LockPreemptionCallback lock,
+                                               fmi3UnlockPreemptionCallback unlock) {
+    (void)token, (void)resources, (void)visible, (void)logging, (void)update, (void)lock, (void)unlock;
+    return refuse_kind(__func__, "scheduled-execution", name, environment, logger);
+}
+
+void fmi3FreeInstance(fmi3Instance handle) { instance_free(handle); }
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance handle, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
+                                       fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop) {
+    (void)tolerance_defined;
+    (void)tolerance;
+    BEGIN(INSTANTIATED);
+    if (instance_set_times(instance, __func__, start, stop_defined, stop) != STATUS_OK) return fmi3Error;
+    return (fmi3Status)instance_enter_initialisation(instance, __func__);
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance handle) {
+    BEGIN(INITIALISATION);
+    return (fmi3Status)instance_exit_initialisation(instance, __func__);
+}
+
+fmi3Status fmi3Terminate(fmi3Instance handle) {
+    BEGIN(STEPPING | EVENT);
+    return (fmi3Status)instance_terminate(instance, __func__);
+}
+
+fmi3Status fmi3Reset(fmi3Instance handle) {
+    BEGIN(ANY_MODE);
+    return (fmi3Status)instance_reset(instance, __func__);
+}
+
+fmi3Status fmi3DoStep(fmi3Instance handle, fmi3Float64 t, fmi3Float64 dt, fmi3Boolean no_set_state_prior,
+                      fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last_time) {
+    (void)no_set_state_prior;
+    BEGIN(STEPPING);
+    if (!given(instance, __func__, event_needed, "eventHandlingNeeded") ||
+        !given(instance, __func__, terminate, "terminateSimulation") ||
+        !given(instance, __func__, early, "earlyReturn") || !given(instance, __func__, last_time, "lastSuccessfulTime"))
+        return fmi3Error;
+    *event_needed = *terminate = *early = false;
+    Status status = instance_step(instance, __func__, t, dt);
+    *last_time = instance->floats[0];
+    return (fmi3Status)status;
+}
+
+/* A unit has no events of its own. A host that uses event mode all the same may set inputs in it and goes on. */
+
+fmi3Status fmi3EnterEventMode(fmi3Instance handle) {
+    BEGIN(STEPPING);
+    if (!instance->event_mode_used)
+        return (fmi3Status)refuse(instance, __func__, "the instance was made with eventModeUsed = fmi3False");
+    instance->mode = EVENT;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance handle) {
+    BEGIN(EVENT);
+    instance->mode = STEPPING;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance handle) {
+    BEGIN(INITIALISATION | EVENT);
+    return fmi3OK;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance handle, fmi3Boolean *again, fmi3Boolean *terminate,
+                                    fmi3Boolean *nominals_changed, fmi3Boolean *states_changed,
+                                    fmi3Boolean *next_event_defined, fmi3Float64 *next_event) {
+    BEGIN(EVENT);
+    if (!given(instance, __func__, again, "discreteStatesNeedUpdate") ||
+        !given(instance, __func__, terminate, "terminateSimulation") ||
+        !given(instance, __func__, nominals_changed, "nominalsOfContinuousStatesChanged") ||
+        !given(instance, __func__, states_changed, "valuesOfContinuousStatesChanged") ||
+        !given(instance, __func__, next_event_defined, "nextEventTimeDefined") ||
+        !given(instance, __func__, next_event, "nextEventTime"))
+        return fmi3Error;
+    *again = *terminate = *nominals_changed = *states_changed = *next_event_defined = false;
+    *next_event = 0.0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetFMUState(fmi3Instance handle, fmi3FMUState *state) {
+    return (fmi3Status)state_get(handle, __func__, state);
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance handle, fmi3FMUState state) {
+    return (fmi3Status)state_set(handle, __func__, state);
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance handle, fmi3FMUState *state) {
+    return (fmi3Status)state_free(handle, __func__, state);
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance handle, fmi3FMUState state, size_t *size) {
+    return (fmi3Status)state_size(handle, __func__, state, size);
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance handle, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
+    return (fmi3Status)state_serialise(handle, __func__, state, bytes, size);
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance handle, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
+    return (fmi3Status)state_deserialise(handle, __func__, bytes, size, state);
+}

@@ -1,0 +1,107 @@
+#include "instance.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TIME_TOLERANCE 1e-9 /* of the time, or of 1 s: what a host may lose by adding up step sizes */
+
+Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void), void *environment, bool logging) {
+    Instance *instance = calloc(1, sizeof *instance);
+    if (!instance) return NULL;
+    instance->name = copy_of(name ? name : "");
+    instance->log = log;
+    instance->host_logger = host_logger;
+    instance->host_environment = environment;
+    instance->logging = logging;
+    instance->mode = INSTANTIATED;
+    instance->stop_time = INFINITY;
+    if (instance->name) return instance;
+    free(instance);
+    return NULL;
+}
+
+void instance_free(Instance *instance) {
+    if (!instance) return;
+    states_free(instance);
+    slave_release(instance);
+    free(instance->table);
+    free(instance->name);
+    free(instance);
+}
+
+static bool inputs_finite(const Instance *instance, const char *function) {
+    Text bad = {0};
+    if (!find_bad_input(instance, &bad)) return true;
+    refuse(instance, function, "%s", text_of(&bad));
+    text_clear(&bad);
+    return false;
+}
+
+static Status fail(Instance *instance) {
+    instance->mode = FAILED;
+    return STATUS_ERROR;
+}
+
+Status instance_set_times(Instance *instance, const char *function, double start, bool has_stop, double stop) {
+    if (!isfinite(start)) return refuse(instance, function, "the start time is %g", start);
+    if (has_stop && !(stop >= start))
+        return refuse(instance, function, "the stop time %.17g s is before the start time %.17g s", stop, start);
+    instance->floats[0] = start;
+    instance->stop_time = has_stop ? stop : INFINITY;
+    return STATUS_OK;
+}
+
+Status instance_enter_initialisation(Instance *instance, const char *function) {
+    instance->mode = INITIALISATION;
+    instance->outputs_stale = true;
+    note(instance, function, "initialising at t = %.17g s", instance->floats[0]);
+    return STATUS_OK;
+}
+
+Status instance_refresh_outputs(Instance *instance, const char *function) {
+    if (instance->mode != INITIALISATION || !instance->outputs_stale) return STATUS_OK;
+    if (!inputs_finite(instance, function)) return STATUS_ERROR;
+    if (slave_call(instance, function, "initialise") != STATUS_OK) return fail(instance);
+    instance->outputs_stale = false;
+    instance->has_outputs = true;
+    return STATUS_OK;
+}
+
+Status instance_exit_initialisation(Instance *instance, const char *function) {
+    if (instance_refresh_outputs(instance, function) != STATUS_OK) return STATUS_ERROR;
+    instance->mode = instance->event_mode_used ? EVENT : STEPPING;
+    return STATUS_OK;
+}
+
+Status instance_step(Instance *instance, const char *function, double t, double dt) {
+    double tolerance = TIME_TOLERANCE * fmax(1.0, fabs(instance->floats[0]));
+    if (!(fabs(t - instance->floats[0]) <= tolerance))
+        return refuse(instance, function, "the step begins at t = %.17g s where the instance is at %.17g s", t,
+                      instance->floats[0]);
+    if (!(dt > 0.0 && isfinite(dt)))
+        return refuse(instance, function, "the step size is %.17g s; it must be positive", dt);
+    if (t + dt > instance->stop_time + tolerance)
+        return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
+                      instance->stop_time);
+    if (!inputs_finite(instance, function)) return STATUS_ERROR;
+    instance->floats[0] = t;
+    instance->floats[1] = dt;
+    if (slave_step(instance, function) != STATUS_OK) return fail(instance);
+    instance->floats[0] = t + dt;
+    return STATUS_OK;
+}
+
+Status instance_terminate(Instance *instance, const char *function) {
+    note(instance, function, "ends at t = %.17g s", instance->floats[0]);
+    instance->mode = TERMINATED;
+    return STATUS_OK;
+}
+
+Status instance_reset(Instance *instance, const char *function) {
+    if (slave_call(instance, function, "reset") != STATUS_OK) return fail(instance);
+    instance->mode = INSTANTIATED;
+    instance->has_outputs = instance->outputs_stale = false;
+    instance->stop_time = INFINITY;
+    return STATUS_OK;
+}

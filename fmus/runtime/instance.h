@@ -1,0 +1,160 @@
+/* One instance of a unit, whatever the standard: its modes, its variables' buffers, its Python side.
+ *
+ * fmi2.c and fmi3_*.c translate the standards' functions into these. `function` is always the name of the standard's
+ * function that the host called; it begins the log line of every refusal.
+ *
+ * A refused call (wrong mode, unknown variable, NULL) changes nothing. A failure in the block's own code puts the
+ * instance into the mode FAILED: it can be reset, set back to a saved state, or freed.
+ */
+#ifndef INSTANCE_H
+#define INSTANCE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "python_api.h"
+
+/* The values are those of fmi2Status and fmi3Status. */
+typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR } Status;
+
+typedef enum {
+    INSTANTIATED = 1,
+    INITIALISATION = 2,
+    STEPPING = 4,
+    EVENT = 8,
+    TERMINATED = 16,
+    FAILED = 32,
+    ANY_MODE = 63
+} Mode;
+
+/* The numbers in these two, and the structures below, are written by fmus/table.py (and layout.py). */
+typedef enum { FLOAT64, INT64, BOOLEAN, STRING, BINARY } Kind;
+typedef enum { PARAMETER, INPUT, OUTPUT, INDEPENDENT } Causality;
+
+/* What a value reference stands for: `count` entries from `offset` on in the buffer of its kind. */
+typedef struct {
+    uint8_t kind, causality;
+    uint16_t unused;
+    uint32_t count, offset, name;
+} Variable;
+
+/* A binary variable's buffer. A picture's size is exact: only `capacity` bytes make one. */
+typedef struct {
+    uint64_t address, capacity, exact;
+} BinaryBuffer;
+
+typedef struct {
+    uint64_t floats, integers, booleans, sizes; /* addresses; floats begin with the time and the step size */
+    uint64_t first_input, inputs;               /* where the real inputs lie in `floats` */
+    uint64_t variables, binaries, names;        /* entries and bytes of what follows this structure */
+} TableHeader;
+
+typedef struct Instance Instance;
+typedef struct SavedState SavedState;
+typedef void Logger(const Instance *instance, Status status, const char *category, const char *message);
+
+struct Instance {
+    char *name;
+    Logger *log;
+    void (*host_logger)(void); /* the host's own function, called by `log` */
+    void *host_environment;
+    bool logging; /* messages beyond errors and warnings are wanted */
+
+    Mode mode;
+    bool event_mode_used;
+    bool has_outputs;   /* the outputs were worked out at least once since the start */
+    bool outputs_stale; /* in initialisation mode something was set after they were */
+    double stop_time;   /* infinity if there is none */
+
+    PyObject *slave, *step, *explain;
+
+    char *table; /* owns what the following point into */
+    const Variable *variables;
+    const BinaryBuffer *binaries;
+    const char *names;
+    size_t n_variables;
+    double *floats;
+    int64_t *integers;
+    uint8_t *booleans;
+    uint64_t *sizes;
+    size_t first_input, n_inputs;
+
+    SavedState *states;
+};
+
+/* log.c */
+
+#define CATEGORY_ERROR "logStatusError"
+#define CATEGORY_WARNING "logStatusWarning"
+#define CATEGORY_ALL "logAll"
+
+Status refuse(const Instance *instance, const char *function, const char *format, ...);
+void warn(const Instance *instance, const char *function, const char *format, ...);
+void note(const Instance *instance, const char *function, const char *format, ...);
+Status refuse_unsupported(const Instance *instance, const char *function, const char *reason);
+
+/* Whether the function may be called now; if not, says so in the log. */
+bool allowed(const Instance *instance, const char *function, unsigned modes);
+bool given(const Instance *instance, const char *function, const void *pointer, const char *what);
+Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]);
+
+/* slave.c: calls into Python. Each takes and releases the interpreter's lock. */
+
+bool slave_start(Instance *instance, const char *function, const char *resources, const char *token);
+void slave_release(Instance *instance);
+Status slave_call(Instance *instance, const char *function, const char *method);
+Status slave_step(Instance *instance, const char *function);
+Status slave_get_state(Instance *instance, const char *function, char **bytes, size_t *size);
+Status slave_set_state(Instance *instance, const char *function, const char *bytes, size_t size);
+Status slave_get_string(Instance *instance, const char *function, size_t index, const char **value);
+Status slave_set_string(Instance *instance, const char *function, size_t index, const char *value);
+
+/* instance.c: life and time */
+
+Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void), void *environment, bool logging);
+void instance_free(Instance *instance);
+Status instance_set_times(Instance *instance, const char *function, double start, bool has_stop, double stop);
+Status instance_enter_initialisation(Instance *instance, const char *function);
+Status instance_exit_initialisation(Instance *instance, const char *function);
+Status instance_step(Instance *instance, const char *function, double t, double dt);
+Status instance_terminate(Instance *instance, const char *function);
+Status instance_reset(Instance *instance, const char *function);
+Status instance_refresh_outputs(Instance *instance, const char *function);
+
+/* variables.c */
+
+/* The variable of a checked value reference. */
+static inline const Variable *variable_of(const Instance *instance, uint32_t reference) {
+    return &instance->variables[reference];
+}
+
+/* Whether these variables may be read (written) now and have `values` entries altogether. Reading brings outputs up to
+ * date, writing marks them stale. */
+bool may_get(Instance *instance, const char *function, Kind kind, const uint32_t references[], size_t n,
+             const void *values, size_t n_values);
+bool may_set(Instance *instance, const char *function, Kind kind, const uint32_t references[], size_t n,
+             const void *values, size_t n_values);
+
+Status get_floats(Instance *instance, const char *function, const uint32_t vr[], size_t n, double values[], size_t);
+Status set_floats(Instance *instance, const char *function, const uint32_t vr[], size_t n, const double values[],
+                  size_t);
+Status get_strings(Instance *instance, const char *function, const uint32_t vr[], size_t n, const char *values[],
+                   size_t);
+Status set_strings(Instance *instance, const char *function, const uint32_t vr[], size_t n, const char *const values[],
+                   size_t);
+
+/* The real input that is not finite, described, or false if all are. */
+bool find_bad_input(const Instance *instance, Text *description);
+
+/* state.c */
+
+Status state_get(Instance *instance, const char *function, void **state);
+Status state_set(Instance *instance, const char *function, void *state);
+Status state_free(Instance *instance, const char *function, void **state);
+Status state_size(Instance *instance, const char *function, void *state, size_t *size);
+Status state_serialise(Instance *instance, const char *function, void *state, void *bytes, size_t size);
+Status state_deserialise(Instance *instance, const char *function, const void *bytes, size_t size, void **state);
+void states_free(Instance *instance);
+
+#endif

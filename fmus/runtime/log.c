@@ -1,0 +1,81 @@
+#include <string.h>
+
+#include "instance.h"
+
+static void say(const Instance *instance, Status status, const char *category, const char *function, const char *format,
+                va_list arguments) {
+    if (!instance || !instance->host_logger) return;
+    Text message = {0};
+    text_add(&message, "%s: ", function);
+    text_add_list(&message, format, arguments);
+    instance->log(instance, status, category, text_of(&message));
+    text_clear(&message);
+}
+
+Status refuse(const Instance *instance, const char *function, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    say(instance, STATUS_ERROR, CATEGORY_ERROR, function, format, arguments);
+    va_end(arguments);
+    return STATUS_ERROR;
+}
+
+void warn(const Instance *instance, const char *function, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    say(instance, STATUS_WARNING, CATEGORY_WARNING, function, format, arguments);
+    va_end(arguments);
+}
+
+void note(const Instance *instance, const char *function, const char *format, ...) {
+    if (!instance->logging) return;
+    va_list arguments;
+    va_start(arguments, format);
+    say(instance, STATUS_OK, CATEGORY_ALL, function, format, arguments);
+    va_end(arguments);
+}
+
+Status refuse_unsupported(const Instance *instance, const char *function, const char *reason) {
+    return refuse(instance, function, "not supported: %s", reason);
+}
+
+static const char *mode_name(Mode mode) {
+    switch (mode) {
+        case INSTANTIATED: return "instantiated";
+        case INITIALISATION: return "initialisation mode";
+        case STEPPING: return "step mode";
+        case EVENT: return "event mode";
+        case TERMINATED: return "terminated";
+        case FAILED: return "failed: only reset, a saved state or free help";
+        default: return "unknown";
+    }
+}
+
+bool allowed(const Instance *instance, const char *function, unsigned modes) {
+    if (!instance) return false; /* nobody to tell */
+    if (modes & instance->mode) return true;
+    refuse(instance, function, "not allowed now, the instance is in this state: %s", mode_name(instance->mode));
+    return false;
+}
+
+bool given(const Instance *instance, const char *function, const void *pointer, const char *what) {
+    if (pointer) return true;
+    refuse(instance, function, "the argument %s is NULL", what);
+    return false;
+}
+
+Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]) {
+    if (!instance) return STATUS_ERROR;
+    if (n > 0 && !given(instance, function, categories, "categories")) return STATUS_ERROR;
+    bool all = n == 0;
+    for (size_t i = 0; i < n; i++) {
+        const char *category = categories[i] ? categories[i] : "NULL";
+        if (strcmp(category, CATEGORY_ALL) == 0)
+            all = true;
+        else if (strcmp(category, CATEGORY_ERROR) != 0 && strcmp(category, CATEGORY_WARNING) != 0)
+            return refuse(instance, function, "unknown log category '%s'; known: " CATEGORY_ERROR ", " CATEGORY_WARNING
+                          ", " CATEGORY_ALL, category);
+    }
+    instance->logging = on && all;
+    return STATUS_OK;
+}

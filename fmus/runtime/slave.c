@@ -1,0 +1,227 @@
+/* The Python side of an instance: fmus/loader.py starts it, fmus/slave.py is what is called. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "instance.h"
+#include "platform.h"
+
+#define FILE_INPUT 257 /* Py_file_input */
+
+static void drop(PyObject *object) {
+    if (object) py.Py_DecRef(object);
+}
+
+/* Adds a Python string; drops it. */
+static void add_string(Text *text, PyObject *string) {
+    PyObject *bytes = string ? py.PyUnicode_AsUTF8String(string) : NULL;
+    char *chars;
+    Py_ssize_t size;
+    if (bytes && py.PyBytes_AsStringAndSize(bytes, &chars, &size) == 0) text_add(text, "%.*s", (int)size, chars);
+    drop(bytes);
+    drop(string);
+    py.PyErr_Clear();
+}
+
+/* Logs the exception that is set and clears it. */
+static Status refuse_exception(const Instance *instance, const char *function) {
+    PyObject *type = NULL, *error = NULL, *trace = NULL;
+    py.PyErr_Fetch(&type, &error, &trace);
+    py.PyErr_NormalizeException(&type, &error, &trace);
+    if (error && trace) py.PyException_SetTraceback(error, trace);
+    Text text = {0};
+    if (error && instance->explain) add_string(&text, py.PyObject_CallFunctionObjArgs(instance->explain, error, NULL));
+    if (!text.length && type) {
+        add_string(&text, py.PyObject_Str(type));
+        text_add(&text, " ");
+        if (error) add_string(&text, py.PyObject_Str(error));
+    }
+    drop(type);
+    drop(error);
+    drop(trace);
+    py.PyErr_Clear();
+    refuse(instance, function, "%s", text_of(&text));
+    text_clear(&text);
+    return STATUS_ERROR;
+}
+
+/* Calls a method with up to two arguments, which it drops. */
+static PyObject *invoke(const Instance *instance, const char *method, PyObject *first, PyObject *second) {
+    PyObject *bound = py.PyObject_GetAttrString(instance->slave, method);
+    PyObject *result = bound ? py.PyObject_CallFunctionObjArgs(bound, first, second, NULL) : NULL;
+    drop(bound);
+    drop(first);
+    drop(second);
+    return result;
+}
+
+/* Runs the loader's source and returns its global names. */
+static PyObject *run_loader(const Instance *instance, const char *function, const char *resources) {
+    Text path = {0};
+    text_add(&path, "%s/sources/fmus/loader.py", resources);
+    char *source = platform_read_file(text_of(&path));
+    PyObject *globals = NULL;
+    if (source) {
+        PyObject *code = py.Py_CompileString(source, text_of(&path), FILE_INPUT);
+        PyObject *name = py.PyUnicode_FromString("fmu_loader");
+        globals = py.PyDict_New();
+        py.PyDict_SetItemString(globals, "__name__", name);
+        PyObject *done = code ? py.PyEval_EvalCode(code, globals, globals) : NULL;
+        if (!done) {
+            refuse_exception(instance, function);
+            drop(globals);
+            globals = NULL;
+        }
+        drop(done);
+        drop(name);
+        drop(code);
+    } else {
+        refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+    }
+    free(source);
+    text_clear(&path);
+    return globals;
+}
+
+static PyObject *item(PyObject *dictionary, const char *name) {
+    PyObject *found = py.PyDict_GetItemString(dictionary, name);
+    if (found) py.Py_IncRef(found);
+    return found;
+}
+
+/* Takes over the table that describes the buffers. */
+static bool take_table(Instance *instance) {
+    PyObject *bytes = invoke(instance, "table", NULL, NULL);
+    char *chars;
+    Py_ssize_t size;
+    TableHeader header;
+    bool fits = bytes && py.PyBytes_AsStringAndSize(bytes, &chars, &size) == 0;
+    instance->table = fits ? malloc((size_t)size) : NULL;
+    if (instance->table) {
+        memcpy(instance->table, chars, (size_t)size);
+        memcpy(&header, chars, sizeof header);
+    }
+    drop(bytes);
+    if (!instance->table) return false;
+    instance->binaries = (const BinaryBuffer *)(instance->table + sizeof header);
+    instance->variables = (const Variable *)(instance->binaries + header.binaries);
+    instance->n_variables = header.variables;
+    instance->names = (const char *)(instance->variables + header.variables);
+    instance->floats = (double *)(uintptr_t)header.floats;
+    instance->integers = (int64_t *)(uintptr_t)header.integers;
+    instance->booleans = (uint8_t *)(uintptr_t)header.booleans;
+    instance->sizes = (uint64_t *)(uintptr_t)header.sizes;
+    instance->first_input = header.first_input;
+    instance->n_inputs = header.inputs;
+    return true;
+}
+
+bool slave_start(Instance *instance, const char *function, const char *resources, const char *token) {
+    Text tried = {0};
+    bool attached = python_attach(resources, &tried);
+    if (!attached) refuse(instance, function, "%s", text_of(&tried));
+    text_clear(&tried);
+    if (!attached) return false;
+    int lock = py.PyGILState_Ensure();
+    PyObject *loader = run_loader(instance, function, resources);
+    bool started = false;
+    if (loader) {
+        instance->explain = item(loader, "explain");
+        PyObject *begin = item(loader, "start");
+        PyObject *folder = py.PyUnicode_FromString(resources);
+        PyObject *wanted = py.PyUnicode_FromString(token);
+        if (begin && folder && wanted)
+            instance->slave = py.PyObject_CallFunctionObjArgs(begin, folder, wanted, NULL);
+        instance->step = instance->slave ? py.PyObject_GetAttrString(instance->slave, "step") : NULL;
+        started = instance->step && take_table(instance);
+        if (!started) refuse_exception(instance, function);
+        drop(begin);
+        drop(folder);
+        drop(wanted);
+        drop(loader);
+    }
+    py.PyGILState_Release(lock);
+    return started;
+}
+
+void slave_release(Instance *instance) {
+    if (!py.Py_IsInitialized || !py.Py_IsInitialized()) return; /* never attached, or the host's Python has ended */
+    int lock = py.PyGILState_Ensure();
+    drop(instance->step);
+    drop(instance->slave);
+    drop(instance->explain);
+    py.PyGILState_Release(lock);
+}
+
+Status slave_call(Instance *instance, const char *function, const char *method) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *result = invoke(instance, method, NULL, NULL);
+    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    drop(result);
+    py.PyGILState_Release(lock);
+    return status;
+}
+
+Status slave_step(Instance *instance, const char *function) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *result = py.PyObject_CallNoArgs(instance->step);
+    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    drop(result);
+    py.PyGILState_Release(lock);
+    return status;
+}
+
+Status slave_get_state(Instance *instance, const char *function, char **bytes, size_t *size) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *state = invoke(instance, "get_state", NULL, NULL);
+    char *chars;
+    Py_ssize_t n;
+    Status status = STATUS_OK;
+    if (state && py.PyBytes_AsStringAndSize(state, &chars, &n) == 0) {
+        *size = (size_t)n;
+        *bytes = malloc(*size ? *size : 1);
+        if (*bytes)
+            memcpy(*bytes, chars, *size);
+        else
+            status = refuse(instance, function, "no memory for a state of %zu bytes", *size);
+    } else {
+        status = refuse_exception(instance, function);
+    }
+    drop(state);
+    py.PyGILState_Release(lock);
+    return status;
+}
+
+Status slave_set_state(Instance *instance, const char *function, const char *bytes, size_t size) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *state = py.PyBytes_FromStringAndSize(bytes, (Py_ssize_t)size);
+    PyObject *result = state ? invoke(instance, "set_state", state, NULL) : NULL;
+    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    drop(result);
+    py.PyGILState_Release(lock);
+    return status;
+}
+
+Status slave_get_string(Instance *instance, const char *function, size_t index, const char **value) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *bytes = invoke(instance, "get_string", py.PyLong_FromSize_t(index), NULL);
+    char *chars;
+    Py_ssize_t size;
+    Status status = STATUS_OK;
+    if (bytes && py.PyBytes_AsStringAndSize(bytes, &chars, &size) == 0)
+        *value = chars; /* the slave keeps these bytes until the variable changes */
+    else
+        status = refuse_exception(instance, function);
+    drop(bytes);
+    py.PyGILState_Release(lock);
+    return status;
+}
+
+Status slave_set_string(Instance *instance, const char *function, size_t index, const char *value) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *bytes = py.PyBytes_FromStringAndSize(value, (Py_ssize_t)strlen(value));
+    PyObject *result = bytes ? invoke(instance, "set_string", py.PyLong_FromSize_t(index), bytes) : NULL;
+    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    drop(result);
+    py.PyGILState_Release(lock);
+    return status;
+}

@@ -1,0 +1,19 @@
+/* A growing string. */
+#ifndef TEXT_H
+#define TEXT_H
+
+#include <stdarg.h>
+#include <stddef.h>
+
+typedef struct {
+    char *chars; /* NULL while empty or after memory ran out */
+    size_t length;
+} Text;
+
+void text_add(Text *text, const char *format, ...);
+void text_add_list(Text *text, const char *format, va_list arguments);
+void text_clear(Text *text);
+const char *text_of(const Text *text);
+char *copy_of(const char *string);
+
+#endif

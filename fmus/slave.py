@@ -1,0 +1,103 @@
+"""The Python side of an FMU's instance: what the C runtime calls (runtime/slave.c)."""
+
+from typing import Any
+
+from cosim.block import Block, describe
+from fmus.buffers import Buffers, UnfitState, join, split
+from fmus.exchange import input_reader, output_writer
+from fmus.layout import Layout
+from fmus.parameters import read_parameters
+from fmus.table import table
+
+
+class Slave:
+    """One instance: a block, its buffers, and the way between them.
+
+    The block is made from the parameters when outputs are first needed, and again if a parameter changed after that.
+
+    Args:
+        block: the block's class.
+        fmi: version of the standard, 2 or 3; it decides what a value reference stands for.
+    """
+
+    _block: Block
+
+    def __init__(self, block: type[Any], fmi: int) -> None:
+        self._type = block
+        self._fmi = fmi
+        self._buffers = Buffers(Layout(describe(block)))
+        self._clock = self._buffers.floats[:2]
+        self._read = input_reader(self._buffers)
+        self._write = output_writer(self._buffers)
+        self._made_from: bytes | None = None
+        self._fresh = b""
+
+    def table(self) -> bytes:
+        """Return what the C runtime must know of the buffers."""
+        return table(self._buffers, self._fmi)
+
+    def initialise(self) -> None:
+        """Work out the outputs at the start.
+
+        However often a host asks while it initialises, the block starts from its fresh state each time: the outcome
+        does not depend on the host's ways.
+
+        Raises:
+            ParameterOutOfRange: a parameter is outside its declared range.
+        """
+        if self._made_from == self._buffers.parameters():
+            self._block.set_state(self._fresh)
+        else:
+            self._make()
+        self._write(self._block.outputs(float(self._clock[0]), self._read()))
+
+    def step(self) -> None:
+        """Advance from t by dt, as the buffers have them, and write the outputs."""
+        t, dt = self._clock.tolist()
+        self._write(self._block.step(t, dt, self._read()))
+
+    def reset(self) -> None:
+        """Go back to where a new instance is."""
+        self._buffers.reset()
+        self._made_from = None
+
+    def get_state(self) -> bytes:
+        """Return the variables, the time, and the block's state if there is a block that fits its parameters."""
+        has_block = self._made_from == self._buffers.parameters()
+        return join([self._buffers.to_bytes(), *([self._block.get_state()] if has_block else [])])
+
+    def set_state(self, state: bytes) -> None:
+        """Take over what `get_state` gave, here or in another instance.
+
+        Raises:
+            UnfitState: it is a state of another unit.
+        """
+        parts = split(state)
+        if len(parts) not in (1, 2):
+            raise UnfitState
+        self._buffers.from_bytes(parts[0])
+        if len(parts) == 1:
+            self._made_from = None
+            return
+        if self._made_from != self._buffers.parameters():
+            self._make()
+        self._block.set_state(parts[1])
+
+    def get_string(self, index: int) -> bytes:
+        """Return a string variable as UTF-8; the bytes stay alive until the variable changes."""
+        return self._buffers.strings[index]
+
+    def set_string(self, index: int, value: bytes) -> None:
+        """Set a string variable.
+
+        Raises:
+            UnicodeDecodeError: the bytes are not UTF-8.
+        """
+        value.decode()
+        self._buffers.strings[index] = value
+
+    def _make(self) -> None:
+        self._made_from = None
+        self._block = self._type(read_parameters(self._buffers))
+        self._fresh = self._block.get_state()
+        self._made_from = self._buffers.parameters()

@@ -1,0 +1,157 @@
+"""Which modules an FMU must carry to run its block, and which packages it needs from its environment.
+
+Found in the sources' import statements, without running them: what a block imports, what that imports, and so on.
+"""
+
+import ast
+import importlib.util
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+HOUSE = ("cosim", "plants", "controllers", "fmus")
+"""Packages that every FMU carries as sources."""
+
+SLAVE_SIDE = ("fmus.slave", "fmus.loader", "fmus.interpreter")
+"""Modules that every FMU carries, whatever its block imports."""
+
+
+class UnknownBlock(LookupError):
+    """There is no such block class; the message says what of its path is missing."""
+
+    def __init__(self, path: str, fault: str) -> None:
+        super().__init__(f"{path!r} is not the path of a block, such as 'plants.tendon_arm:TendonArm': {fault}")
+        self.path, self.fault = path, fault
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package of the environment: the module's name, and the distribution that has it."""
+
+    module: str
+    distribution: str
+    version: str
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What goes into an FMU.
+
+    Attributes:
+        files: sources by their path in the FMU, such as `plants/tendon_arm.py`.
+        modules: top-level modules of the environment that they import, sorted.
+    """
+
+    files: dict[str, Path]
+    modules: tuple[str, ...]
+
+    def packages(self) -> list[Package]:
+        """Return the environment's packages with their versions; those of no distribution are left out."""
+        found = [(module, name) for module in self.modules for name in _distributions().get(module, [])[:1]]
+        return [Package(module, name, metadata.version(name)) for module, name in found]
+
+
+@cache
+def _distributions() -> dict[str, list[str]]:
+    """Return the names of distributions by top-level module; Python 3.10's own function misses most of them."""
+    found: dict[str, set[str]] = {}
+    for distribution in metadata.distributions():
+        listed = (distribution.read_text("top_level.txt") or "").split()
+        for top in listed or {file.parts[0].partition(".")[0] for file in distribution.files or ()}:
+            found.setdefault(top, set()).add(distribution.metadata["Name"])
+    return {top: sorted(names) for top, names in found.items()}
+
+
+def closure(block: str) -> Carried:
+    """Follow the imports of a block's module.
+
+    Args:
+        block: path of the block's class, such as `plants.tendon_arm:TendonArm`.
+
+    Raises:
+        UnknownBlock: its module cannot be found, or is not Python source.
+    """
+    module, _, name = block.partition(":")
+    if not name:
+        raise UnknownBlock(block, "there is no ':' between module and class")
+    if not _is_source(_spec(module)):
+        raise UnknownBlock(block, f"module {module!r} cannot be found as Python source")
+    carried_tops = {*HOUSE, module.partition(".")[0]}
+    files: dict[str, Path] = {}
+    environment: set[str] = set()
+    waiting = [module, *SLAVE_SIDE]
+    while waiting:
+        for part in _with_packages(waiting.pop()):
+            top = part.partition(".")[0]
+            if top in sys.stdlib_module_names:
+                break
+            spec = _spec(part)
+            if spec is None:
+                break
+            if top not in carried_tops and (_is_installed(spec) or spec.origin in ("built-in", "frozen")):
+                environment.add(top)
+                break
+            path = _path_in_fmu(part, spec)
+            if _is_source(spec) and path not in files:
+                files[path] = Path(spec.origin or "")
+                is_package = spec.submodule_search_locations is not None
+                waiting += _imports(files[path], part if is_package else part.rpartition(".")[0])
+    return Carried(dict(sorted(files.items())), tuple(sorted(environment)))
+
+
+def _with_packages(module: str) -> Iterator[str]:
+    """Yield a, a.b, a.b.c of a.b.c."""
+    parts = module.split(".")
+    for i in range(len(parts)):
+        yield ".".join(parts[: i + 1])
+
+
+def _spec(module: str) -> ModuleSpec | None:
+    try:
+        return importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return None
+
+
+def _is_source(spec: ModuleSpec | None) -> bool:
+    return spec is not None and spec.origin is not None and spec.origin.endswith(".py")
+
+
+def _is_installed(spec: ModuleSpec) -> bool:
+    """Tell whether a module lies where installers put packages, so that another environment can have it too."""
+    places = [spec.origin or "", *(spec.submodule_search_locations or [])]
+    return any({"site-packages", "dist-packages"} & set(Path(place).parts) for place in places)
+
+
+def _path_in_fmu(module: str, spec: ModuleSpec) -> str:
+    path = module.replace(".", "/")
+    return f"{path}/__init__.py" if spec.submodule_search_locations is not None else f"{path}.py"
+
+
+def _imports(source: Path, package: str) -> list[str]:
+    """Return the absolute names that a source may import; of `from a import b` both a and a.b, as b may be a module."""
+    found: list[str] = []
+    for node in _running(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                base = importlib.util.resolve_name("." * node.level + base, package)
+            found += [base] + [f"{base}.{alias.name}" for alias in node.names]
+    return found
+
+
+def _running(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield a tree's nodes but those that only type checkers see."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+            for other in child.orelse:
+                yield from _running(other)
+        else:
+            yield from _running(child)

@@ -1,0 +1,22 @@
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # workshop, ctypes_host, and the blocks in sample_units
+
+from workshop import Workshop
+
+
+@pytest.fixture(scope="session")
+def fmu_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fmus")
+
+
+@pytest.fixture
+def workshop(fmu_folder: Path) -> Iterator[Workshop]:
+    made = Workshop(fmu_folder)
+    yield made
+    for host in made.open:
+        host.close()

@@ -1,0 +1,136 @@
+"""A small host: loads an FMU's library with ctypes and calls the standard's functions by name."""
+
+import ctypes
+import shutil
+import tempfile
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fmus.binaries import FMI2_FOLDERS
+from fmus.compile import host_platform, library
+
+OK, ERROR = 0, 3
+
+DOUBLE, SIZE, BOOL = ctypes.c_double, ctypes.c_size_t, ctypes.c_bool
+Log2 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
+Log3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
+
+
+class Callbacks(ctypes.Structure):
+    _fields_ = [
+        ("logger", Log2),
+        ("allocate", ctypes.c_void_p),
+        ("free", ctypes.c_void_p),
+        ("step_finished", ctypes.c_void_p),
+        ("environment", ctypes.c_void_p),
+    ]
+
+
+class CtypesHost:
+    """One FMU, unpacked and loaded, with at most one instance.
+
+    Attributes:
+        log: messages so far, as the host gets them.
+        references: value references by variable's name; of an array in FMI 2 that of its first entry.
+    """
+
+    def __init__(self, fmu: Path, fmi: int) -> None:
+        self.fmi = fmi
+        self.log: list[str] = []
+        self.folder = Path(tempfile.mkdtemp(prefix="a 100% größerer Ordner "))
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(self.folder)
+        root = ET.parse(self.folder / "modelDescription.xml").getroot()
+        self.token = root.attrib["guid" if fmi == 2 else "instantiationToken"]
+        variables = [v.attrib for v in root.iter() if {"name", "valueReference"} <= v.attrib.keys()]
+        self.references: dict[str, int] = {}
+        for v in variables:
+            self.references.setdefault(v["name"].partition("[")[0], int(v["valueReference"]))
+        folder = FMI2_FOLDERS[host_platform()] if fmi == 2 else host_platform()
+        suffix = library(host_platform(), fmi).suffix
+        self.library = ctypes.CDLL(str(self.folder / "binaries" / folder / (root.attrib["modelName"] + suffix)))
+        self.instance: int | None = None
+        self._log2 = Log2(lambda *arguments: self.log.append(arguments[-1].decode()))
+        self._log3 = Log3(lambda *arguments: self.log.append(arguments[-1].decode()))
+        self._callbacks = Callbacks(logger=self._log2)
+
+    def instantiate(self, token: str | None = None, *, event_mode: bool = False) -> bool:
+        """Make the instance; tell whether it was made."""
+        given = (token or self.token).encode()
+        resources = self.folder / "resources"
+        if self.fmi == 2:
+            make = self.library.fmi2Instantiate
+            arguments: tuple[Any, ...] = (
+                b"x",
+                1,
+                given,
+                resources.as_uri().encode(),
+                ctypes.byref(self._callbacks),
+                0,
+                0,
+            )
+        else:
+            make = self.library.fmi3InstantiateCoSimulation
+            flags = (BOOL(False), BOOL(False), BOOL(event_mode), BOOL(False))
+            path = f"{resources}/".encode()
+            arguments = (b"x", given, path, *flags, None, SIZE(0), None, self._log3, None)
+        make.restype = ctypes.c_void_p
+        self.instance = make(*arguments)
+        return self.instance is not None
+
+    def call(self, function: str, *arguments: Any) -> int:
+        """Call fmi2... or fmi3... with the instance; return the status."""
+        return getattr(self.library, f"fmi{self.fmi}{function}")(ctypes.c_void_p(self.instance), *arguments)
+
+    def initialise(self, start: float = 0.0) -> int:
+        """Go through initialisation mode."""
+        return self.enter(start) or self.call("ExitInitializationMode")
+
+    def enter(self, start: float = 0.0) -> int:
+        """Enter initialisation mode."""
+        times = (BOOL(False), DOUBLE(0.0), DOUBLE(start), BOOL(False), DOUBLE(0.0))
+        if self.fmi == 3:
+            return self.call("EnterInitializationMode", *times)
+        return self.call("SetupExperiment", 0, DOUBLE(0.0), DOUBLE(start), 0, DOUBLE(0.0)) or self.call(
+            "EnterInitializationMode"
+        )
+
+    def step(self, t: float, dt: float) -> int:
+        """Do a step."""
+        if self.fmi == 2:
+            return self.call("DoStep", DOUBLE(t), DOUBLE(dt), 0)
+        flags = (BOOL * 3)()
+        last = DOUBLE()
+        pointers = [ctypes.byref(flags, i) for i in range(3)]
+        return self.call("DoStep", DOUBLE(t), DOUBLE(dt), BOOL(False), *pointers, ctypes.byref(last))
+
+    def set(self, name: str, values: Sequence[float]) -> int:
+        """Set a real variable, by the name of its first entry in FMI 2."""
+        return self._transfer("Set", name, (DOUBLE * len(values))(*values))
+
+    def get(self, name: str, n: int = 1) -> list[float]:
+        """Get a real variable; it must succeed."""
+        values = (DOUBLE * n)()
+        assert self._transfer("Get", name, values) == OK, self.log[-1]
+        return list(values)
+
+    def _transfer(self, verb: str, name: str, values: "ctypes.Array[ctypes.c_double]") -> int:
+        n, first = len(values), self.references[name]
+        if self.fmi == 3:
+            return self.call(f"{verb}Float64", ctypes.byref(ctypes.c_uint32(first)), SIZE(1), values, SIZE(n))
+        references = (ctypes.c_uint32 * n)(*range(first, first + n))
+        return self.call(f"{verb}Real", references, SIZE(n), values)
+
+    def free(self) -> None:
+        """Free the instance."""
+        if self.instance is not None:
+            self.call("FreeInstance")
+        self.instance = None
+
+    def close(self) -> None:
+        """Free the instance and remove the unpacked files; the library stays loaded."""
+        self.free()
+        shutil.rmtree(self.folder, ignore_errors=True)

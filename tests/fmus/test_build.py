@@ -1,0 +1,156 @@
+import json
+import zipfile
+from fractions import Fraction
+from pathlib import Path
+from typing import cast
+
+import pytest
+from workshop import Workshop
+
+from fmus.build import UnknownVersion, UnusableName, build_block, cached
+from fmus.catalog import UNITS, Entry, UnknownUnit, find_unit
+from fmus.sources import UnknownBlock, closure
+from fmus.universal import universal
+
+BLOCK = """
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, ClassVar
+
+from cosim.ports import output, parameter
+from cosim.units import Number
+
+if TYPE_CHECKING:
+    import cv2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    pass
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    pass
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    y: Number = output("answer")
+
+
+class Small:
+    "Answers."
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: Params) -> None: ...
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        from {helper} import answer
+
+        return Outputs(y=answer())
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return self.outputs(t, u)
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None: ...
+"""
+
+
+def write_block(folder: Path, name: str, answer: str, helper: str = "shared_helper") -> str:
+    """Write a block and a module that it imports; return the block's path."""
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}.py").write_text(BLOCK.replace("{helper}", helper))
+    (folder / f"{helper}.py").write_text(f"def answer():\n    return {answer}\n")
+    return f"{name}:Small"
+
+
+def test_the_catalog_knows_its_units_without_loading_them():
+    assert {"TendonArm", "HandoverPartner", "StereoCamera", "HandoverVision", "VisualServo"} <= UNITS.keys()
+    assert find_unit("StereoCamera").step == Fraction(1, 30)
+    assert all(name == entry.name and name.isidentifier() and entry.summary for name, entry in UNITS.items())
+
+
+def test_an_unknown_unit_is_answered_with_the_nearest():
+    with pytest.raises(UnknownUnit, match="did you mean TendonArm"):
+        find_unit("TendonArn")
+
+
+@pytest.mark.parametrize("path", ["nowhere.at_all:Block", "sample_units.every_kind", "sample_units.every_kind:Nothing"])
+def test_an_unknown_block_is_refused(path: str, tmp_path: Path):
+    with pytest.raises(UnknownBlock, match=path):
+        build_block(path, 3, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_path: Path):
+    with pytest.raises(UnusableName, match="two words"):
+        build_block("sample_units.every_kind:EveryKind", 3, tmp_path, name="two words")
+    with pytest.raises(UnknownVersion, match="there are 2"):
+        build_block("sample_units.every_kind:EveryKind", 1, tmp_path)
+
+
+def test_the_same_sources_give_the_same_bytes(workshop: Workshop, tmp_path: Path):
+    first = workshop.fmu("every_kind:EveryKind", 3)
+    again = build_block("sample_units.every_kind:EveryKind", 3, tmp_path)
+    assert again.read_bytes() == first.read_bytes()
+
+
+def test_an_fmu_carries_its_sources_and_lists_its_packages(workshop: Workshop):
+    with zipfile.ZipFile(workshop.fmu("every_kind:EveryKind", 3)) as archive:
+        names = set(archive.namelist())
+        unit = json.loads(archive.read("resources/unit.json"))
+        page = archive.read("documentation/index.html").decode()
+    assert {"resources/sources/sample_units/every_kind.py", "resources/sources/cosim/block.py"} <= names
+    assert not any("build" in name or "catalog" in name for name in names)
+    assert [p["module"] for p in unit["packages"]] == ["numpy", "typing_extensions"]
+    assert all(p["version"] for p in unit["packages"])
+    assert "a&lt;b&amp;" in page
+    assert "0 … 10" in page
+
+
+def test_imports_are_followed_but_those_for_type_checkers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    block = write_block(tmp_path, "followed", "1.0", helper="followed_helper")
+    carried = closure(block)
+    assert {"followed.py", "followed_helper.py", "cosim/ports.py"} <= carried.files.keys()
+    assert "cv2" not in carried.modules
+
+
+def test_a_new_token_for_new_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    tokens: list[str] = []
+    for answer in ("1.0", "2.0"):
+        fmu = build_block(write_block(tmp_path, "renewed", answer, helper="renewed_helper"), 3, tmp_path)
+        with zipfile.ZipFile(fmu) as archive:
+            tokens.append(json.loads(archive.read("resources/unit.json"))["token"])
+    assert tokens[0] != tokens[1]
+
+
+def test_the_cache_builds_once_and_again_when_a_source_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    block = write_block(tmp_path, "kept", "1.0", helper="kept_helper")
+    monkeypatch.setitem(cast("dict[str, Entry]", UNITS), "Kept", Entry("Kept", block, Fraction(1), "for a test"))
+    first = cached("Kept", 3)
+    assert first.is_relative_to(tmp_path / "cache")
+    made = first.stat().st_ino
+    assert cached("Kept", 3).stat().st_ino == made
+    write_block(tmp_path, "kept", "2.0", helper="kept_helper")
+    assert cached("Kept", 3) != first
+
+
+def test_a_universal_binary_holds_both_files_at_page_boundaries():
+    intel = bytes.fromhex("cffaedfe0700000103000000") + b"intel"
+    arm = bytes.fromhex("cffaedfe0c00000100000000") + b"arm"
+    joined = universal([intel, arm])
+    assert joined[:8] == bytes.fromhex("cafebabe00000002")
+    assert joined[8:28] == bytes.fromhex("01000007 00000003 00004000 00000011 0000000e")
+    assert joined[0x4000:].startswith(intel)
+    assert joined[0x8000:].startswith(arm)

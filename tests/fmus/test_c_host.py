@@ -1,0 +1,108 @@
+"""A unit in a host that is not Python finds an interpreter by itself, or says what is missing."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from ctypes_host import CtypesHost
+from workshop import Workshop
+
+from fmus import interpreter
+from fmus.compile import RUNTIME, zig_cc
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="host.c loads libraries with dlopen")
+
+LIBRARY = interpreter.library()
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("host") / "host"
+    source = Path(__file__).with_name("host.c")
+    done = zig_cc(["-O1", "-std=gnu11", "-I", str(RUNTIME), str(source), "-o", str(made), "-ldl"])
+    assert done.returncode == 0, done.stdout
+    return made
+
+
+@pytest.fixture
+def unpacked(workshop: Workshop) -> CtypesHost:
+    """Return an FMU, unpacked; only its folder is used."""
+    return workshop.host("every_kind:EveryKind", 2)
+
+
+def run(program: Path, unit: CtypesHost, **environment: str) -> "subprocess.CompletedProcess[str]":
+    resources = unit.folder / "resources"
+    references = [str(unit.references[name]) for name in ("a", "b")]
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "FMU_", "VIRTUAL_ENV"))}
+    return subprocess.run(
+        [program, unit.library._name, unit.token, resources.as_uri(), *references],
+        env={**kept, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+
+
+def expect_values(done: "subprocess.CompletedProcess[str]") -> None:
+    if LIBRARY:
+        assert done.stdout == f"b = {2.0 * 99 + 25.0:.17g}\n" * 2
+        assert done.returncode == 0
+    else:
+        assert "is built without a shared library of Python" in done.stdout
+        assert done.returncode == 1
+
+
+def test_by_the_note_of_the_environment_that_built_the_unit(program: Path, unpacked: CtypesHost):
+    expect_values(run(program, unpacked, PATH="/nonexistent"))
+
+
+def test_by_the_environment_variable(program: Path, unpacked: CtypesHost):
+    note = unpacked.folder / "resources" / "python.txt"
+    text = note.read_text()
+    note.write_text(text.replace(f"library = {LIBRARY}", "library = "))
+    expect_values(run(program, unpacked, PATH="/nonexistent", FMU_LIBPYTHON=LIBRARY))
+
+
+def test_by_the_interpreter_on_the_path(program: Path, unpacked: CtypesHost, tmp_path: Path):
+    (unpacked.folder / "resources" / "python.txt").unlink()
+    wrapper = tmp_path / "python3"
+    wrapper.write_text(f'#!/bin/sh\nexec "{interpreter.sys.executable}" "$@"\n')
+    wrapper.chmod(0o755)
+    expect_values(run(program, unpacked, PATH=f"{tmp_path}:/bin:/usr/bin"))
+
+
+def test_all_that_was_tried_is_logged_with_a_cure(program: Path, unpacked: CtypesHost):
+    (unpacked.folder / "resources" / "python.txt").write_text("executable = /opt/static/bin/python3\nlibrary = \n")
+    done = run(program, unpacked, PATH="/nonexistent", FMU_LIBPYTHON="/no/libpython.so")
+    assert done.returncode == 1
+    for part in (
+        "[unit 3] fmi2Instantiate: no usable Python",
+        "this process: no Python is loaded",
+        "FMU_LIBPYTHON: /no/libpython.so",
+        "/opt/static/bin/python3 is built without a shared library of Python",
+        "python3 on the PATH: cannot be read",
+        "Cure: set the environment variable FMU_LIBPYTHON",
+        "--enable-shared",
+    ):
+        assert part in done.stdout
+
+
+def test_a_library_that_is_no_python_is_named(program: Path, unpacked: CtypesHost):
+    (unpacked.folder / "resources" / "python.txt").unlink()
+    done = run(program, unpacked, PATH="/nonexistent", FMU_LIBPYTHON=unpacked.library._name)
+    assert "has no function Py_IsInitialized; it is not a usable Python" in done.stdout
+
+
+def test_a_python_without_the_packages_names_them(program: Path, unpacked: CtypesHost):
+    note = unpacked.folder / "resources" / "python.txt"
+    lines = [line for line in note.read_text().splitlines() if not line.startswith(("site", "executable"))]
+    note.write_text("\n".join(lines) + "\n")
+    unit = unpacked.folder / "resources" / "unit.json"
+    unit.write_text(unit.read_text().replace('"module": "numpy"', '"module": "no_such_module"'))
+    done = run(program, unpacked, PATH="/nonexistent")
+    if LIBRARY:
+        assert "needs packages that this Python does not have" in done.stdout
+        assert "pip install" in done.stdout
+    assert done.returncode == 1

@@ -1,0 +1,168 @@
+"""Calls that the standards forbid, and failures: answered with an error and a log line, and the process lives."""
+
+import ctypes
+import math
+from collections.abc import Callable
+
+import pytest
+from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
+from workshop import Workshop
+
+BLOCK = "every_kind:EveryKind"
+
+
+def started(workshop: Workshop, fmi: int) -> CtypesHost:
+    host = workshop.host(BLOCK, fmi)
+    assert host.initialise() == OK
+    return host
+
+
+def reference(n: int) -> "ctypes.Array[ctypes.c_uint32]":
+    return (ctypes.c_uint32 * 1)(n)
+
+
+FORBIDDEN: list[tuple[Callable[[CtypesHost], int], str]] = [
+    (lambda h: h.step(0.5, 0.1), "where the instance is at 0 s"),
+    (lambda h: h.step(0.0, 0.0), "must be positive"),
+    (lambda h: h.step(0.0, math.nan), "must be positive"),
+    (lambda h: h.step(math.nan, 0.1), "begins at t = nan"),
+    (lambda h: h.set("gain", [1.0]), "'gain' cannot be set: it is a parameter and fixed after initialisation"),
+    (lambda h: h.set("b", [1.0]), "'b' cannot be set: it is an output"),
+    (lambda h: h.set("k", [1.0]), "'k' (value reference"),
+    (lambda h: h.call("EnterInitializationMode", *[0] * 5), "not allowed now"),
+    (lambda h: h.call("ExitInitializationMode"), "not allowed now"),
+    (lambda h: h.call("GetFMUState" if h.fmi == 3 else "GetFMUstate", None), "FMUState is NULL"),
+    (lambda h: h.call("SetFMUState" if h.fmi == 3 else "SetFMUstate", None), "the state is NULL"),
+    (lambda h: h.call("SetTime", DOUBLE(1.0)), "not supported"),
+    (lambda h: h.call("EnterEventMode"), "fmi"),
+]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("call", "message"), FORBIDDEN)
+def test_forbidden_calls_are_refused_and_change_nothing(
+    workshop: Workshop, fmi: int, call: Callable[[CtypesHost], int], message: str
+):
+    host = started(workshop, fmi)
+    assert call(host) == ERROR
+    assert message in host.log[-1]
+    assert host.step(0.0, 0.1) == OK
+
+
+@pytest.mark.parametrize(
+    ("references", "n", "values", "n_values", "message"),
+    [
+        (reference(999), 1, (DOUBLE * 1)(), 1, "no variable with value reference 999"),
+        (None, 1, (DOUBLE * 1)(), 1, "valueReferences is NULL"),
+        (reference(0), 1, None, 1, "values is NULL"),
+        (reference(0), 1, (DOUBLE * 2)(), 2, "2 values for variables with 1 entries"),
+    ],
+)
+def test_bad_arguments_are_refused(
+    workshop: Workshop, references: object, n: int, values: object, n_values: int, message: str
+):
+    host = started(workshop, 3)
+    assert host.call("GetFloat64", references, SIZE(n), values, SIZE(n_values)) == ERROR
+    assert message in host.log[-1]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_no_instance_is_an_error(workshop: Workshop, fmi: int):
+    host = workshop.host(BLOCK, fmi)
+    host.free()
+    assert host.step(0.0, 0.1) == ERROR
+    assert host.call("Reset") == ERROR
+    host.call("FreeInstance")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_outputs_have_no_value_before_initialisation(workshop: Workshop, fmi: int):
+    host = workshop.host(BLOCK, fmi)
+    with pytest.raises(AssertionError, match="'b' has no value before initialisation"):
+        host.get("b")
+    assert host.get("gain") == [2.0]
+
+
+def test_steps_end_with_the_stop_time(workshop: Workshop):
+    host = workshop.host(BLOCK, 2)
+    host.call("SetupExperiment", 0, DOUBLE(0.0), DOUBLE(0.0), 1, DOUBLE(1.0))
+    host.call("EnterInitializationMode")
+    host.call("ExitInitializationMode")
+    assert host.step(0.0, 1.5) == ERROR
+    assert "after the stop time 1 s" in host.log[-1]
+    assert host.step(0.0, 1.0) == OK
+
+
+def test_a_wrong_token_is_refused(workshop: Workshop):
+    host = workshop.host(BLOCK, 3)
+    host.free()
+    assert not host.instantiate(token="{00000000-0000-0000-0000-000000000000}")
+    assert "token {00000000" in host.log[-1]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_exception_is_an_error_with_its_traceback_and_the_instance_can_be_reset(workshop: Workshop, fmi: int):
+    host = started(workshop, fmi)
+    assert host.step(0.0, 0.1) == OK
+    before = host.get("p", 3)
+    host.set("a", [666.0])
+    assert host.step(0.1, 0.1) == ERROR
+    trace = host.log[-1]
+    if fmi == 2:
+        trace = trace.replace("%%", "%").replace("##", "#")
+    assert "Traceback" in trace
+    assert 'raise Misfortune("the number of the beast # 100%")' in trace
+    assert host.step(0.1, 0.1) == ERROR
+    assert "failed: only reset" in host.log[-1]
+    assert host.call("Reset") == OK
+    assert host.initialise() == OK
+    assert host.step(0.0, 0.1) == OK
+    assert host.get("p", 3) == before
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_parameter_out_of_range_is_refused_with_name_value_range_and_unit(workshop: Workshop, fmi: int):
+    host = workshop.host(BLOCK, fmi)
+    host.set("gain", [11.0])
+    assert host.initialise() == ERROR
+    assert "parameter 'gain' (gain) is 11.0 1; it must be from 0 to 10 1" in host.log[-1]
+    assert "Traceback" not in host.log[-1]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_an_input_that_is_not_finite_is_refused_by_name(workshop: Workshop, fmi: int, value: float):
+    host = started(workshop, fmi)
+    host.set("v", [0.0, value, 0.0])
+    assert host.step(0.0, 0.1) == ERROR
+    assert ("'v[2]' is" if fmi == 2 else "'v' is") in host.log[-1]
+    host.set("v", [0.0, 0.0, 0.0])
+    assert host.step(0.0, 0.1) == OK
+
+
+def test_a_number_that_is_no_item_of_an_enumeration_is_refused(workshop: Workshop):
+    host = workshop.host(BLOCK, 3)
+    value = (ctypes.c_int64 * 1)(3)
+    assert host.call("SetInt64", reference(host.references["mood_in"]), SIZE(1), value, SIZE(1)) == OK
+    assert host.initialise() == ERROR
+    assert "input 'mood_in' is 3; its items are 0 CALM, 1 KEEN, 5 WILD" in host.log[-1]
+
+
+def test_an_output_of_the_wrong_shape_is_an_error_that_names_it(workshop: Workshop):
+    host = workshop.host("careless:Careless", 3)
+    assert host.initialise() == ERROR
+    assert "output 'p' is declared as array of shape (3,); the block gave float64 array of shape (1,)" in host.log[-1]
+
+
+def test_event_mode_is_passed_through_when_a_host_insists(workshop: Workshop):
+    host = workshop.host(BLOCK, 3)
+    host.free()
+    assert host.instantiate(event_mode=True)
+    host.initialise()
+    assert host.step(0.0, 0.1) == ERROR
+    flags, time = (ctypes.c_bool * 5)(*[True] * 5), DOUBLE()
+    pointers = [ctypes.byref(flags, i) for i in range(5)]
+    assert host.call("UpdateDiscreteStates", *pointers, ctypes.byref(time)) == OK
+    assert list(flags) == [False] * 5
+    assert host.call("EnterStepMode") == OK
+    assert host.step(0.0, 0.1) == OK

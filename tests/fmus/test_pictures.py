@@ -1,0 +1,61 @@
+import ctypes
+
+import numpy as np
+from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from workshop import Workshop
+
+SIZE_OF_PICTURE = 1280 * 720 * 3
+
+
+def put(host: CtypesHost, name: str, data: bytes) -> int:
+    sizes, values = (ctypes.c_size_t * 1)(len(data)), (ctypes.c_char_p * 1)(data)
+    reference = (ctypes.c_uint32 * 1)(host.references[name])
+    return host.call("SetBinary", reference, SIZE(1), sizes, values, SIZE(1))
+
+
+def take(host: CtypesHost, name: str) -> tuple[int, int]:
+    """Return address and size."""
+    sizes, values = (ctypes.c_size_t * 1)(), (ctypes.c_void_p * 1)()
+    reference = (ctypes.c_uint32 * 1)(host.references[name])
+    assert host.call("GetBinary", reference, SIZE(1), sizes, values, SIZE(1)) == OK, host.log[-1]
+    return values[0] or 0, sizes[0]
+
+
+def test_a_picture_goes_in_and_out_and_is_read_where_it_lies(workshop: Workshop):
+    host = workshop.host("eye:Eye", 3)
+    picture = np.random.default_rng(1).integers(0, 256, SIZE_OF_PICTURE, dtype=np.uint8)
+    assert put(host, "picture", picture.tobytes()) == OK
+    host.initialise()
+    address, size = take(host, "brighter")
+    assert size == SIZE_OF_PICTURE
+    assert ctypes.string_at(address, size) == (picture + np.uint8(1)).tobytes()
+    assert put(host, "picture", (picture + np.uint8(7)).tobytes()) == OK
+    host.step(0.0, 1 / 30)
+    assert take(host, "brighter") == (address, size)  # no copy: the pointer stays, its content changes
+    assert ctypes.string_at(address, size) == (picture + np.uint8(8)).tobytes()
+
+
+def test_a_picture_of_another_size_is_refused(workshop: Workshop):
+    host = workshop.host("eye:Eye", 3)
+    assert put(host, "picture", b"abc") == ERROR
+    assert "3 bytes for 'picture', which takes 2764800" in host.log[-1]
+
+
+def test_no_bytes_make_a_picture_black(workshop: Workshop):
+    host = workshop.host("eye:Eye", 3)
+    put(host, "picture", b"\xff" * SIZE_OF_PICTURE)
+    assert put(host, "picture", b"") == OK
+    host.initialise()
+    assert ctypes.string_at(*take(host, "brighter")) == b"\1" * SIZE_OF_PICTURE
+
+
+def test_bytes_of_any_length_up_to_the_capacity(workshop: Workshop):
+    host = workshop.host("eye:Eye", 3)
+    assert put(host, "note", b"drawer") == OK
+    host.initialise()
+    assert ctypes.string_at(*take(host, "note_back")) == b"reward"
+    assert put(host, "note", b"") == OK
+    host.step(0.0, 1 / 30)
+    assert take(host, "note_back")[1] == 0
+    assert put(host, "note", bytes(1 << 17)) == ERROR
+    assert "at most 65536" in host.log[-1]

@@ -1,0 +1,95 @@
+"""Units in one process do not see each other's modules, nor does the host see theirs."""
+
+import importlib
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ctypes_host import OK, CtypesHost
+from test_build import write_block
+from workshop import Workshop
+
+from fmus import loader
+from fmus.build import build_block
+
+
+@pytest.fixture
+def hosts() -> Iterator[list[CtypesHost]]:
+    made: list[CtypesHost] = []
+    yield made
+    for host in made:
+        host.close()
+
+
+def build_in(folder: Path, answer: str) -> Path:
+    """Build an FMU from a folder whose modules have the same names as those of other folders."""
+    block = write_block(folder, "same_name", answer)
+    sys.path.insert(0, str(folder))
+    for name in ("same_name", "shared_helper"):
+        sys.modules.pop(name, None)
+    importlib.invalidate_caches()
+    try:
+        return build_block(block, 3, folder)
+    finally:
+        sys.path.remove(str(folder))
+        sys.modules.pop("same_name", None)
+
+
+def test_units_with_modules_of_the_same_name_run_their_own_code(tmp_path: Path, hosts: list[CtypesHost]):
+    hosts += [CtypesHost(build_in(tmp_path / f"version{i}", str(float(i))), 3) for i in (1, 2)]
+    path_before, modules_before = list(sys.path), set(sys.modules)
+    for host in hosts:
+        assert host.instantiate(), host.log
+        assert host.initialise() == OK
+    assert [host.get("y") for host in hosts] == [[1.0], [2.0]]
+    assert sys.path == path_before
+    assert all(name.startswith("_fmu_") for name in set(sys.modules) - modules_before)
+
+
+def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gone(
+    tmp_path: Path, hosts: list[CtypesHost]
+):
+    fmu = build_in(tmp_path / "unpacked_twice", "[][0]")  # fails where its helper is imported, in the first outputs
+    first = CtypesHost(fmu, 3)
+    assert first.instantiate()
+    first.close()
+    hosts.append(CtypesHost(fmu, 3))
+    assert hosts[0].instantiate()
+    assert hosts[0].initialise() != OK
+    assert "return [][0]" in hosts[0].log[-1]
+
+
+def test_missing_packages_are_named_with_version_interpreter_and_cure(workshop: Workshop):
+    host = workshop.host("scalars:Scalars", 3)
+    host.free()
+    file = host.folder / "resources" / "unit.json"
+    unit = json.loads(file.read_text())
+    unit["packages"].append({"module": "no_such_module", "distribution": "no-such-package", "version": "4.5.6"})
+    file.write_text(json.dumps(unit))
+    assert not host.instantiate()
+    for part in ("no-such-package (built with version 4.5.6)", sys.executable, "pip install no-such-package==4.5.6"):
+        assert part in host.log[-1]
+
+
+def test_a_missing_source_is_a_logged_error(workshop: Workshop):
+    host = workshop.host("scalars:Scalars", 3)
+    host.free()
+    (host.folder / "resources" / "sources" / "fmus" / "loader.py").unlink()
+    assert not host.instantiate()
+    assert "loader.py cannot be read" in host.log[-1]
+
+
+def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
+    host = workshop.host("scalars:Scalars", 3)
+    host.free()
+    unit = host.folder / "resources" / "unit.json"
+    unit.write_text(unit.read_text().replace("_fmu_", "_fmu_broken_"))
+    (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text("import cosim.nothing\n")
+    assert not host.instantiate()
+    assert "the FMU has no module 'cosim.nothing'" in host.log[-1]
+
+
+def test_an_explanation_of_a_refusal_has_no_traceback():
+    assert loader.explain(loader.Refusal("why")) == "why"

@@ -1,0 +1,133 @@
+import ctypes
+
+import pytest
+from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from workshop import Workshop
+
+DT = 1 / 64
+
+
+def called(host: CtypesHost, name: str) -> str:
+    """Return the standard's spelling of a function's name."""
+    if host.fmi == 3:
+        return name.replace("state", "State")
+    return name.replace("Deserialize", "DeSerialize")
+
+
+def ready(workshop: Workshop, fmi: int) -> CtypesHost:
+    host = workshop.host("every_kind:EveryKind", fmi)
+    assert host.initialise() == OK
+    for i in range(3):
+        assert host.step(i * DT, DT) == OK
+    return host
+
+
+def save(host: CtypesHost) -> ctypes.c_void_p:
+    state = ctypes.c_void_p()
+    assert host.call(called(host, "GetFMUstate"), ctypes.byref(state)) == OK
+    return state
+
+
+def ten_steps(host: CtypesHost) -> list[list[float]]:
+    seen: list[list[float]] = []
+    for i in range(3, 13):
+        assert host.step(i * DT, DT) == OK, host.log[-1]
+        seen.append(host.get("p", 3))
+    return seen
+
+
+def serialised(host: CtypesHost, state: ctypes.c_void_p) -> bytes:
+    size = ctypes.c_size_t()
+    assert host.call(called(host, "SerializedFMUstateSize"), state, ctypes.byref(size)) == OK
+    data = ctypes.create_string_buffer(size.value)
+    assert host.call(called(host, "SerializeFMUstate"), state, data, size) == OK
+    return data.raw
+
+
+def deserialise(host: CtypesHost, data: bytes) -> tuple[int, ctypes.c_void_p]:
+    state = ctypes.c_void_p()
+    return host.call(called(host, "DeserializeFMUstate"), data, SIZE(len(data)), ctypes.byref(state)), state
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_what_follows_a_restored_state_is_the_same_bit_for_bit(workshop: Workshop, fmi: int):
+    host = ready(workshop, fmi)
+    state = save(host)
+    first = ten_steps(host)
+    assert host.call(called(host, "SetFMUstate"), state) == OK
+    assert ten_steps(host) == first
+    assert host.call(called(host, "FreeFMUstate"), ctypes.byref(state)) == OK
+    assert state.value is None
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_serialised_state_continues_in_another_instance(workshop: Workshop, fmi: int):
+    host, other = ready(workshop, fmi), workshop.host("every_kind:EveryKind", fmi)
+    host.set("v", [3.0, 2.0, 1.0])
+    data = serialised(host, save(host))
+    status, state = deserialise(other, data)
+    assert status == OK
+    assert other.call(called(other, "SetFMUstate"), state) == OK
+    assert ten_steps(other) == ten_steps(host)
+
+
+def test_a_state_saved_while_initialising_goes_back_to_initialising(workshop: Workshop):
+    host = workshop.host("every_kind:EveryKind", 3)
+    host.enter()
+    host.set("gain", [4.0])
+    state = save(host)
+    host.call("ExitInitializationMode")
+    first = host.get("p", 3)
+    assert host.call("SetFMUState", state) == OK
+    assert host.step(0.0, DT) == ERROR
+    assert host.call("ExitInitializationMode") == OK
+    assert (host.get("b"), host.get("p", 3)) == ([2.0], first)
+
+
+def test_a_saved_state_revives_a_failed_instance(workshop: Workshop):
+    host = ready(workshop, 3)
+    state = save(host)
+    first = ten_steps(host)
+    host.call("SetFMUState", state)
+    host.set("a", [666.0])
+    assert host.step(3 * DT, DT) == ERROR
+    assert host.call("SetFMUState", state) == OK
+    assert ten_steps(host) == first
+
+
+def test_saving_again_uses_the_same_state(workshop: Workshop):
+    host = ready(workshop, 3)
+    state = save(host)
+    before = state.value
+    ten_steps(host)
+    assert host.call("GetFMUState", ctypes.byref(state)) == OK
+    assert state.value == before
+    assert host.step(13 * DT, DT) == OK
+
+
+@pytest.mark.parametrize("damage", [b"", b"x" * 10, b"x" * 500])
+def test_bytes_that_are_no_state_are_refused(workshop: Workshop, damage: bytes):
+    host = ready(workshop, 3)
+    assert deserialise(host, damage)[0] == ERROR
+    assert "not a state that this unit serialised" in host.log[-1]
+
+
+def test_a_damaged_or_foreign_state_is_refused_when_set(workshop: Workshop):
+    host, other = ready(workshop, 3), workshop.host("scalars:Scalars", 3)
+    other.initialise()
+    data = serialised(host, save(host))
+    status, state = deserialise(other, data)
+    assert status == OK
+    assert other.call("SetFMUState", state) == ERROR
+    assert "saved by another unit" in other.log[-1]
+
+
+def test_a_freed_state_and_one_of_another_instance_are_refused(workshop: Workshop):
+    host, other = ready(workshop, 3), ready(workshop, 3)
+    state = save(host)
+    assert other.call("SetFMUState", state) == ERROR
+    gone = ctypes.c_void_p(state.value)
+    host.call("FreeFMUState", ctypes.byref(state))
+    assert host.call("SetFMUState", gone) == ERROR
+    assert "it was freed" in host.log[-1]
+    assert host.call("FreeFMUState", ctypes.byref(ctypes.c_void_p())) == OK

@@ -1,0 +1,26 @@
+"""Sample units for tests."""
+
+from pathlib import Path
+
+from ctypes_host import CtypesHost
+
+from fmus.build import build_block
+
+
+class Workshop:
+    """Builds each sample block's FMU once and opens hosts on it; closes them all at the end of a test."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.open: list[CtypesHost] = []
+
+    def fmu(self, block: str, fmi: int) -> Path:
+        made = self.folder / f"{block.rpartition(':')[2]}.fmi{fmi}.fmu"
+        return made if made.is_file() else build_block(f"sample_units.{block}", fmi, self.folder)
+
+    def host(self, block: str, fmi: int) -> CtypesHost:
+        """Return a host with an instance of a block's FMU."""
+        host = CtypesHost(self.fmu(block, fmi), fmi)
+        self.open.append(host)
+        host.instantiate()
+        return host
