@@ -1,0 +1,80 @@
+"""Finds fiducial markers in a picture and the pixels of their corners, after [Vervloet2025] sec. 3.2.4."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.marker_ring import SIDES
+from controllers.region import Pixels, Region
+from cosim.ports import Floats
+
+_ZOOM = 3  # enlargement of a region; corners of enlarged markers come out twice as exact
+_NEAR = 5.0  # marker sides around the largest marker found; the ring is smaller than that
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Numbers, shape (n,), each once, and corners, shape (n, 4, 2), in px, in the order in which they are printed."""
+
+    ids: NDArray[np.int64]
+    corners: Floats
+
+
+NO_MARKERS = Markers(np.empty(0, dtype=np.int64), np.empty((0, 4, 2)))
+
+
+class MarkerReader:
+    """Reads ArUco markers 0 to 7 of DICT_4X4_50.
+
+    Args:
+        shift: how far refined corners come out inside of the printed ones, along the diagonal, in px: blur rounds the
+            corners off.
+    """
+
+    def __init__(self, shift: float) -> None:
+        self._shift = shift
+        self._coarse = _detector(threshold_windows=(3, 13), refined=False)
+        self._fine = _detector(threshold_windows=(13, 13), refined=True)
+
+    def read(self, picture: Pixels, region: Region) -> Markers:
+        """Return the markers in a region of a picture, corners refined."""
+        if region.empty:
+            return NO_MARKERS
+        gray = cv2.cvtColor(region.of(picture), cv2.COLOR_BGR2GRAY)
+        enlarged = np.asarray(cv2.resize(gray, None, fx=_ZOOM, fy=_ZOOM, interpolation=cv2.INTER_CUBIC), np.uint8)
+        found = _read(self._fine, enlarged)
+        corners = (found.corners + 0.5) / _ZOOM - 0.5 + region.origin  # pixels' middles are whole
+        outwards = corners - corners.mean(axis=1, keepdims=True)
+        return Markers(found.ids, corners + self._shift * outwards / np.linalg.norm(outwards, axis=2, keepdims=True))
+
+    def search(self, picture: Pixels) -> Region:
+        """Return the region of a picture around the largest marker in it that holds a whole ring; empty if none."""
+        gray = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        found = _read(self._coarse, gray)
+        if not len(found.ids):
+            return Region(0, 0, 0, 0)
+        sides = np.linalg.norm(found.corners - np.roll(found.corners, 1, axis=1), axis=2).max(axis=1)
+        largest = int(np.argmax(sides))
+        return Region.around(found.corners[largest], _NEAR * float(sides[largest]), picture)
+
+
+def _read(detector: cv2.aruco.ArucoDetector, gray: Pixels) -> Markers:
+    quads, numbers, _ = detector.detectMarkers(gray)
+    if not len(quads):
+        return NO_MARKERS
+    ids = np.asarray(numbers, dtype=np.int64).ravel()
+    corners = np.asarray(quads, dtype=np.float64).reshape(-1, 4, 2)
+    once = (ids < SIDES) & (np.bincount(ids, minlength=SIDES)[ids] == 1)  # a number seen twice tells nothing
+    order = np.argsort(ids[once])
+    return Markers(ids[once][order], corners[once][order])
+
+
+def _detector(threshold_windows: tuple[int, int], refined: bool) -> cv2.aruco.ArucoDetector:
+    p = cv2.aruco.DetectorParameters()
+    p.adaptiveThreshWinSizeMin, p.adaptiveThreshWinSizeMax = threshold_windows
+    if refined:
+        p.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        p.relativeCornerRefinmentWinSize = 1.0  # a whole marker cell
+    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), p)

@@ -1,0 +1,139 @@
+"""Parameters of the visual servo, and what is wrong with them. [Vervloet2025] appendix A."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from cosim.ports import Vector3, Vector6, Vector9, parameter
+from cosim.units import Metre, Number, Second, SquareMetre
+
+_ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
+
+
+class UnusableParameters(ValueError):
+    """Values with which the visual servo cannot work; `faults` lists all of them."""
+
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("VisualServo: " + "; ".join(faults))
+        self.faults = faults
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Values of appendix A and eq. (11); a description that says own choice gives the stated value after it, if any.
+
+    The estimate lies epsilon_pose_bound off the measurement, on the command's side. A Jacobian loop that is made to go
+    on by a smaller epsilon_control takes that back from the command, period by period. So the command does not wind up
+    while slack tendons hide it from the arm, but the loop stalls where the error falls to epsilon_pose_bound / alpha:
+    the stated 0.005 m with alpha = 0.1 stalls at the stated threshold, 0.05 m. Lengths weigh more than stated in the
+    estimate, since a metre is a lot more than a radian: equal weights explain a sagging arm by segments of half their
+    length. The wrist filter lags by about three control periods, so with alpha = 0.4 the arm still moves when the
+    filtered error first is small: hence settle_steps.
+    """
+
+    alpha: Number = parameter(
+        0.4, "step size: part of the way to the goal in a control period", minimum=0.0, maximum=1.0
+    )
+    adaptive_step: bool = parameter(
+        False, "let the step grow with the error e: min(0.8, max(alpha, 0.8 e / (e + 0.08 m))) (own choice)"
+    )
+    d_gripper: Metre = parameter(0.10, "distance of wrist and gripper", minimum=0.0)
+    d: Metre = parameter(0.035, "distance of the tendons from the axis (own choice)", minimum=0.0)
+    l_calib: Vector3[Metre] = parameter(np.array([0.12, 0.24, 0.24]), "segment lengths after calibration", minimum=0.0)
+    L_sys_LB: Vector6[Number] = parameter(
+        np.array([0.0, 0.08, 0.0, 0.16, 0.0, 0.16]),
+        "lower bounds of d_1, l_1, d_2, l_2, d_3, l_3 (rad, m)",
+        minimum=0.0,
+    )
+    L_sys_UB: Vector6[Number] = parameter(
+        np.array([math.pi / 4, 0.14, math.pi / 2, 0.26, math.pi / 2, 0.26]), "upper bounds likewise", minimum=0.0
+    )
+    A_pose_upd: Vector9[Number] = parameter(
+        np.array([1.0, 1.0, 5.0, 1.05, 1.05, 5.25, 1.1, 1.1, 5.5]),
+        "weight of each state's distance from the command in the estimate (diagonal; own choice; lengths 1, 1.05, 1.1)",
+        minimum=0.0,
+    )
+    K_initialize: Vector9[Number] = parameter(
+        np.array([0.2, 0.2, 2.0, 0.1, 0.1, 1.0, 0.1, 0.1, 1.0]), "virtual stiffness (diagonal)", minimum=0.0
+    )
+    epsilon_pose_bound: Metre = parameter(
+        0.0015, "distance of the estimate's pose from the measured one (own choice; 0.005)", minimum=0.0
+    )
+    epsilon_control: Metre = parameter(0.0005, "error at which the Jacobian loop ends (own choice; 0.005)", minimum=0.0)
+    N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1)
+    threshold: Metre = parameter(0.05, "error at which the arm has reached the place above the ball", minimum=0.0)
+    threshold_grasp: Metre = parameter(0.02, "error at which the gripper closes (own choice; 0.05)", minimum=0.0)
+    settle_steps: int = parameter(
+        4, "control steps in a row below threshold_grasp before the gripper closes (own choice; 1)", minimum=1
+    )
+    threshold_retreat: Metre = parameter(
+        0.16, "error at which the arm, coming down, goes back above the ball (own choice)", minimum=0.0
+    )
+    d_grasp_offset: Metre = parameter(0.05, "height of the first goal above the ball", minimum=0.0)
+    closing_time: Second = parameter(10.0, "time that the gripper is given to close", minimum=0.0)
+    patience: int = parameter(60, "control steps without progress before the arm gives up (own choice)", minimum=1)
+    progress: Metre = parameter(0.001, "change of the error that is progress (own choice)", minimum=0.0)
+    max_steps: int = parameter(1000, "control steps before the arm gives up (own choice)", minimum=1)
+    P_init: SquareMetre = parameter(2000.0, "variance of all three filters before the first measurement", minimum=0.0)
+    Q_ball: SquareMetre = parameter(0.1, "ball filter: variance that a control period adds", minimum=0.0)
+    R_ball: SquareMetre = parameter(0.01, "ball filter: variance of a measurement", minimum=0.0)
+    Q_wrist: SquareMetre = parameter(0.01, "wrist filter: variance that a control period adds", minimum=0.0)
+    R_wrist: SquareMetre = parameter(0.1, "wrist filter: variance of a measurement", minimum=0.0)
+    Q_direction: SquareMetre = parameter(0.1, "gripper direction filter: variance a control period adds", minimum=0.0)
+    R_direction: SquareMetre = parameter(0.01, "gripper direction filter: variance of a measurement", minimum=0.0)
+    use_covariance: bool = parameter(
+        False, "take the measurements' covariances for R (own choice); then Q wants to be of their size"
+    )
+
+    def check(self) -> None:
+        """Raise UnusableParameters, with all faults, if the servo cannot work with these values."""
+        faults = self._value_faults() + self._limit_faults() + self._threshold_faults()
+        if faults:
+            raise UnusableParameters(faults)
+
+    def _value_faults(self) -> list[str]:
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        infinite = [n for n, v in values.items() if not np.all(np.isfinite(v))]
+        positive = ["d_gripper", "d", "l_calib", "A_pose_upd", "K_initialize", "epsilon_pose_bound", "epsilon_control"]
+        positive += ["N_max_iter", "threshold", "threshold_grasp", "settle_steps", "patience", "max_steps"]
+        positive += [n for n in values if n.startswith(("P_", "Q_", "R_"))]
+        negative = [n for n in positive if np.any(np.asarray(values[n]) <= 0.0)]
+        faults = [f"{n} = {_text(values[n])} is not finite" for n in infinite]
+        faults += [f"{n} = {_text(values[n])} must be positive" for n in negative]
+        at_least_0 = ["d_grasp_offset", "closing_time", "progress"]
+        faults += [f"{n} = {values[n]} must not be negative" for n in at_least_0 if values[n] < 0.0]
+        if not 0.0 < self.alpha <= 1.0:
+            faults.append(f"alpha = {self.alpha} is outside (0, 1]")
+        return faults
+
+    def _limit_faults(self) -> list[str]:
+        LB, UB, l = self.L_sys_LB, self.L_sys_UB, self.l_calib
+        names = ["d_1", "l_1", "d_2", "l_2", "d_3", "l_3"]
+        faults = [f"limits of {n}: lower {a} > upper {b}" for n, a, b in zip(names, LB, UB, strict=True) if a > b]
+        if np.any(LB[_ROTATIONS] != 0.0):
+            faults.append(f"L_sys_LB: rotations d_i have the lower bound 0, not {_text(LB[_ROTATIONS])}")
+        if np.any(UB[_ROTATIONS] <= 0.0) or np.any(LB[_LENGTHS] <= 0.0):
+            faults.append("L_sys_UB of the rotations and L_sys_LB of the lengths must be positive")
+        if np.any(l < LB[_LENGTHS]) or np.any(l > UB[_LENGTHS]):
+            within = f"{_text(LB[_LENGTHS])} .. {_text(UB[_LENGTHS])}"
+            faults.append(f"l_calib = {_text(l)} is outside the limits of the lengths, {within}")
+        return faults
+
+    def _threshold_faults(self) -> list[str]:
+        after_switch = self.threshold + math.sqrt(2.0) * self.d_grasp_offset
+        faults: list[str] = []
+        if self.threshold_retreat <= after_switch:
+            faults.append(
+                f"threshold_retreat = {self.threshold_retreat} must exceed threshold + sqrt(2) d_grasp_offset = "
+                f"{after_switch:.4g}, the largest error when the goal changes to the ball, or the arm goes up at once"
+            )
+        if self.threshold_retreat <= self.threshold_grasp:
+            faults.append(
+                f"threshold_retreat = {self.threshold_retreat} must exceed threshold_grasp = {self.threshold_grasp}"
+            )
+        return faults
+
+
+def _text(value: object) -> str:
+    return str(np.asarray(value).tolist())

@@ -1,0 +1,158 @@
+import hashlib
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from cosim.block import describe
+from cosim.pinhole import Pinhole, UnusableCalibration
+from plants.sketch import Pixels
+from plants.stereo_camera import BadCover, Inputs, Params, StereoCamera
+
+HOUSE = Path(__file__).parents[2]
+FAR = np.array([0.3, 1.5, -1.2])  # out of both pictures
+
+
+@pytest.fixture(scope="module")
+def camera() -> StereoCamera:
+    return StereoCamera(Params())
+
+
+@pytest.fixture(scope="module")
+def clean() -> StereoCamera:
+    return StereoCamera(Params(noise=0.0))
+
+
+def left_pinhole() -> Pinhole:
+    p = Params()
+    return Pinhole("left", p.p_WC_left, p.q_WC_left, p.intrinsics_left, p.distortion_left)
+
+
+def green(picture: Pixels) -> int:
+    levels = picture.astype(int)
+    return int(np.count_nonzero(levels[..., 1] - np.maximum(levels[..., 0], levels[..., 2]) > 30))
+
+
+def digest() -> str:
+    camera = StereoCamera(Params(seed=3))
+    y = camera.step(0.0, 1 / 30, Inputs())
+    return hashlib.sha256(y.left.tobytes() + y.right.tobytes()).hexdigest()
+
+
+def test_declares_pictures_that_feed_through_at_30_hz():
+    d = describe(StereoCamera)
+    assert [(v.name, v.raster.mime if v.raster else "") for v in d.outputs] == [
+        ("left", "image/x-raw-bgr; width=1280; height=720"),
+        ("right", "image/x-raw-bgr; width=1280; height=720"),
+    ]
+    assert d.feedthrough == {side: tuple(v.name for v in d.inputs) for side in ("left", "right")}
+    assert d.period is not None
+    assert float(d.period) == pytest.approx(1 / 30)
+
+
+def test_pictures_are_the_same_in_another_process():
+    code = f"import sys; sys.path[:0] = [{str(HOUSE)!r}, {str(Path(__file__).parent)!r}]\n"
+    code += "import test_stereo_camera as t; print(t.digest())"
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert other.stdout.strip() == digest()
+
+
+def test_seeds_differ_only_in_noise(camera: StereoCamera):
+    a, b = camera.outputs(0.0, Inputs()).left, StereoCamera(Params(seed=1)).outputs(0.0, Inputs()).left
+    difference = a.astype(float) - b
+    assert np.count_nonzero(difference) > 0.7 * difference.size
+    assert abs(difference.mean()) < 0.01
+    assert difference.std() == pytest.approx(np.sqrt(2) * 2.2, rel=0.03)
+
+
+def test_noise_of_pictures_and_pixels_is_independent(camera: StereoCamera, clean: StereoCamera):
+    truth = clean.outputs(0.0, Inputs())
+    first, second = (camera.step(0.0, 1 / 30, Inputs()) for _ in range(2))
+    noise = [p.astype(float) - q for p, q in ((first.left, truth.left), (second.left, truth.left))]
+    noise.append(first.right.astype(float) - truth.right)
+    for a, b in ((noise[0], noise[1]), (noise[0], noise[2]), (noise[0][:, 1:], noise[0][:, :-1])):
+        assert abs(float(np.mean(a * b))) < 0.01 * 2.2**2
+
+
+def test_outputs_do_not_draw_noise(camera: StereoCamera):
+    np.testing.assert_array_equal(camera.outputs(0.0, Inputs()).left, camera.outputs(0.0, Inputs()).left)
+
+
+def test_continues_bit_identically_from_a_state(camera: StereoCamera):
+    state = camera.get_state()
+    expected = [camera.step(0.1 * i, 0.1, Inputs()) for i in range(3)]
+    other = StereoCamera(Params())
+    other.set_state(state)
+    for i, y in enumerate(expected):
+        again = other.step(0.1 * i, 0.1, Inputs())
+        np.testing.assert_array_equal(again.left, y.left)
+        np.testing.assert_array_equal(again.right, y.right)
+
+
+def test_the_ball_is_where_the_camera_model_puts_it(clean: StereoCamera):
+    p_WO = np.array([0.05, 0.3, -0.45])
+    picture = clean.outputs(0.0, Inputs(p_WO=p_WO, p_WH=FAR)).left.astype(int)
+    v, u = np.nonzero(picture[..., 1] - np.maximum(picture[..., 0], picture[..., 2]) > 25)
+    camera = left_pinhole()
+    centre, radius = cv2.minEnclosingCircle(np.column_stack([u, v]).astype(np.float32))
+    np.testing.assert_allclose(centre, camera.project(p_WO), atol=0.5)
+    assert radius == pytest.approx(camera.f[0] * 0.025 / camera.depth(p_WO), abs=1.0)
+
+
+def test_the_arm_hides_a_ball_behind_it(clean: StereoCamera):
+    p_WC = Params().p_WC_left
+    p_WO = p_WC + 1.25 * (np.array([0.0, 0.0, -0.42]) - p_WC)
+    y = clean.outputs(0.0, Inputs(p_WO=p_WO, p_WH=FAR))
+    assert green(y.left) == 0
+    assert green(y.right) > 500
+
+
+def test_the_ball_hides_markers_behind_it(clean: StereoCamera):
+    p_WC = Params().p_WC_left
+    p_WO = p_WC + 0.8 * (np.array([0.0, 0.0, -0.6]) - p_WC)
+    at = left_pinhole().project(np.array([0.0, 0.0, -0.6]))
+    u, v = np.rint(at).astype(int)
+    blue, colour, red = clean.outputs(0.0, Inputs(p_WO=p_WO, p_WH=FAR)).left[v, u].astype(int)
+    assert colour > max(blue, red) + 30
+
+
+def test_closing_the_gripper_shows(clean: StereoCamera):
+    opened, closed = (clean.outputs(0.0, Inputs(grip=grip)).left.astype(int) for grip in (0.0, 1.0))
+    assert np.count_nonzero(np.abs(opened - closed).max(axis=2) > 20) > 300
+
+
+def test_a_cover_darkens_one_picture_while_it_lasts():
+    camera = StereoCamera(Params(cover_left_from=1.0, cover_left_until=2.0))
+    for t, dark in ((0.99, False), (1.0, True), (1.99, True), (2.0, False)):
+        y = camera.step(t, 1 / 30, Inputs())
+        assert (y.left.mean() < 10.0) is dark
+        assert y.right.mean() > 50.0
+        assert y.left.std() > 1.0  # of noise at least
+
+
+def test_a_scene_out_of_sight_leaves_the_backdrop(clean: StereoCamera):
+    gone = Inputs(
+        backbone=np.full((25, 3), -3.0), p_WR=np.full(3, -3.0), p_WG=np.full(3, -3.0), p_WO=np.full(3, -3.0),
+        p_WH=np.full(3, -3.0),
+    )  # fmt: skip
+    assert green(clean.outputs(0.0, gone).left) == 0
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_quaternion_not_of_unit_length_is_refused(side: str):
+    with pytest.raises(UnusableCalibration, match=f"'{side}': q_WC"):
+        StereoCamera(replace(Params(), **{f"q_WC_{side}": np.array([1.0, 1.0, 0.0, 0.0])}))
+
+
+def test_a_focal_length_that_is_not_positive_is_refused():
+    with pytest.raises(UnusableCalibration, match="fx and fy positive"):
+        StereoCamera(Params(intrinsics_right=np.array([907.0, 0.0, 640.0, 360.0])))
+
+
+def test_a_cover_that_ends_before_it_begins_is_refused():
+    with pytest.raises(BadCover, match="'right'.*from 3.0 s until 2.0 s"):
+        StereoCamera(Params(cover_right_from=3.0, cover_right_until=2.0))
