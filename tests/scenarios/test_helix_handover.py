@@ -1,0 +1,133 @@
+"""The handover itself, through the command, on the built FMUs."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.record import Record
+
+
+def command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-c", "from scenarios.command import main; main()", *map(str, arguments)]
+
+
+def run(out: Path, *arguments: str) -> tuple[int, dict[str, Any]]:
+    call = command("run", "helix_handover", *arguments, "--out", out)
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    assert (out / "summary.json").is_file(), done.stderr
+    return done.returncode, json.loads((out / "summary.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def handover(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int, dict[str, Any]]:
+    out = tmp_path_factory.mktemp("runs") / "r"
+    return out, *run(out, "--seed", "3")
+
+
+def test_the_ball_changes_hands(handover: tuple[Path, int, dict[str, Any]]):
+    out, status, summary = handover
+    assert status == 0
+    assert summary["success"] is True
+    metrics = summary["metrics"]
+    assert metrics["final_distance"] == {**metrics["final_distance"], "unit": "m"}
+    assert metrics["final_distance"]["value"] <= 0.05
+    assert 5 <= metrics["steps"]["value"] <= 60
+    assert metrics["cpu_per_cycle"]["value"] > 0
+    record = Record(out / "signals.parquet")
+    end = np.linalg.norm(record["arm.p_WG"][-1] - record["hand.p_WO"][-1])
+    assert end == pytest.approx(metrics["final_distance"]["value"])
+    assert record["hand.holder"][0] == 0
+    assert record["hand.holder"][-1] == 1
+
+
+def test_the_run_stays_within_its_memory(handover: tuple[Path, int, dict[str, Any]]):
+    assert handover[2]["metrics"]["peak_memory"]["value"] < 1.5e9
+
+
+def test_a_run_leaves_its_whole_folder(handover: tuple[Path, int, dict[str, Any]]):
+    out = handover[0]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "figures",
+        "report.html",
+        "run.json",
+        "signals.parquet",
+        "summary.json",
+    ]
+    figures = {p.name for p in (out / "figures").iterdir()}
+    assert figures == {f"{n}.{s}" for n in ("error", "paths", "pictures", "tendons") for s in ("png", "svg")}
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 4
+    assert "http://" not in page
+    assert "https://" not in page
+    told = json.loads((out / "run.json").read_text())
+    assert set(told["units"]) == {"arm", "hand", "camera", "vision", "servo"}
+    assert all(len(u["sha256"]) == 64 for u in told["units"].values())
+
+
+def test_the_controller_sees_the_ball_and_the_arm_well(handover: tuple[Path, int, dict[str, Any]]):
+    record = Record(handover[0] / "signals.parquet")
+    late = record.time > 1.0  # when the arm hangs before the ball, half of it is hidden
+    errors = np.linalg.norm(record["vision.p_WG_meas"] - record["arm.p_WG"], axis=1)[late & record["vision.seen_R"]]
+    assert np.median(errors) < 0.005
+    errors = np.linalg.norm(record["vision.p_WO_meas"] - record["hand.p_WO"], axis=1)[late & record["vision.seen_O"]]
+    assert np.median(errors) < 0.005
+
+
+def test_the_same_seed_gives_the_same_signals_bit_for_bit(handover: tuple[Path, int, dict[str, Any]], tmp_path: Path):
+    run(tmp_path / "again", "--seed", "3")
+    first, second = (
+        hashlib.sha256((p / "signals.parquet").read_bytes()).hexdigest() for p in (handover[0], tmp_path / "again")
+    )
+    assert first == second
+
+
+def test_covering_a_camera_for_two_seconds_does_not_lose_the_handover(tmp_path: Path):
+    status, summary = run(tmp_path / "r", "-p", "cover=left", "-p", "cover_from=3", "-p", "cover_for=2")
+    assert status == 0, summary["reason"]
+    record = Record(tmp_path / "r" / "signals.parquet")
+    covered = (record.time > 3.1) & (record.time < 4.9)
+    assert np.trace(record["vision.cov_R"][covered].mean(axis=0)) > np.trace(
+        record["vision.cov_R"][(record.time > 2.0) & (record.time < 2.9)].mean(axis=0)
+    )
+
+
+def test_a_ball_out_of_reach_ends_with_status_1_and_says_why(tmp_path: Path):
+    status, summary = run(tmp_path / "r", "-p", "radius=0.8")
+    assert status == 1
+    assert summary["success"] is False
+    assert "out of reach" in summary["reason"] or "did not see" in summary["reason"]
+
+
+def test_an_fmi_2_arm_takes_the_arms_place(tmp_path: Path):
+    from fmus.build import cached
+
+    status, summary = run(tmp_path / "r", "--unit", f"arm={cached('TendonArm', 2)}", "--seed", "3")
+    assert status == 0, summary["reason"]
+
+
+def test_ctrl_c_ends_a_run_and_keeps_its_record(tmp_path: Path):
+    out = tmp_path / "r"
+    going = subprocess.Popen(command("run", "helix_handover", "--out", out), stdout=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while not (out / "signals.parquet").exists():
+        assert going.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    os.kill(going.pid, signal.SIGINT)
+    printed, _ = going.communicate(timeout=120)
+    assert going.returncode == 1
+    assert "interrupted" in printed
+    record = Record(out / "signals.parquet")
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["success"] is False
+    assert record.time[-1] == pytest.approx(summary["simulated_seconds"])
+    assert (out / "report.html").is_file()
