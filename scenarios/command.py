@@ -35,18 +35,31 @@ class BadCall(click.ClickException):
     exit_code = BAD_CALL
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+_HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
+
+\b
+handover list                          scenarios and units
+handover list helix_handover           a scenario's parameters, with ranges
+handover run helix_handover            one run; leaves a folder with a report
+handover build TendonArm --fmi both    units for other tools
+
+\b
+Exit status
+  0  the task succeeded
+  1  the run ended, but the task failed
+  2  bad call or bad input; nothing was written
+  3  a unit failed; what was recorded until then is kept
+
+\b
+Environment
+  HANDOVER_CACHE  folder of built units [default: the user's cache folder]
+"""
+
+
+@click.group(help=_HELP, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="handover-cosim")
 def main() -> None:
-    r"""Robots that hand objects over, co-simulated as Functional Mock-up Units.
-
-    \b
-    handover list                          what there is
-    handover run helix_handover            one run; leaves a folder with a report
-    handover build TendonArm --fmi both    units for other tools
-
-    Exit status: 0 the task succeeded, 1 the run ended but the task failed, 2 bad call or bad input, 3 a unit failed.
-    """
+    """Robots that hand objects over, co-simulated as Functional Mock-up Units."""
 
 
 @main.command("list")
