@@ -23,7 +23,8 @@ class Limits(NamedTuple):
 class ControlStep(NamedTuple):
     """Command q_sys, shape (9,), estimate q_est, shape (9,), that follows it, error |X_goal_alpha - f(q_est)|, in m.
 
-    `converged` says whether the error is below epsilon_control; if not, this is the best iterate.
+    `converged` says whether the error is below epsilon_control; if not, this is the best iterate, or where the arm is
+    if no iterate is nearer to the goal.
     """
 
     q_sys: Floats
@@ -76,7 +77,8 @@ def control_step(
     """
     K_inv = 1.0 / K
     e = X_goal_alpha - X_meas
-    _, jacobian = linearise(q_est, d_gripper)
+    X_est, jacobian = linearise(q_est, d_gripper)
+    stay = ControlStep(q_sys, q_est, float(np.linalg.norm(X_goal_alpha - X_est)), False)
     best = ControlStep(q_sys, q_est, math.inf, False)
     for _ in range(N_max_iter):
         dq_J = _weighted_step(jacobian, K_inv, e)
@@ -90,7 +92,7 @@ def control_step(
             best = ControlStep(q_sys, q_est, error, error < epsilon_control)
         if best.converged:
             break
-    return best
+    return best if best.converged or best.error < stay.error else stay
 
 
 def _weighted_step(J: Floats, K_inv: Floats, e: Floats) -> Floats:

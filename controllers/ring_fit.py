@@ -68,18 +68,18 @@ class RingFit:
         return None
 
     def _settle(self, seen: Sequence[Markers], start: tuple[Floats, Floats]) -> RingPose | None:
-        p_WR, R_WR = start
+        pose = start
         for _ in range(_ITERATIONS):
-            e, J = self._misfit(seen, p_WR, R_WR)
+            e, J = self._misfit(seen, *pose)
             if not np.isfinite(e).all():
                 return None
             try:
                 dx, information = least_squares(J, e)
             except np.linalg.LinAlgError:
                 return None
-            p_WR, R_WR = p_WR + dx[:3], R_WR @ Rotation.from_rotvec(dx[3:]).as_matrix()
+            pose = pose[0] + dx[:3], pose[1] @ Rotation.from_rotvec(dx[3:]).as_matrix()
             if np.abs(dx).max() < _SETTLED:
-                return RingPose(p_WR, R_WR, information)
+                return RingPose(*pose, information)
         return None
 
     def _misfit(self, seen: Sequence[Markers], p_WR: Floats, R_WR: Floats) -> tuple[Floats, Floats]:

@@ -11,8 +11,8 @@ import numpy as np
 from cosim.geometry import looking_at, quaternion_of
 from cosim.pinhole import Pinhole
 
-_P_WC = {"left": np.array([-0.95, 0.25, -0.70]), "right": np.array([-0.95, -0.25, -0.70])}
-_LOOKED_AT = np.array([0.0, 0.0, -0.60])
+_P_WC = {"left": np.array([-0.95, 0.25, -0.60]), "right": np.array([-0.95, -0.25, -0.60])}
+_LOOKED_AT = np.array([0.0, 0.0, -0.62])
 _INTRINSICS = {"left": np.array([907.0, 906.0, 642.5, 357.0]), "right": np.array([908.5, 907.5, 636.0, 361.5])}
 _DISTORTION = {
     "left": np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]),

@@ -20,7 +20,7 @@ def disc(background: tuple[int, int, int] = GREY) -> Pixels:
 
 
 def bar(picture: Pixels, start: tuple[int, int], end: tuple[int, int], thickness: int) -> Pixels:
-    hidden = picture.copy()
+    hidden = np.array(picture)
     cv2.line(hidden, start, end, (40, 40, 40), thickness)
     return hidden
 

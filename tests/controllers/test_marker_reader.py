@@ -6,7 +6,7 @@ from controllers.marker_reader import MarkerReader
 from controllers.region import Pixels, Region
 from cosim.ports import Floats
 
-H = np.array([[1.0, 0.12, 301.7], [-0.2, 0.95, 222.4], [0.0004, 0.0002, 1.0]])  # mm on the marker to px
+H = np.array([[1.4, 0.12, 301.7], [-0.2, 1.35, 222.4], [0.0008, 0.0004, 1.0]])  # mm on the marker to px
 
 
 def picture(i: int) -> Pixels:

@@ -64,13 +64,15 @@ def test_one_camera_does():
 
 
 def test_covariance_is_the_scatter():
-    fit, errors, squares = RingFit(RING, CAMERAS, 1.2), [], []
+    fit = RingFit(RING, CAMERAS, 1.2)
+    errors: list[Floats] = []
+    squares: list[float] = []
     for seed in range(60):
         pose = fit.fit(seen(0.2, seed), (P_WR, R_WR))
         assert pose is not None
         e = pose.p_WR - P_WR
         errors.append(e)
-        squares.append(e @ np.linalg.solve(covariance(pose.information, 0.2)[:3, :3], e))
+        squares.append(float(e @ np.linalg.solve(covariance(pose.information, 0.2)[:3, :3], e)))
     assert 2.0 < np.mean(squares) < 4.0
     assert np.linalg.norm(np.mean(errors, axis=0)) < 2e-4
 

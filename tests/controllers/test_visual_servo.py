@@ -244,6 +244,12 @@ def test_a_ball_that_wanders_is_followed():
     assert run.miss(wandering(run.t)) < 0.05
 
 
+def test_a_ball_that_keeps_moving_is_not_given_up():
+    run = loop(alpha=0.1, patience=12)
+    y = run.run(Phase.GRASP, lambda t: ball_at(60.0 * math.sin(0.35 * t)), steps=60)
+    assert y.phase is Phase.APPROACH
+
+
 def test_a_ball_that_is_moved_away_in_the_descent_is_approached_from_above_again():
     run = loop()
     run.run(Phase.DESCEND, lambda _t: ball_at(0.0))
