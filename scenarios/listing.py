@@ -15,7 +15,7 @@ from scenarios.report import told
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Ended
 
-_SHOWN = ("final_distance", "steps", "arm_time", "handover_time", "cpu_per_cycle", "peak_memory")
+_SHOWN = ("final_distance", "steps", "arm_time", "handover_time", "cpu_per_cycle", "pace_arm", "peak_memory")
 
 
 def print_catalog() -> None:

@@ -105,7 +105,10 @@ def _speed(experiment: Experiment, master: Master) -> dict[str, Metric]:
     if cycle:
         metrics["cpu_per_cycle"] = Metric(sum(cycle), "s", f"median CPU time of a control cycle ({units})")
     for name, spent in master.cpu.items():
-        metrics[f"cpu_{name}"] = Metric(float(np.sum(spent)), "s", f"CPU time of {name} in all")
+        total = float(np.sum(spent))
+        metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
+        simulated = len(spent) * float(master.system.units[name].period)
+        metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
     return metrics
 
 

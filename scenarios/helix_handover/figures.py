@@ -41,7 +41,7 @@ def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
         )
         axes.plot(t, true * 1000, color=COLOURS[1], label="gripper to ball, ground truth")
         axes.axhline(parameters.threshold * 1000, color="#4d5866", lw=0.8, ls="--")
-        axes.axhline(parameters.threshold_grasp * 1000, color="#4d5866", lw=0.8, ls=":")
+        axes.axhline(parameters.settings["threshold_grasp"] * 1000, color="#4d5866", lw=0.8, ls=":")
         axes.set(xlabel="time (s)", ylabel="distance (mm)", ylim=(0, None), xlim=(t[0], t[-1]))
         axes.legend(loc="upper right")
     return Figure("error", "Distance to the goal over time. Dashed: threshold for the descent; dotted: for the grasp.")

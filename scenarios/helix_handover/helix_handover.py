@@ -53,7 +53,7 @@ class HelixHandover(Experiment):
             period=p.period,
             alpha=p.alpha,
             threshold=p.threshold,
-            threshold_grasp=p.threshold_grasp,
+            **p.settings,
         )
         arm = s.add("arm", fmu("arm"))
         hand = s.add("hand", fmu("hand"), seed=hand_seed, p_WO_0=p.p_WO)

@@ -3,11 +3,13 @@
 import enum
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from cosim.ports import Floats, parameter
 from cosim.units import Metre, Number, Second
+from scenarios.paper import paper_values
 
 
 class Place(enum.IntEnum):
@@ -32,6 +34,13 @@ class Cover(enum.IntEnum):
     RIGHT = 2
 
 
+class Tuning(enum.IntEnum):
+    """Settings of the controller that belong together; `paper.toml` lists them."""
+
+    OWN = 0
+    THESIS = 1
+
+
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
     """One handover."""
@@ -42,7 +51,7 @@ class Parameters:
     height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-2.0, maximum=0.0)
     control_period: Second = parameter(0.5, "period of the controller", minimum=0.1, maximum=10.0)
     threshold: Metre = parameter(0.05, "error at which the arm descends onto the ball", minimum=0.001, maximum=0.2)
-    threshold_grasp: Metre = parameter(0.02, "error at which the gripper closes", minimum=0.001, maximum=0.2)
+    tuning: Tuning = parameter(Tuning.OWN, "bounds and weights of the controller: ours, or the thesis's")
     cover: Cover = parameter(Cover.NONE, "camera whose lens is covered for a while")
     cover_from: Second = parameter(4.0, "time at which the lens is covered", minimum=0.0, maximum=600.0)
     cover_for: Second = parameter(2.0, "how long the lens is covered", minimum=0.0, maximum=600.0)
@@ -58,6 +67,11 @@ class Parameters:
     def period(self) -> Fraction:
         """The controller's period as an exact number of milliseconds."""
         return Fraction(round(self.control_period * 1000), 1000)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Return the controller's parameters that the tuning stands for."""
+        return paper_values("helix_handover", self.tuning.name.lower())
 
     def covered(self, side: Cover) -> tuple[float, float]:
         """Return from when until when a lens is covered, in seconds; (0, 0) where it is not."""

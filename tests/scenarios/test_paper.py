@@ -1,0 +1,61 @@
+"""What the code has as defaults is what `paper.toml` tells the origin of."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli
+
+import scenarios.helix_handover
+from controllers.servo_parameters import Params as ServoParams
+from plants.stereo_camera import Params as CameraParams
+from scenarios.helix_handover.parameters import Parameters, Place, Tuning
+from scenarios.helix_handover.rig import calibration
+
+STATUS = {"stated", "derived", "assumed", "read off figure"}
+
+
+@pytest.fixture(scope="module")
+def paper() -> dict[str, dict[str, dict[str, Any]]]:
+    file = Path(scenarios.helix_handover.__file__).parent / "paper.toml"
+    return tomli.loads(file.read_text(encoding="utf-8"))
+
+
+def test_every_value_has_its_unit_origin_and_status(paper: dict[str, dict[str, dict[str, Any]]]):
+    for group in paper.values():
+        for name, entry in group.items():
+            assert set(entry) == {"value", "unit", "where", "status"}, name
+            assert entry["status"] in STATUS, name
+
+
+def test_the_scenarios_defaults_have_an_origin(paper: dict[str, dict[str, dict[str, Any]]]):
+    p, experiment = Parameters(), paper["experiment"]
+    assert p.radius == experiment["radius"]["value"]
+    assert p.height == experiment["height"]["value"]
+    assert p.control_period == experiment["control_period"]["value"]
+    assert p.alpha in experiment["alpha"]["value"]
+    assert [e.name.lower().replace("_", "-") for e in Place] == experiment["places"]["value"]
+
+
+def test_the_controllers_defaults_have_an_origin(paper: dict[str, dict[str, dict[str, Any]]]):
+    servo, scenario = ServoParams(), Parameters()
+    for name, entry in (paper["servo"] | paper["own"]).items():
+        assert np.array_equal(getattr(servo, name), entry["value"]), name
+        if hasattr(scenario, name):
+            assert getattr(scenario, name) == entry["value"], name
+
+
+def test_the_cameras_are_where_the_paper_file_says(paper: dict[str, dict[str, dict[str, Any]]]):
+    c = calibration()
+    assert [c["p_WC_left"].tolist(), c["p_WC_right"].tolist()] == paper["camera"]["p_WC"]["value"]
+    assert [c["intrinsics_left"][0], c["intrinsics_right"][0]] == paper["camera"]["focal_length"]["value"]
+    camera = CameraParams()
+    assert camera.marker == paper["camera"]["marker"]["value"]
+    assert camera.ball_radius == paper["camera"]["ball_radius"]["value"]
+
+
+def test_a_tuning_stands_for_its_settings(paper: dict[str, dict[str, dict[str, Any]]]):
+    thesis = Parameters(tuning=Tuning.THESIS).settings
+    assert thesis == {name: entry["value"] for name, entry in paper["thesis"].items()}
+    assert set(thesis) == set(Parameters().settings)
