@@ -15,15 +15,27 @@ def write_report(
     folder: RunFolder,
     title: str,
     summary: Mapping[str, Any],
+    parameters: Sequence[tuple[str, str, str]],
     units: Sequence[tuple[str, str, str, int, float]],
     figures: Sequence[Figure],
 ) -> None:
-    """Write `report.html`: verdict, figures of merit, parameters, units with their CPU time, and the figures."""
+    """Write `report.html`: verdict, figures of merit, parameters, units with their CPU time, and the figures.
+
+    Args:
+        folder: the run's folder; the figures are in it.
+        title: what the scenario is, in a line.
+        summary: what is in `summary.json`.
+        parameters: name, value with unit, and description of each parameter.
+        units: name, FMU, step, number of steps and CPU seconds of each unit.
+        figures: names and captions.
+    """
     source = resources.files("scenarios").joinpath("report.html").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters["figure"] = told
     pictures = [(f, _inline(folder, f)) for f in figures]
-    page = environment.from_string(source).render(title=title, summary=summary, units=units, pictures=pictures)
+    page = environment.from_string(source).render(
+        title=title, summary=summary, parameters=parameters, units=units, pictures=pictures
+    )
     folder.report.write_text(page, encoding="utf-8")
 
 

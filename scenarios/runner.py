@@ -138,7 +138,17 @@ def _present(
     if task.folder.signals.exists():
         record = Record(task.folder.signals)
         figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
-    write_report(task.folder, task.experiment.title, summary, units, figures)
+    write_report(task.folder, task.experiment.title, summary, _parameter_rows(task), units, figures)
+
+
+def _parameter_rows(task: Task) -> list[tuple[str, str, str]]:
+    rows: list[tuple[str, str, str]] = []
+    for v in task.experiment.parameters():
+        value = _plain(getattr(task.parameters, v.name))
+        told = value.lower() if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
+        unit = "" if v.unit.symbol == "1" else f" {v.unit.symbol}"
+        rows.append((v.name, told + unit, v.description))
+    return rows
 
 
 def _plain(value: Any) -> Any:
