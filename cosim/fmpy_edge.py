@@ -1,8 +1,10 @@
 """The typed edge to FMPy: reading model descriptions, unpacking, and loading FMUs of both standards."""
 
 import ctypes
+import os
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, cast
 from xml.etree import ElementTree
@@ -115,14 +117,12 @@ def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: s
     def log_message(_environment: Any, status: int, _category: bytes, message: bytes) -> None:
         log(status, message.decode("utf-8", "replace"))
 
-    try:
+    with _loading(path):
         fmu = fmpy.fmi3.FMU3Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
         fmu.instantiate(loggingOn=True, logMessage=log_message)
-    except Exception as e:  # FMPy raises plain Exception when a library does not load or instantiate
-        raise InvalidFmu(path, f"could not be instantiated: {_one_line(e)}") from e
-    return fmu
+        return fmu
 
 
 def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger) -> Any:
@@ -140,14 +140,24 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
     callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
-    try:
+    with _loading(path):
         fmu = fmpy.fmi2.FMU2Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
         fmu.instantiate(callbacks=callbacks, loggingOn=True)
+        return fmu
+
+
+@contextmanager
+def _loading(path: Path) -> Generator[None, None, None]:
+    """Tell a failed loading as InvalidFmu, and stay in the working directory, which FMPy leaves when it fails."""
+    before = Path.cwd()
+    try:
+        yield
     except Exception as e:  # FMPy raises plain Exception when a library does not load or instantiate
         raise InvalidFmu(path, f"could not be instantiated: {_one_line(e)}") from e
-    return fmu
+    finally:
+        os.chdir(before)
 
 
 def _one_line(e: BaseException) -> str:

@@ -171,5 +171,7 @@ def test_an_fmu_with_a_damaged_binary_is_refused(fmu: FmuOf, tmp_path: Path):
             target.writestr(item, b"not a library" if item.filename.startswith("binaries/") else content)
     s = System()
     s.add("mass", broken)
+    here = Path.cwd()
     with pytest.raises(InvalidFmu, match="could not be instantiated"), Master(s):
         pass
+    assert Path.cwd() == here
