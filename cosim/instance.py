@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.block import Kind
-from cosim.exceptions import UnitFailure
+from cosim.exceptions import InvalidFmu, UnitFailure
 from cosim.fmpy_edge import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.signal_buffer import SignalBuffer, Views
@@ -32,7 +32,10 @@ class Instance:
         self._prefix = f"fmi{self._fmi}"
         load = load_fmi2 if self._fmi == 2 else load_fmi3
         d = description
-        self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
+        try:
+            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
+        except InvalidFmu as e:
+            raise InvalidFmu(e.path, "\n  ".join([e.fault, *self.log])) from e
         self._component = self._fmu.component
         chosen = [d.inputs[i] for i in inputs]
         self._setters = self._buffers("Set", chosen)
