@@ -1,0 +1,40 @@
+"""The catalogued units in FMPy, a host that knows nothing of this project."""
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+
+from fmus.build import cached
+from fmus.catalog import UNITS
+from fmus.fmi2_description import NoFmi2Form
+from plants.tendon_arm import Inputs, TendonArm
+from plants.tendon_parameters import Params
+
+DL = np.array([-0.01, 0.005, 0.005, -0.02, 0.01, 0.01, 0.0, -0.015, -0.015])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", UNITS)
+def test_every_unit_is_valid_or_says_why_it_has_no_such_form(name: str, fmi: int):
+    try:
+        file = cached(name, fmi)
+    except NoFmi2Form:
+        assert fmi == 2
+        assert name in ("StereoCamera", "HandoverVision")
+        return
+    assert validate_fmu(str(file)) == []
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_arm_alone_in_fmpy_is_the_plain_arm_bit_for_bit(fmi: int):
+    start = {f"dl_t[{i + 1}]": x for i, x in enumerate(DL)} if fmi == 2 else {"dl_t": DL}
+    output = [f"p_WG[{i}]" for i in (1, 2, 3)] if fmi == 2 else ["p_WG"]
+    result = fmpy.simulate_fmu(
+        str(cached("TendonArm", fmi)), stop_time=0.4, output_interval=0.02, start_values=start, output=output
+    )
+    seen = np.column_stack([result[n] for n in output]) if fmi == 2 else result["p_WG"]
+    arm, u = TendonArm(Params()), Inputs(dl_t=DL)
+    plain = [arm.outputs(0.0, u).p_WG] + [arm.step(k * 0.02, 0.02, u).p_WG for k in range(20)]
+    assert np.array_equal(seen, plain)
+    assert np.linalg.norm(plain[-1] - plain[0]) > 0.01
