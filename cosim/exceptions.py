@@ -50,9 +50,20 @@ class UnitFailure(CosimError):
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)
 
     @property
+    def told(self) -> str:
+        """The last line of the unit's log, or the status where it logged nothing."""
+        lines = [line.strip() for entry in self.log for line in entry.splitlines() if line.strip()]
+        return lines[-1] if lines else self.status
+
+    @property
     def cause(self) -> str:
         """One line: unit, call, time, and the last thing that the unit logged."""
-        told = [line.strip() for entry in self.log for line in entry.splitlines() if line.strip()]
-        return f"{self.unit}: {self.call} at t = {self.t:.6g} s answered {self.status}" + (
-            f": {told[-1]}" if told else ""
-        )
+        return f"{self.unit}: {self.call} at t = {self.t:.6g} s: {self.told}"
+
+
+class UnitRefused(CosimError):
+    """A unit did not accept its parameters or did not initialise; nothing has run yet."""
+
+    def __init__(self, failure: UnitFailure) -> None:
+        super().__init__(f"{failure.unit} does not start: {failure.told}")
+        self.failure = failure

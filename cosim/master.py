@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.exceptions import CosimError
+from cosim.exceptions import CosimError, UnitFailure, UnitRefused
 from cosim.fmpy_edge import unpack
 from cosim.instance import Instance
 from cosim.schedule import Algorithm, Schedule, Slot
@@ -39,7 +39,7 @@ class Master:
 
     Raises:
         WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`.
-        UnitFailure: a unit's call failed.
+        UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
     def __init__(self, system: System, algorithm: Algorithm = Algorithm.GAUSS_SEIDEL) -> None:
@@ -56,7 +56,10 @@ class Master:
     def __enter__(self) -> "Master":
         with self._cleanup as cleanup:
             self._load(cleanup)
-            self._initialize()
+            try:
+                self._initialize()
+            except UnitFailure as e:
+                raise UnitRefused(e) from e
             self._cleanup = cleanup.pop_all()
         return self
 

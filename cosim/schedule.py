@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from cosim.exceptions import ScheduleError
-from cosim.system import System, Unit
+from cosim.system import PlacedUnit, System
 
 
 class Algorithm(enum.Enum):
@@ -70,7 +70,7 @@ def _common_divisor(periods: Sequence[Fraction]) -> Fraction:
     return Fraction(math.gcd(*(int(p * denominator) for p in periods)), denominator)
 
 
-def _direct_sources(system: System, unit: Unit) -> set[str]:
+def _direct_sources(system: System, unit: PlacedUnit) -> set[str]:
     acting = {u for us in unit.description.feedthrough.values() for u in us}
     return {source.unit for port, source in system.sources_of(unit.name).items() if port in acting}
 

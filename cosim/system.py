@@ -36,7 +36,7 @@ class PortNames:
 
 
 @dataclass(frozen=True)
-class Unit:
+class PlacedUnit:
     """A unit of a system: what its FMU says, the values it starts with, and its communication step in seconds."""
 
     name: str
@@ -67,12 +67,12 @@ class System:
     """Units and connections. Nothing is loaded: files are read for what they declare, and wiring is checked on that."""
 
     def __init__(self) -> None:
-        self.units: dict[str, Unit] = {}
+        self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
-    def add(self, name: str, fmu: Path, *, period: Fraction | None = None, **start: Any) -> Unit:
+    def add(self, name: str, fmu: Path, *, period: Fraction | None = None, **start: Any) -> PlacedUnit:
         """Add a unit under a name, with start values of its parameters and inputs.
 
         `period` is its communication step in seconds; by default the step that its FMU proposes.
@@ -90,7 +90,7 @@ class System:
         if period is None or period <= 0:
             self._faults.append(f"{name}: its FMU proposes no communication step; give one that is above 0 s")
             period = Fraction(1, 100)
-        unit = Unit(name, description, start, period)
+        unit = PlacedUnit(name, description, start, period)
         self.units[name] = unit
         return unit
 
@@ -144,7 +144,7 @@ class System:
         return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, wanted)}"
 
 
-def _value_faults(unit: Unit) -> list[str]:
+def _value_faults(unit: PlacedUnit) -> list[str]:
     ports = {**unit.description.parameters, **unit.description.inputs}
     faults: list[str] = []
     for name, value in unit.start.items():

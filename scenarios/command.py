@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from cosim.exceptions import CosimError, UnitFailure, nearest
+from cosim.exceptions import CosimError, nearest
 from fmus.binaries import NotCompiled
 from fmus.build import build, cached
 from fmus.catalog import UNITS
@@ -155,9 +155,6 @@ def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Ite
 def _told_in_one_line() -> Generator[None, None, None]:
     try:
         yield
-    except UnitFailure as e:
-        click.echo(f"Error: {e}", err=True)
-        sys.exit(UNIT_FAILED)
     except (CosimError, BadParameter, BadRunFolder, NotCompiled) as e:
         raise BadCall(str(e)) from e
 

@@ -48,8 +48,7 @@ def carry_out(task: Task, progress: Progress, interrupted: Callable[[], bool]) -
     """Run a scenario to its end, its failure or its interruption and write its folder.
 
     Raises:
-        WiringError, ScheduleError, InvalidFmu, BadRunFolder: before anything was written.
-        UnitFailure: a unit could not be initialised; nothing was written.
+        WiringError, ScheduleError, InvalidFmu, UnitRefused, BadRunFolder: before anything was written.
     """
     experiment, parameters = task.experiment, task.parameters
     stop = experiment.stop_time(parameters)

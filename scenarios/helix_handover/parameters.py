@@ -50,7 +50,7 @@ class Parameters:
     radius: Metre = parameter(0.16, "distance of the offered ball from the arm's axis", minimum=0.0, maximum=2.0)
     height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-2.0, maximum=0.0)
     control_period: Second = parameter(0.5, "period of the controller", minimum=0.1, maximum=10.0)
-    threshold: Metre = parameter(0.05, "error at which the arm descends onto the ball", minimum=0.001, maximum=0.2)
+    threshold: Metre = parameter(0.05, "error at which the arm descends onto the ball", minimum=0.001, maximum=0.08)
     tuning: Tuning = parameter(Tuning.OWN, "bounds and weights of the controller: ours, or the thesis's")
     cover: Cover = parameter(Cover.NONE, "camera whose lens is covered for a while")
     cover_from: Second = parameter(4.0, "time at which the lens is covered", minimum=0.0, maximum=600.0)

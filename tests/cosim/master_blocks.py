@@ -204,3 +204,18 @@ class Echo(Stateless):
 
     def step(self, t: float, dt: float, u: EchoInputs) -> EchoOutputs:  # noqa: ARG002
         return self.outputs(t, u)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PickyParams:
+    low: Number = parameter(0.0, "lower bound")
+    high: Number = parameter(1.0, "upper bound")
+
+
+class Picky(Counter):
+    """Takes no bounds that are the wrong way round."""
+
+    def __init__(self, params: PickyParams) -> None:
+        if params.low >= params.high:
+            raise ValueError(f"low = {params.low} must be below high = {params.high}")
+        super().__init__(CounterParams())

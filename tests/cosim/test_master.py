@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.exceptions import InvalidFmu, UnitFailure, WiringError
+from cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused, WiringError
 from cosim.master import Master
 from cosim.recorder import Recorder
 from cosim.schedule import Algorithm
@@ -128,6 +128,13 @@ def test_a_failure_names_unit_call_and_time_and_keeps_the_record(fmu: FmuOf, tmp
         master.run(Fraction(1), [recorder])
     assert any("count 5 was asked to fail" in line for line in caught.value.log)
     assert Record(file)["steady.n"].tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_unit_that_refuses_its_parameters_is_named_with_its_reason(fmu: FmuOf):
+    s = System()
+    s.add("picky", fmu("Picky"), low=3.0, high=2.0)
+    with pytest.raises(UnitRefused, match=r"picky does not start: .*low = 3\.0 must be below high"), Master(s):
+        pass
 
 
 def test_a_record_has_all_scalars_with_their_units(fmu: FmuOf, tmp_path: Path):

@@ -7,7 +7,7 @@ from cosim.block import Causality, Kind
 from cosim.exceptions import ScheduleError
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.schedule import Schedule
-from cosim.system import PortName, System, Unit
+from cosim.system import PlacedUnit, PortName, System
 
 
 def description(feedthrough: dict[str, tuple[str, ...]]) -> FmuDescription:
@@ -34,9 +34,9 @@ def description(feedthrough: dict[str, tuple[str, ...]]) -> FmuDescription:
 def system(direct: str, plain: str = "", period: Fraction = Fraction(1, 10)) -> System:
     s = System()
     for name in direct.split():
-        s.units[name] = Unit(name, description({"y": ("u",)}), {}, period)
+        s.units[name] = PlacedUnit(name, description({"y": ("u",)}), {}, period)
     for name in plain.split():
-        s.units[name] = Unit(name, description({}), {}, period)
+        s.units[name] = PlacedUnit(name, description({}), {}, period)
     return s
 
 

@@ -97,6 +97,6 @@ def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(tmp_p
     assert "a tendon tore" in result.output
     summary = json.loads((out / "summary.json").read_text())
     assert summary["success"] is False
-    assert summary["reason"].startswith("a unit failed: arm: fmi3DoStep at t = 0.3 s")
+    assert summary["reason"].startswith("a unit failed: arm: fmi3DoStep at t = 0.3 s: RuntimeError: a tendon tore")
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.3)
     assert (out / "report.html").is_file()

@@ -9,7 +9,9 @@ import tomli
 
 import scenarios.helix_handover
 from controllers.servo_parameters import Params as ServoParams
+from plants.handover_partner import Params as HandParams
 from plants.stereo_camera import Params as CameraParams
+from plants.tendon_parameters import Params as ArmParams
 from scenarios.helix_handover.parameters import Parameters, Place, Tuning
 from scenarios.helix_handover.rig import calibration
 
@@ -44,6 +46,14 @@ def test_the_controllers_defaults_have_an_origin(paper: dict[str, dict[str, dict
         assert np.array_equal(getattr(servo, name), entry["value"]), name
         if hasattr(scenario, name):
             assert getattr(scenario, name) == entry["value"], name
+
+
+@pytest.mark.parametrize(("group", "plant"), [("arm", ArmParams()), ("hand", HandParams())])
+def test_the_plants_defaults_have_an_origin(
+    paper: dict[str, dict[str, dict[str, Any]]], group: str, plant: ArmParams | HandParams
+):
+    for name, entry in paper[group].items():
+        assert np.array_equal(getattr(plant, name), entry["value"]), name
 
 
 def test_the_cameras_are_where_the_paper_file_says(paper: dict[str, dict[str, dict[str, Any]]]):
