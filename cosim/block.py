@@ -8,6 +8,7 @@ import dataclasses
 import enum
 import functools
 import inspect
+import math
 import typing
 from collections.abc import Mapping
 from fractions import Fraction
@@ -75,30 +76,32 @@ class DeclarationError(TypeError):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Variable:
-    """All that a block says of one of its parameters, inputs or outputs."""
+class Declared:
+    """What is known of a parameter, input or output, be it a block's or an FMU's. `items` are an enumeration's."""
 
     name: str
     kind: Kind
     causality: Causality
-    description: str
-    start: Any
+    description: str = ""
     shape: tuple[int, ...] = ()
     unit: Unit = ONE
     minimum: float | None = None
     maximum: float | None = None
-    enumeration: type[enum.IntEnum] | None = None
-    raster: Raster | None = None
+    items: tuple[tuple[str, int], ...] = ()
 
     @property
     def size(self) -> int:
         """Number of entries; 1 for a scalar."""
-        return int(np.prod(self.shape, dtype=int))
+        return math.prod(self.shape)
 
-    @property
-    def items(self) -> tuple[tuple[str, int], ...]:
-        """Names and values of an enumeration."""
-        return tuple((e.name, int(e)) for e in self.enumeration) if self.enumeration else ()
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Variable(Declared):
+    """All that a block says of one of its parameters, inputs or outputs."""
+
+    start: Any
+    enumeration: type[enum.IntEnum] | None = None
+    raster: Raster | None = None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -208,7 +211,7 @@ def _facts(owner: str, name: str, hint: Any) -> tuple[Kind, dict[str, Any]]:
             return Kind.BINARY, {"raster": note}
     plain = typing.get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
     if isinstance(plain, type) and issubclass(plain, enum.IntEnum):
-        return Kind.ENUMERATION, {"enumeration": plain}
+        return Kind.ENUMERATION, {"enumeration": plain, "items": tuple((e.name, int(e)) for e in plain)}
     kinds = {bool: Kind.BOOLEAN, int: Kind.INTEGER, float: Kind.REAL, str: Kind.STRING, bytes: Kind.BINARY}
     if "shape" in facts:
         return Kind.REAL, facts

@@ -12,9 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from cosim.block import Causality, Kind
+from cosim.block import Causality, Declared, Kind
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
 from cosim.units import ONE, BaseExponents, Unit
 
@@ -38,27 +36,13 @@ def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FmuPort:
+class FmuPort(Declared):
     """A parameter, input or output of an FMU. `references` has one value reference a scalar (FMI 2) or one in all."""
 
-    name: str
-    kind: Kind
-    causality: Causality
     fmi_type: str
     references: tuple[int, ...]
-    shape: tuple[int, ...] = ()
-    unit: Unit = ONE
     start: str | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-    items: tuple[tuple[str, int], ...] = ()
     mime: str | None = None
-    description: str = ""
-
-    @property
-    def size(self) -> int:
-        """Number of entries; 1 for a scalar."""
-        return int(np.prod(self.shape, dtype=int))
 
     @property
     def signature(self) -> str:

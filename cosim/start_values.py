@@ -1,15 +1,11 @@
-"""Checks a value that a user gave for a parameter or an input against what the port declares, and flattens it."""
+"""Checks values of parameters and inputs against what is declared of them, and flattens them."""
 
 from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind, Variable
-from cosim.fmu_description import FmuPort
+from cosim.block import Causality, Declared, Kind, declared_variables
 from cosim.ports import Floats
-
-Declared = FmuPort | Variable
-"""A declaration of a port or a parameter, be it an FMU's or a block's."""
 
 
 def fault_of(port: Declared, value: Any) -> str | None:
@@ -34,6 +30,14 @@ def fault_of(port: Declared, value: Any) -> str | None:
     if port.kind is Kind.ENUMERATION and int(numbers[0]) not in [v for _, v in port.items]:
         return f"{_told(value)} is none of {', '.join(f'{v} ({n})' for n, v in port.items)}"
     return _range_fault(port, value, numbers)
+
+
+def parameter_faults(params: Any) -> list[str]:
+    """Return what is wrong with a block's parameters, an instance of its dataclass, by their declarations."""
+    owner: Any = params.__class__
+    variables = declared_variables(owner, Causality.PARAMETER)
+    faults = [(v.name, fault_of(v, getattr(params, v.name))) for v in variables]
+    return [f"{name}: {fault}" for name, fault in faults if fault]
 
 
 def numbers_of(port: Declared, value: Any) -> Floats:

@@ -1,12 +1,12 @@
 """Values as a block is to see them, and the parameters from which it is made."""
 
 import enum
-import math
 from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind, Variable
+from cosim.block import Variable
+from cosim.start_values import fault_of
 from fmus.buffers import Buffers
 from fmus.layout import Buffer, Slot
 
@@ -16,14 +16,9 @@ class ParameterOutOfRange(ValueError):
 
     is_refusal = True
 
-    def __init__(self, variable: Variable, value: float) -> None:
-        low = "-inf" if variable.minimum is None else f"{variable.minimum:g}"
-        high = "inf" if variable.maximum is None else f"{variable.maximum:g}"
-        super().__init__(
-            f"parameter '{variable.name}' ({variable.description}) is {value!r} {variable.unit};"
-            f" it must be from {low} to {high} {variable.unit}"
-        )
-        self.variable, self.value = variable, value
+    def __init__(self, variable: Variable, fault: str) -> None:
+        super().__init__(f"parameter '{variable.name}' ({variable.description}): {fault}")
+        self.variable, self.fault = variable, fault
 
 
 class UnknownItem(ValueError):
@@ -47,17 +42,10 @@ def read_parameters(buffers: Buffers) -> Any:
     values: dict[str, Any] = {}
     for v in layout.description.parameters:
         values[v.name] = read_value(buffers, layout.slots[v.name])
-        if v.kind in (Kind.REAL, Kind.INTEGER):
-            _check_range(v, values[v.name])
+        fault = fault_of(v, values[v.name])
+        if fault:
+            raise ParameterOutOfRange(v, fault)
     return layout.description.params_type(**values)
-
-
-def _check_range(variable: Variable, value: Any) -> None:
-    low = -math.inf if variable.minimum is None else variable.minimum
-    high = math.inf if variable.maximum is None else variable.maximum
-    for entry in np.ravel(value).tolist():
-        if not (low <= entry <= high and math.isfinite(entry)):
-            raise ParameterOutOfRange(variable, entry)
 
 
 def read_value(buffers: Buffers, slot: Slot) -> Any:

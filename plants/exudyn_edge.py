@@ -1,7 +1,6 @@
 """The typed edge to Exudyn: a system of rigid bodies, elastic joints and tendons, advanced in steps."""
 
 import contextlib
-import importlib
 import io
 import os
 import weakref
@@ -21,13 +20,15 @@ def _load() -> tuple[Any, Any]:
     os.environ[_NO_SETTINGS] = "1"
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            exudyn, items = importlib.import_module("exudyn"), importlib.import_module("exudyn.itemInterface")
+            import exudyn
+            import exudyn.itemInterface as items
     finally:
         del os.environ[_NO_SETTINGS]
         if kept is not None:
             os.environ[_NO_SETTINGS] = kept
-    exudyn.config.printToConsole = False
-    return exudyn, items
+    module: Any = exudyn
+    module.config.printToConsole = False
+    return module, items
 
 
 _exu, _items = _load()

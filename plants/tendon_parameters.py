@@ -1,10 +1,11 @@
 """Parameters of the tendon-driven arm, and what is wrong with them."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Declaration, Vector3, parameter
+from cosim.ports import Vector3, parameter
+from cosim.start_values import parameter_faults
 from cosim.units import (
     Hertz,
     Kilogram,
@@ -79,13 +80,6 @@ class Params:
 
     def check(self) -> None:
         """Raise UnusableArm, with all faults, if a value lies outside its range."""
-        faults: list[str] = []
-        for field in fields(self):
-            declared: Declaration = field.metadata["declaration"]
-            value = np.asarray(getattr(self, field.name), dtype=np.float64)
-            low = -np.inf if declared.minimum is None else declared.minimum
-            high = np.inf if declared.maximum is None else declared.maximum
-            if value.shape != np.shape(declared.start) or not np.all((low <= value) & (value <= high)):
-                faults.append(f"{field.name} = {value.tolist()} is outside {low:g} .. {high:g}")
+        faults = parameter_faults(self)
         if faults:
             raise UnusableArm(faults)

@@ -17,6 +17,8 @@ class Place(enum.IntEnum):
 
 
 def variable(kind: Kind, **facts: Any) -> Variable:
+    if kind is Kind.ENUMERATION:
+        facts["items"] = tuple((e.name, int(e)) for e in Place)
     return Variable(name="x", kind=kind, causality=Causality.PARAMETER, description="", start=None, **facts)
 
 
@@ -32,8 +34,8 @@ def variable(kind: Kind, **facts: Any) -> Variable:
         (variable(Kind.REAL, shape=(2,), minimum=0.0), [1.0, -2.0], "out of range"),
         (variable(Kind.INTEGER), 1.5, "a whole number"),
         (variable(Kind.BOOLEAN), "maybe", "neither true nor false"),
-        (variable(Kind.ENUMERATION, enumeration=Place), "behind", "none of FRONT, LEFT"),
-        (variable(Kind.ENUMERATION, enumeration=Place), 3, "none of 0 (FRONT), 4 (LEFT)"),
+        (variable(Kind.ENUMERATION), "behind", "none of FRONT, LEFT"),
+        (variable(Kind.ENUMERATION), 3, "none of 0 (FRONT), 4 (LEFT)"),
         (variable(Kind.STRING), 5, "5 is not a string"),
     ],
 )
@@ -50,7 +52,7 @@ def test_a_bad_value_is_told_with_what_would_be_right(given: Variable, value: An
         (variable(Kind.REAL, shape=(3,)), np.ones(3)),
         (variable(Kind.INTEGER, minimum=0.0), 7),
         (variable(Kind.BOOLEAN), True),
-        (variable(Kind.ENUMERATION, enumeration=Place), "left"),
+        (variable(Kind.ENUMERATION), "left"),
         (variable(Kind.STRING), "a word"),
     ],
 )
@@ -60,7 +62,7 @@ def test_a_good_value_has_no_fault(given: Variable, value: Any):
 
 def test_numbers_come_in_row_major_order():
     assert numbers_of(variable(Kind.REAL, shape=(2, 2)), [[1, 2], [3, 4]]).tolist() == [1, 2, 3, 4]
-    assert numbers_of(variable(Kind.ENUMERATION, enumeration=Place), "Left").tolist() == [4]
+    assert numbers_of(variable(Kind.ENUMERATION), "Left").tolist() == [4]
 
 
 def test_no_range_is_told_where_there_is_none():

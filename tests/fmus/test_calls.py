@@ -125,7 +125,7 @@ def test_a_parameter_out_of_range_is_refused_with_name_value_range_and_unit(work
     host = workshop.host(BLOCK, fmi)
     host.set("gain", [11.0])
     assert host.initialise() == ERROR
-    assert "parameter 'gain' (gain) is 11.0 1; it must be from 0 to 10 1" in host.log[-1]
+    assert "parameter 'gain' (gain): 11.0 is out of range: from 0 to 10" in host.log[-1]
     assert "Traceback" not in host.log[-1]
 
 

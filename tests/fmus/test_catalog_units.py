@@ -1,5 +1,8 @@
 """The catalogued units in FMPy, a host that knows nothing of this project."""
 
+import json
+import zipfile
+
 import fmpy
 import numpy as np
 import pytest
@@ -24,6 +27,24 @@ def test_every_unit_is_valid_or_says_why_it_has_no_such_form(name: str, fmi: int
         assert name in ("StereoCamera", "HandoverVision")
         return
     assert validate_fmu(str(file)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "package"),
+    [
+        ("TendonArm", "exudyn"),
+        ("StereoCamera", "opencv-python-headless"),
+        ("HandoverVision", "opencv-python-headless"),
+        ("HandoverPartner", "numpy"),
+        ("VisualServo", "numpy"),
+    ],
+)
+def test_a_unit_lists_the_package_that_it_stands_on(name: str, package: str):
+    with zipfile.ZipFile(cached(name, 3)) as archive:
+        listed = json.loads(archive.read("resources/unit.json"))["packages"]
+    names = {p["distribution"] for p in listed}
+    assert package in names
+    assert "fmpy" not in names
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
