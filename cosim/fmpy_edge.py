@@ -27,6 +27,7 @@ class ModelVariable(Protocol):
     name: str
     type: str
     causality: str
+    variability: str | None
     valueReference: int
     shape: tuple[int, ...] | None
     unit: str | None
@@ -121,7 +122,8 @@ def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: s
         fmu = fmpy.fmi3.FMU3Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
-        fmu.instantiate(loggingOn=True, logMessage=log_message)
+        with _unloading(fmu):
+            fmu.instantiate(loggingOn=True, logMessage=log_message)
         return fmu
 
 
@@ -144,7 +146,8 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
         fmu = fmpy.fmi2.FMU2Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
-        fmu.instantiate(callbacks=callbacks, loggingOn=True)
+        with _unloading(fmu):
+            fmu.instantiate(callbacks=callbacks, loggingOn=True)
         return fmu
 
 
@@ -158,6 +161,16 @@ def _loading(path: Path) -> Generator[None, None, None]:
         raise InvalidFmu(path, f"could not be instantiated: {_one_line(e)}") from e
     finally:
         os.chdir(before)
+
+
+@contextmanager
+def _unloading(fmu: Any) -> Generator[None, None, None]:
+    """Unload the library if the instance cannot be made."""
+    try:
+        yield
+    except BaseException:
+        fmu.freeLibrary()
+        raise
 
 
 def _one_line(e: BaseException) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 
 from cosim.block import Causality, Declared, Kind
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
-from cosim.units import ONE, BaseExponents, Unit
+from cosim.units import UNKNOWN, BaseExponents, Unit
 
 _KINDS = {
     "Real": Kind.REAL,
@@ -48,14 +48,19 @@ class FmuPort(Declared):
     def signature(self) -> str:
         """Kind, unit and shape, as in `real [3] m`, for messages."""
         shape = f" [{','.join(map(str, self.shape))}]" if self.shape else ""
-        unit = self.unit.symbol if self.kind is Kind.REAL and self.unit != ONE else ""
+        unit = self.unit.symbol if self.kind is Kind.REAL and self.unit.symbol != "1" else ""
         extra = self.mime if self.kind is Kind.BINARY else unit
         return f"{self.kind.value}{shape}{' ' + extra if extra else ''}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class FmuDescription:
-    """An FMU's ports and identity. `feedthrough` names, by output, the inputs it depends on at once."""
+    """An FMU's ports and identity.
+
+    `feedthrough` names, by output, the inputs that it is declared to depend on at once; `presumed_feedthrough` likewise
+    where nothing is declared, which the standards take as all inputs. `sampled` says that all outputs are discrete and
+    the step is fixed: such a unit acts at instants, on the values of the instant.
+    """
 
     path: Path
     fmi: int
@@ -67,6 +72,8 @@ class FmuDescription:
     inputs: Mapping[str, FmuPort]
     outputs: Mapping[str, FmuPort]
     feedthrough: Mapping[str, tuple[str, ...]]
+    presumed_feedthrough: Mapping[str, tuple[str, ...]]
+    sampled: bool
 
 
 def describe_fmu(path: Path) -> FmuDescription:
@@ -86,6 +93,9 @@ def describe_fmu(path: Path) -> FmuDescription:
     by_causality: dict[Causality, dict[str, FmuPort]] = {c: {} for c in Causality}
     for p in grouped:
         by_causality[p.causality][p.name] = p
+    declared, presumed = _feedthrough(md, owner, by_causality[Causality.INPUT])
+    outputs = [v for v in md.modelVariables if v.causality == "output"]
+    fixed_step = not md.coSimulation.canHandleVariableCommunicationStepSize
     return FmuDescription(
         path=path,
         fmi=2 if is_fmi2 else 3,
@@ -96,13 +106,15 @@ def describe_fmu(path: Path) -> FmuDescription:
         parameters=by_causality[Causality.PARAMETER],
         inputs=by_causality[Causality.INPUT],
         outputs=by_causality[Causality.OUTPUT],
-        feedthrough=_feedthrough(md, owner, by_causality[Causality.INPUT]),
+        feedthrough=declared,
+        presumed_feedthrough=presumed,
+        sampled=bool(outputs) and fixed_step and all(v.variability == "discrete" for v in outputs),
     )
 
 
 def _unit(u: Any) -> Unit:
     if u.baseUnit is None:
-        return Unit(u.name)
+        return Unit(u.name, defined=False)
     names = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
     base = BaseExponents(**{n: int(getattr(u.baseUnit, n) or 0) for n in names})
     return Unit(u.name, base, float(u.baseUnit.factor or 1.0), float(u.baseUnit.offset or 0.0))
@@ -124,7 +136,7 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         fmi_type=v.type,
         references=(v.valueReference,),
         shape=tuple(v.shape or ()),
-        unit=units.get(unit, Unit(unit)) if unit else ONE,
+        unit=units.get(unit, Unit(unit, defined=False)) if unit else UNKNOWN,
         start=v.start,
         minimum=float(low) if low is not None else None,
         maximum=float(high) if high is not None else None,
@@ -161,15 +173,17 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
 
 def _feedthrough(
     md: ModelDescription, owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
-) -> dict[str, tuple[str, ...]]:
-    found: dict[str, set[str]] = defaultdict(set)
+) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Return the declared and the presumed dependencies of outputs on inputs."""
+    declared: dict[str, set[str]] = defaultdict(set)
+    presumed: dict[str, tuple[str, ...]] = {}
     for unknown in md.outputs:
         name = owner.get(unknown.variable.valueReference)
         if name is None:
             continue
-        if unknown.dependencies is None:  # the standard: not given means all
-            found[name].update(inputs)
+        if unknown.dependencies is None:
+            presumed[name] = tuple(sorted(inputs))
         else:
             sources = {owner.get(d.valueReference) for d in unknown.dependencies}
-            found[name].update(s for s in sources if s is not None and s in inputs)
-    return {y: tuple(sorted(us)) for y, us in found.items() if us}
+            declared[name].update(s for s in sources if s is not None and s in inputs)
+    return {y: tuple(sorted(us)) for y, us in declared.items() if us}, {y: us for y, us in presumed.items() if us}

@@ -10,10 +10,11 @@ from cosim.block import Kind
 from cosim.exceptions import InvalidFmu, UnitFailure
 from cosim.fmpy_edge import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
-from cosim.signal_buffer import SignalBuffer, Views
+from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 
 _LOG_LINES = 30
+_FATAL = 4
 
 
 class Instance:
@@ -37,8 +38,8 @@ class Instance:
         except InvalidFmu as e:
             raise InvalidFmu(e.path, "\n  ".join([e.fault, *self.log])) from e
         self._component = self._fmu.component
-        chosen = [d.inputs[i] for i in inputs]
-        self._setters = self._buffers("Set", chosen)
+        self._failed: int | None = None
+        self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
@@ -67,17 +68,20 @@ class Instance:
 
     def set_inputs(self) -> None:
         """Hand the contents of `u` to the unit."""
-        for setter in self._setters:
-            status = setter()
-            if status > 1:
-                self._fail("setting its inputs", status)
+        self._carry_out(self._setters)
+
+    def set_some_inputs(self, names: Iterable[str]) -> None:
+        """Hand the contents of `u` to the unit, but only of these inputs; the others stay as they are."""
+        setters = self._buffers("Set", [self.description.inputs[n] for n in names])
+        for buffer in setters:
+            for name, views in buffer.views.items():
+                for mine, held in zip(views, self.u[name], strict=True):
+                    mine[:] = held
+        self._carry_out(setters)
 
     def get_outputs(self) -> None:
         """Fetch the unit's outputs into `y`."""
-        for getter in self._getters:
-            status = getter()
-            if status > 1:
-                self._fail("getting its outputs", status)
+        self._carry_out(self._getters)
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt.
@@ -91,14 +95,16 @@ class Instance:
             self._fail(f"{self._prefix}DoStep", status)
         if self._fmi == 3 and self._terminate.value:
             raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
+        self.time = t + dt
 
     def end(self) -> None:
-        """Terminate the unit."""
-        self._call("Terminate")
+        """Terminate the unit, unless a call failed: the standards forbid it then."""
+        if self._failed is None:
+            self._call("Terminate")
 
     def free(self) -> None:
-        """Free the unit and its library."""
-        if self._component is not None:
+        """Free the unit and its library; after a fatal error the standards forbid any call, and it is left."""
+        if self._component is not None and self._failed != _FATAL:
             self._component = None
             self._fmu.freeInstance()
 
@@ -120,7 +126,15 @@ class Instance:
         kind = ports[0].fmi_type
         if kind == "Enumeration":
             kind = "Integer" if self._fmi == 2 else "Int64"
-        return SignalBuffer(self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
+        make = OutputBuffer if verb == "Get" else SignalBuffer
+        call = f"{self._prefix}{verb}{kind}"
+        return make(call, self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
+
+    def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
+        for buffer in buffers:
+            status = buffer()
+            if status > 1:
+                self._fail(buffer.name, status)
 
     def _set_one(self, port: FmuPort, value: Any) -> None:
         buffer = self._buffer("Set", [port])
@@ -148,6 +162,7 @@ class Instance:
             self._fail(self._prefix + name, status)
 
     def _fail(self, call: str, status: int) -> None:
+        self._failed = status
         told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
         raise UnitFailure(self.name, call, self.time, told, tuple(self.log))
 

@@ -4,7 +4,7 @@ import array
 import contextlib
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -49,6 +49,7 @@ class Master:
         self.time = 0.0
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit."""
+        self._due: dict[str, int] = dict.fromkeys(system.units, 0)
         self._instances: dict[str, Instance] = {}
         self._copies: dict[str, _Copies] = {}
         self._cleanup = contextlib.ExitStack()
@@ -71,14 +72,14 @@ class Master:
     @property
     def signals(self) -> Signals:
         """The units' outputs as they are."""
-        return Signals({n: i.y for n, i in self._instances.items()}, self._descriptions())
+        return Signals({n: i.y for n, i in self._instances.items()}, self._descriptions(), self)
 
     def run(self, stop: Fraction, observers: Sequence[Observer] = (), until: Callable[[], bool] = never) -> None:
         """Step until `stop` seconds, or until `until()` says so after the observers have seen a communication point.
 
-        Gauss-Seidel: at a communication point t, units with feedthrough act on the values at t, then the observers see
-        all signals at t, then the other units go on from t. Jacobi: a step's results count from the time where it ends,
-        for units with feedthrough too.
+        Gauss-Seidel: at a communication point t, sampled units act on the values at t, then the observers see all
+        signals at t, then the other units go on from t. Jacobi: a step's results count from the time where it ends, for
+        sampled units too. A second call goes on where the first one ended.
 
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
@@ -86,24 +87,23 @@ class Master:
         signals = self.signals
         jacobi = self.schedule.algorithm is Algorithm.JACOBI
         last = self.schedule.ticks(stop)
-        for tick in range(last + 1):
-            first = [s for s in self.schedule.algebraic if tick % s.every == 0]
-            then = [s for s in self.schedule.integrating if tick % s.every == 0]
-            if not first and not then and tick != last:
-                continue
+        while True:
+            tick = min(last, *self._due.values())
             self.time = self.schedule.time(tick)
+            sampled = [s for s in self.schedule.sampled if self._due[s.unit] == tick]
+            continuous = [s for s in self.schedule.continuous if self._due[s.unit] == tick]
             if jacobi:
-                self._publish(first + then)
+                self._publish(sampled + continuous)
             else:
-                self._one_after_another(first)
+                self._one_after_another(sampled)
             for observe in observers:
                 observe(self.time, signals)
             if tick == last or until():
                 break
             if jacobi:
-                self._all_at_once(first + then)
+                self._all_at_once(sampled + continuous)
             else:
-                self._one_after_another(then)
+                self._one_after_another(continuous)
 
     def _one_after_another(self, due: Sequence[Slot]) -> None:
         for slot in due:
@@ -122,20 +122,25 @@ class Master:
         for slot in due:
             self._instances[slot.unit].get_outputs()
 
-    def _feed(self, unit: str) -> None:
+    def _feed(self, unit: str, known: Collection[str] | None = None) -> None:
+        """Set a unit's inputs from its sources, or only from those whose outputs are known already."""
         for target, source in self._copies[unit]:
             np.copyto(target, source, casting="unsafe")
-        self._instances[unit].set_inputs()
+        if known is None:
+            self._instances[unit].set_inputs()
+        else:
+            sources = self.system.sources_of(unit)
+            self._instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
 
     def _step(self, slot: Slot) -> None:
         began = time.process_time()
         self._instances[slot.unit].step(self.time, float(slot.period))
         self.cpu[slot.unit].append(time.process_time() - began)
+        self._due[slot.unit] += slot.every
 
     def _load(self, cleanup: contextlib.ExitStack) -> None:
-        folder = Path(
-            cleanup.enter_context(tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True))
-        )
+        temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
+        folder = Path(cleanup.enter_context(temporary))
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description
@@ -146,22 +151,24 @@ class Master:
             cleanup.callback(instance.free)
             self._instances[name] = instance
         for name, instance in self._instances.items():
-            pairs = [
-                (instance.u[p], self._instances[s.unit].y[s.port]) for p, s in self.system.sources_of(name).items()
-            ]
-            self._copies[name] = [(t, s) for targets, sources in pairs for t, s in zip(targets, sources, strict=True)]
+            copies: list[tuple[NDArray[Any], NDArray[Any]]] = []
+            for port, source in self.system.sources_of(name).items():
+                copies += zip(instance.u[port], self._instances[source.unit].y[source.port], strict=True)
+            self._copies[name] = copies
 
     def _initialize(self) -> None:
         for name, unit in self.system.units.items():
             instance = self._instances[name]
             instance.set_start(unit.start)
             instance.enter_initialization(0.0, None)
-        for slot in self.schedule.integrating + self.schedule.algebraic:  # what needs no input gives its outputs first
-            if slot in self.schedule.algebraic:
-                self._feed(slot.unit)
+        known: set[str] = set()
+        for slot in self.schedule.slots:
+            self._feed(slot.unit, known)
             self._instances[slot.unit].get_outputs()
-        for name, instance in self._instances.items():
-            self._feed(name)
+            known.add(slot.unit)
+        for slot in self.schedule.slots:
+            instance = self._instances[slot.unit]
+            self._feed(slot.unit)
             instance.exit_initialization()
             instance.get_outputs()
             self._cleanup_end(instance)

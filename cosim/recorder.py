@@ -1,4 +1,4 @@
-"""Writes the scalar signals of a run to a Parquet file, one column a signal, in groups of rows as they come."""
+"""Writes the scalar signals of a run to a Parquet file, one column a signal, safely as they come."""
 
 from pathlib import Path
 from types import TracebackType
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cosim.block import Kind
 from cosim.signals import Column, Signals
 
-_ROWS = 512
+_ROWS = 256
 _TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}
 
 
@@ -20,15 +20,19 @@ class Recorder:
     """An observer of `Master.run` that records every communication point. Use as a context manager.
 
     The first column is `time` in seconds. A column's metadata hold its unit and description, an enumeration's also its
-    items. Leaving completes the file, also when the run was cut short.
+    items. A Parquet file cannot be read before it is complete, so rows go to an Arrow stream beside it
+    (`signals.arrows`), a block at a time; leaving turns that into the Parquet file, also when the run was cut short.
+    If the process dies, the stream stays and holds all blocks that were written.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.stream = path.with_suffix(".arrows")
         self.rows = 0
-        self._writer: pq.ParquetWriter | None = None
+        self._writer: pa.ipc.RecordBatchStreamWriter | None = None
+        self._file: pa.NativeFile | None = None
         self._columns: list[Column] = []
-        self._schema: pa.Schema | None = None
+        self._schema = pa.schema([])
         self._time = np.zeros(_ROWS)
         self._block: list[NDArray[Any]] = []
         self._filled = 0
@@ -39,9 +43,15 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._writer is not None:
+        if self._writer is None:
+            return
+        try:
             self._flush()
+        finally:
             self._writer.close()
+            if self._file is not None:
+                self._file.close()
+        self._complete()
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Record one row."""
@@ -60,17 +70,28 @@ class Recorder:
         self._block = [np.zeros(_ROWS, dtype=c.values.dtype) for c in self._columns]
         time = pa.field("time", pa.float64(), metadata={"unit": "s", "description": "simulated time"})
         self._schema = pa.schema([time, *(_field(c) for c in self._columns)])
-        self._writer = pq.ParquetWriter(self.path, self._schema)
+        self._file = pa.OSFile(str(self.stream), "wb")
+        self._writer = pa.ipc.new_stream(self._file, self._schema)
 
     def _flush(self) -> None:
         n, self._filled = self._filled, 0
-        if n == 0 or self._writer is None or self._schema is None:
+        if n == 0 or self._writer is None:
             return
         arrays: list[pa.Array[Any]] = [pa.array(self._time[:n])]
         for column, block in zip(self._columns, self._block, strict=True):
             values = block[:n].astype(bool) if column.port.kind is Kind.BOOLEAN else block[:n]
             arrays.append(pa.array(values).cast(_TYPES[column.port.kind]))
-        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
+
+    def _complete(self) -> None:
+        with (
+            pa.OSFile(str(self.stream), "rb") as source,
+            pa.ipc.open_stream(source) as batches,
+            pq.ParquetWriter(self.path, self._schema) as file,
+        ):
+            for batch in batches:
+                file.write_batch(batch)
+        self.stream.unlink()
 
 
 def _field(c: Column) -> "pa.Field[Any]":

@@ -27,11 +27,14 @@ _VALUES: dict[str, Any] = {
 class SignalBuffer:
     """The variables of one FMI type of one instance, in the order given, in one block of memory.
 
-    Calling it carries out the FMI call with arguments made once. `views[name]` is the part that belongs to a port, in
-    row-major order; a connection copies one port's views into another's.
+    Calling it carries out the FMI call `name` with arguments made once. `views[port]` is the part that belongs to a
+    port, in row-major order; a connection copies one port's views into another's.
     """
 
-    def __init__(self, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
+    def __init__(
+        self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
+    ) -> None:
+        self.name = name
         first = ports[0].fmi_type
         references = [r for p in ports for r in p.references]
         n = sum(p.size for p in ports)
@@ -49,6 +52,38 @@ class SignalBuffer:
     def __call__(self) -> int:
         """Set or get all values; return the FMI status."""
         return self._function(*self._arguments)
+
+
+class OutputBuffer(SignalBuffer):
+    """A buffer for reading. Binaries and strings are copied: the unit may reuse its memory at the next call."""
+
+    def __init__(
+        self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
+    ) -> None:
+        super().__init__(name, function, component, fmi, ports)
+        self._is_text = ports[0].fmi_type == "String"
+        self._is_binary = ports[0].fmi_type == "Binary"
+        self._kept: list[Any] = [ctypes.create_string_buffer(1) for _ in range(len(self._arrays[0]))]
+
+    def __call__(self) -> int:
+        """Get all values; return the FMI status."""
+        status = super().__call__()
+        if status <= 1 and (self._is_text or self._is_binary):
+            for i in range(len(self._kept)):
+                self._keep(i)
+        return status
+
+    def _keep(self, i: int) -> None:
+        addresses = self._arrays[0]
+        address = int(addresses[i])
+        if self._is_text:
+            self._kept[i] = ctypes.create_string_buffer(ctypes.string_at(address) if address else b"")
+        else:
+            size = int(self._arrays[1][i])
+            if ctypes.sizeof(self._kept[i]) < size:
+                self._kept[i] = ctypes.create_string_buffer(size)
+            ctypes.memmove(self._kept[i], address, size)
+        addresses[i] = ctypes.addressof(self._kept[i])
 
 
 def _arrays(fmi_type: str, fmi: int, n: int) -> tuple[Views, tuple[Any, ...]]:

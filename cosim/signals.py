@@ -27,7 +27,10 @@ class Column:
 class Signals:
     """Live values of all outputs; they change as the system steps, so copy what is kept."""
 
-    def __init__(self, outputs: Mapping[str, Mapping[str, Views]], ports: Mapping[str, Mapping[str, FmuPort]]) -> None:
+    def __init__(
+        self, outputs: Mapping[str, Mapping[str, Views]], ports: Mapping[str, Mapping[str, FmuPort]], owner: object
+    ) -> None:
+        self._owner = owner  # keeps the memory alive that the addresses of pictures and strings point to
         self._views = {f"{unit}.{port}": views for unit, ys in outputs.items() for port, views in ys.items()}
         self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
 

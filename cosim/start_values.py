@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.block import Causality, Declared, Kind, declared_variables
-from cosim.ports import Floats
 
 
 def fault_of(port: Declared, value: Any) -> str | None:
@@ -40,15 +40,17 @@ def parameter_faults(params: Any) -> list[str]:
     return [f"{name}: {fault}" for name, fault in faults if fault]
 
 
-def numbers_of(port: Declared, value: Any) -> Floats:
-    """Return a value as float64 numbers in row-major order; enumerations may be given by name.
+def numbers_of(port: Declared, value: Any) -> NDArray[Any]:
+    """Return a value as numbers in row-major order; enumerations may be given by name.
 
     Raises:
         ValueError: not as many numbers as the port has, or not numbers.
     """
     if port.kind is Kind.ENUMERATION and isinstance(value, str):
         value = {name.upper(): v for name, v in port.items}[value.upper()]
-    array = np.asarray(value, dtype=np.float64)
+    given = np.asarray(value)
+    whole = port.kind in (Kind.INTEGER, Kind.ENUMERATION) and given.dtype.kind in "iu"
+    array = given if whole else np.asarray(given, dtype=np.float64)  # floats would lose digits of large integers
     if array.shape != port.shape:
         raise ValueError(f"shape {array.shape} where {port.shape} is wanted")
     return array.reshape(-1)
@@ -73,7 +75,7 @@ def _wanted(port: Declared) -> str:
     return what + unit
 
 
-def _range_fault(port: Declared, value: Any, numbers: Floats) -> str | None:
+def _range_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | None:
     low, high = port.minimum, port.maximum
     if (low is None or np.all(numbers >= low)) and (high is None or np.all(numbers <= high)):
         return None

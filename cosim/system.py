@@ -10,6 +10,7 @@ from cosim.block import Kind
 from cosim.exceptions import WiringError, nearest
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from cosim.start_values import fault_of
+from cosim.units import UNKNOWN, Unit
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,16 @@ class PortNames:
 
 @dataclass(frozen=True)
 class PlacedUnit:
-    """A unit of a system: what its FMU says, the values it starts with, and its communication step in seconds."""
+    """A unit of a system: what its FMU says, the values it starts with, and its communication step in seconds.
+
+    A sampled unit acts on the values of the instant at which a step begins.
+    """
 
     name: str
     description: FmuDescription
     start: Mapping[str, Any]
     period: Fraction
+    sampled: bool
 
     @property
     def u(self) -> PortNames:
@@ -72,10 +77,13 @@ class System:
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
-    def add(self, name: str, fmu: Path, *, period: Fraction | None = None, **start: Any) -> PlacedUnit:
+    def add(
+        self, name: str, fmu: Path, *, period: Fraction | None = None, sampled: bool | None = None, **start: Any
+    ) -> PlacedUnit:
         """Add a unit under a name, with start values of its parameters and inputs.
 
-        `period` is its communication step in seconds; by default the step that its FMU proposes.
+        `period` is its communication step in seconds, by default the step that its FMU proposes. `sampled` says whether
+        it acts at instants, by default what can be read off its FMU: see `FmuDescription`.
 
         Raises:
             InvalidFmu: the file cannot be used.
@@ -86,11 +94,11 @@ class System:
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
         if period is None:
-            period = _proposed_step(description.step)
+            period = proposed_step(description.step)
         if period is None or period <= 0:
             self._faults.append(f"{name}: its FMU proposes no communication step; give one that is above 0 s")
             period = Fraction(1, 100)
-        unit = PlacedUnit(name, description, start, period)
+        unit = PlacedUnit(name, description, start, period, description.sampled if sampled is None else sampled)
         self.units[name] = unit
         return unit
 
@@ -125,7 +133,7 @@ class System:
         b, fault_b = self._find(c.target, "input")
         if a is None or b is None:
             return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
-        reason = _mismatch(a, b)
+        reason = mismatch(a, b)
         if reason is None:
             return []
         return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
@@ -157,14 +165,14 @@ def _value_faults(unit: PlacedUnit) -> list[str]:
     return faults
 
 
-def _mismatch(a: FmuPort, b: FmuPort) -> str | None:
+def mismatch(a: FmuPort, b: FmuPort) -> str | None:
+    """Return why an output cannot feed an input, or None."""
     if a.kind is not b.kind:
         return f"{a.kind.value} cannot feed {b.kind.value}"
     if a.shape != b.shape:
         return "their shapes differ"
-    if a.kind is Kind.REAL and a.unit != b.unit:
-        same = a.unit.base == b.unit.base
-        return "their units differ" + (" (same dimension: convert before connecting)" if same else " in dimension")
+    if a.kind is Kind.REAL and (fault := _unit_mismatch(a.unit, b.unit)):
+        return fault
     if a.kind is Kind.ENUMERATION and a.items != b.items:
         return "their enumerations have other items"
     if a.kind is Kind.BINARY and a.mime != b.mime:
@@ -172,5 +180,25 @@ def _mismatch(a: FmuPort, b: FmuPort) -> str | None:
     return None
 
 
-def _proposed_step(step: float | None) -> Fraction | None:
-    return Fraction(step).limit_denominator(1_000_000) if step else None
+def _unit_mismatch(a: Unit, b: Unit) -> str | None:
+    """Compare what units mean, not how they are written; a variable without a unit fits any."""
+    if UNKNOWN in (a, b) or (a.symbol == b.symbol and not (a.defined and b.defined)):
+        return None
+    if not (a.defined and b.defined):
+        undefined = b.symbol if a.defined else a.symbol
+        return f"the unit {undefined!r} is not defined in its FMU, so it cannot be compared"
+    if a.base != b.base:
+        return "their units differ in dimension"
+    if (a.factor, a.offset) != (b.factor, b.offset):
+        return "their units differ (same dimension: convert before connecting)"
+    return None
+
+
+def proposed_step(step: float | None) -> Fraction | None:
+    """Return a step as an exact number; one with its digits cut, as 0.0333333, is taken as the fraction meant."""
+    if not step or step < 0:
+        return None
+    whole = round(1 / step)
+    if whole and abs(1 / whole - step) <= 2e-6 * step:
+        return Fraction(1, whole)
+    return Fraction(repr(step))

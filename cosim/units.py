@@ -24,18 +24,24 @@ class BaseExponents:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: value in SI = factor * value + offset, of the dimension `base`."""
+    """A unit: value in SI = factor * value + offset, of the dimension `base`.
+
+    A foreign FMU may name a unit that it does not define, or name none: then `defined` is False.
+    """
 
     symbol: str
     base: BaseExponents = BaseExponents()
     factor: float = 1.0
     offset: float = 0.0
+    defined: bool = True
 
     def __str__(self) -> str:
         return self.symbol
 
 
 ONE = Unit("1")
+UNKNOWN = Unit("", defined=False)
+"""The unit of a variable that names none."""
 
 Number = Annotated[float, ONE]
 Metre = Annotated[float, Unit("m", BaseExponents(m=1))]

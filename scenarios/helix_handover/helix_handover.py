@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf, Watch
+from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
 from scenarios.helix_handover.rig import calibration
@@ -16,7 +16,7 @@ from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
 
 
-class HelixHandover(Experiment):
+class HelixHandover(Experiment[HandoverWatch]):
     """The thesis's first experiment: one automated human-to-robot handover."""
 
     name: ClassVar[str] = "helix_handover"
@@ -29,6 +29,17 @@ class HelixHandover(Experiment):
         "arm": "TendonArm",
         "hand": "HandoverPartner",
     }
+    headline: ClassVar[tuple[str, ...]] = (
+        "final_distance",
+        "grasp_offset_lateral",
+        "grasp_offset_axial",
+        "steps",
+        "arm_time",
+        "handover_time",
+        "cpu_per_cycle",
+        "pace_arm",
+        "peak_memory",
+    )
 
     def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
         """Wire arm, hand, cameras, vision and controller."""
@@ -76,7 +87,7 @@ class HelixHandover(Experiment):
         """Return the patience for the approach and time for closing the gripper."""
         return Fraction(round(parameters.patience)) + 15
 
-    def watch(self, parameters: Parameters) -> Watch:
+    def watch(self, parameters: Parameters) -> HandoverWatch:
         """Return the judge of one handover."""
         return HandoverWatch(parameters)
 
@@ -84,7 +95,6 @@ class HelixHandover(Experiment):
         """Return the robot's own computing: seeing and controlling."""
         return ("vision", "servo")
 
-    def draw(self, parameters: Parameters, watch: Watch, record: Record, folder: Path) -> list[Figure]:
+    def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw errors, paths and tendons over time, and the camera pictures of three moments."""
-        snapshots = watch.snapshots if isinstance(watch, HandoverWatch) else []
-        return draw_handover(parameters, snapshots, record, folder)
+        return draw_handover(parameters, watch.snapshots, record, folder)

@@ -219,3 +219,22 @@ class Picky(Counter):
         if params.low >= params.high:
             raise ValueError(f"low = {params.low} must be below high = {params.high}")
         super().__init__(CounterParams())
+
+
+@dataclass(kw_only=True)
+class PushedOutputs:
+    x: Metre = output("position")
+    a: Number = output("force over mass, at once")
+
+
+class Pushed(Mass):
+    """A mass that also tells its acceleration, which the force acts on at once."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"a": ("f",)}
+
+    def outputs(self, t: float, u: MassInputs) -> PushedOutputs:  # type: ignore[override]  # noqa: ARG002
+        return PushedOutputs(x=self.x, a=u.f / self.m)
+
+    def step(self, t: float, dt: float, u: MassInputs) -> PushedOutputs:  # type: ignore[override]
+        super().step(t, dt, u)
+        return self.outputs(t + dt, u)

@@ -1,11 +1,17 @@
+import re
+import subprocess
+import sys
+import zipfile
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
+import fmpy
 import numpy as np
+import pyarrow as pa
 import pytest
 
-from cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused, WiringError
+from cosim.exceptions import InvalidFmu, ScheduleError, UnitFailure, UnitRefused, WiringError
 from cosim.master import Master
 from cosim.recorder import Recorder
 from cosim.schedule import Algorithm
@@ -169,8 +175,6 @@ def test_a_wrong_system_does_not_start(fmu: FmuOf):
 
 
 def test_an_fmu_with_a_damaged_binary_is_refused(fmu: FmuOf, tmp_path: Path):
-    import zipfile
-
     broken = tmp_path / "Mass.fmu"
     with zipfile.ZipFile(fmu("Mass")) as source, zipfile.ZipFile(broken, "w") as target:
         for item in source.infolist():
@@ -182,3 +186,97 @@ def test_an_fmu_with_a_damaged_binary_is_refused(fmu: FmuOf, tmp_path: Path):
     with pytest.raises(InvalidFmu, match="could not be instantiated"), Master(s):
         pass
     assert Path.cwd() == here
+
+
+@pytest.mark.parametrize("algorithm", list(Algorithm))
+def test_a_plant_with_feedthrough_is_recorded_as_fmpy_records_it(fmu: FmuOf, algorithm: Algorithm):
+    s = System()
+    s.add("mass", fmu("Pushed"), f=1.0, x_0=0.0)
+    result = fmpy.simulate_fmu(
+        str(fmu("Pushed")), stop_time=1.0, output_interval=0.1, start_values={"f": 1.0, "x_0": 0.0}, output=["x", "a"]
+    )
+    seen: list[tuple[float, float]] = []
+    with Master(s, algorithm) as master:
+        master.run(Fraction(1), [lambda t, y: seen.append((t, float(y["mass.x"])))])
+    assert [x for _, x in seen] == pytest.approx(result["x"].tolist(), rel=1e-12)
+    assert [t for t, _ in seen] == pytest.approx(result["time"].tolist())
+
+
+def without_dependencies(file: Path, folder: Path) -> Path:
+    """Copy an FMU but for what it declares of its outputs' dependencies."""
+    made = folder / file.name
+    with zipfile.ZipFile(file) as source, zipfile.ZipFile(made, "w") as target:
+        for item in source.infolist():
+            content = source.read(item)
+            if item.filename == "modelDescription.xml":
+                content = re.sub(rb' dependencies(Kind)?="[^"]*"', b"", content)
+            target.writestr(item, content)
+    return made
+
+
+def test_units_that_declare_no_dependencies_run_in_a_loop(fmu: FmuOf, tmp_path: Path):
+    s = System()
+    mass = s.add("mass", without_dependencies(fmu("Mass"), tmp_path))
+    spring = s.add("spring", without_dependencies(fmu("Spring"), tmp_path))
+    s.connect(mass.y.x, spring.u.x)
+    s.connect(spring.y.f, mass.u.f)
+    assert list(positions(s, Fraction(1)).values()) == held_force(10, 0.1, delay=0)
+
+
+def test_a_second_run_goes_on_where_the_first_ended(fmu: FmuOf):
+    whole = positions(oscillator(fmu), Fraction(1))
+    seen: dict[float, float] = {}
+
+    def observe(t: float, y: Signals) -> None:
+        seen[t] = float(y["mass.x"])
+
+    with Master(oscillator(fmu)) as master:
+        master.run(Fraction(1, 2), [observe])
+        master.run(Fraction(1), [observe])
+    assert seen == whole
+
+
+def test_inputs_keep_their_start_values_until_their_source_is_known(fmu: FmuOf):
+    s = System()
+    first, second = s.add("first", fmu("Pushed"), f=3.0), s.add("second", fmu("Spring"))
+    s.connect(first.y.x, second.u.x)
+    s.connect(second.y.f, first.u.f)
+    with pytest.raises(ScheduleError), Master(s):
+        pass  # a declared loop: a of the mass hangs on f, and f on x
+    s = System()
+    mass = s.add("mass", fmu("Mass"), f=3.0)
+    spring = s.add("spring", fmu("Spring"))
+    s.connect(mass.y.x, spring.u.x)
+    s.connect(spring.y.f, mass.u.f)
+    with Master(s) as master:
+        assert float(master.signals["spring.f"]) == -4.0
+
+
+def test_pictures_and_numbers_can_be_read_after_the_run(fmu: FmuOf):
+    s = System()
+    s.add("counter", fmu("Counter"))
+    with Master(s) as master:
+        master.run(Fraction(1, 2))
+        signals = master.signals
+    del master
+    assert signals["counter.picture"].tolist() == [5] * 24
+    assert int(signals["counter.n"]) == 5
+
+
+def test_a_record_of_a_killed_process_keeps_its_blocks(fmu: FmuOf, tmp_path: Path):
+    program = f"""
+import os
+from fractions import Fraction
+from pathlib import Path
+from cosim.master import Master
+from cosim.recorder import Recorder
+from cosim.system import System
+s = System()
+s.add("counter", Path({str(fmu("Counter"))!r}))
+with Master(s) as master, Recorder(Path({str(tmp_path / "signals.parquet")!r})) as recorder:
+    master.run(Fraction(10**6), [recorder], until=lambda: recorder.rows == 1000 and os._exit(9))
+"""
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 9
+    with pa.OSFile(str(tmp_path / "signals.arrows"), "rb") as source, pa.ipc.open_stream(source) as stream:
+        rows = sum(batch.num_rows for batch in stream)
+    assert 700 <= rows <= 1000

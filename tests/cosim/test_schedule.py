@@ -10,7 +10,7 @@ from cosim.schedule import Schedule
 from cosim.system import PlacedUnit, PortName, System
 
 
-def description(feedthrough: dict[str, tuple[str, ...]]) -> FmuDescription:
+def description(feedthrough: bool, presumed: bool, sampled: bool) -> FmuDescription:
     def ports(causality: Causality, *names: str) -> dict[str, FmuPort]:
         made = [
             FmuPort(name=n, kind=Kind.REAL, causality=causality, fmi_type="Float64", references=(0,)) for n in names
@@ -27,16 +27,25 @@ def description(feedthrough: dict[str, tuple[str, ...]]) -> FmuDescription:
         parameters={},
         inputs=ports(Causality.INPUT, "u"),
         outputs=ports(Causality.OUTPUT, "y"),
-        feedthrough=feedthrough,
+        feedthrough={"y": ("u",)} if feedthrough else {},
+        presumed_feedthrough={"y": ("u",)} if presumed else {},
+        sampled=sampled,
     )
 
 
-def system(direct: str, plain: str = "", period: Fraction = Fraction(1, 10)) -> System:
+def system(
+    direct: str = "", plain: str = "", presumed: str = "", sampled: str = "", period: Fraction = Fraction(1, 10)
+) -> System:
     s = System()
-    for name in direct.split():
-        s.units[name] = PlacedUnit(name, description({"y": ("u",)}), {}, period)
-    for name in plain.split():
-        s.units[name] = PlacedUnit(name, description({}), {}, period)
+    for names, facts in (
+        (direct, (True, False, False)),
+        (plain, (False, False, False)),
+        (presumed, (False, True, False)),
+        (sampled, (True, False, True)),
+    ):
+        for name in names.split():
+            d = description(*facts)
+            s.units[name] = PlacedUnit(name, d, {}, period, d.sampled)
     return s
 
 
@@ -49,9 +58,25 @@ def connect(s: System, *pairs: str) -> None:
 def test_a_chain_of_feedthrough_is_ordered_from_its_source():
     s = system("c b a", plain="plant")
     connect(s, "plant>a", "a>b", "b>c", "c>plant")
+    assert [x.unit for x in Schedule(s).continuous] == ["plant", "a", "b", "c"]
+
+
+def test_sampled_units_stand_apart_and_after_their_sources():
+    s = system(plain="plant", sampled="servo vision camera")
+    connect(s, "plant>camera", "camera>vision", "vision>servo", "servo>plant")
     schedule = Schedule(s)
-    assert [x.unit for x in schedule.algebraic] == ["a", "b", "c"]
-    assert [x.unit for x in schedule.integrating] == ["plant"]
+    assert [x.unit for x in schedule.sampled] == ["camera", "vision", "servo"]
+    assert [x.unit for x in schedule.continuous] == ["plant"]
+
+
+def test_presumed_feedthrough_orders_but_does_not_make_a_loop(caplog: pytest.LogCaptureFixture):
+    chain = system(presumed="b a")
+    connect(chain, "a>b")
+    assert [x.unit for x in Schedule(chain).slots] == ["a", "b"]
+    loop = system(presumed="a b")
+    connect(loop, "a>b", "b>a")
+    assert [x.unit for x in Schedule(loop).slots] == ["a", "b"]
+    assert "a does not declare what acts at once" in caplog.text
 
 
 def test_units_that_do_not_depend_on_each_other_keep_their_order():
@@ -71,12 +96,12 @@ def test_an_algebraic_loop_is_spelled_out():
 def test_a_loop_through_a_plant_is_no_algebraic_loop():
     s = system("controller", plain="plant")
     connect(s, "controller>plant", "plant>controller")
-    assert [x.unit for x in Schedule(s).slots] == ["controller", "plant"]
+    assert [x.unit for x in Schedule(s).slots] == ["plant", "controller"]
 
 
 def test_the_tick_divides_all_periods_exactly():
     s = system("a", period=Fraction(1, 30))
-    s.units |= system("", plain="b", period=Fraction(1, 50)).units
+    s.units |= system(plain="b", period=Fraction(1, 50)).units
     schedule = Schedule(s)
     assert schedule.tick == Fraction(1, 150)
     assert {x.unit: x.every for x in schedule.slots} == {"a": 5, "b": 3}
@@ -87,3 +112,10 @@ def test_time_does_not_drift():
     assert schedule.time(3) == 0.3
     assert schedule.time(10**9) == 1e8
     assert schedule.ticks(Fraction(1, 3)) == 4
+
+
+def test_steps_that_fit_no_common_grid_are_refused():
+    s = system("a", period=Fraction(33333, 999991))
+    s.units |= system(plain="b", period=Fraction(1, 50)).units
+    with pytest.raises(ScheduleError, match="a 33333/999991 s, b 1/50 s"):
+        Schedule(s)

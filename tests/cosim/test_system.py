@@ -4,8 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from cosim.block import Causality, Kind, Variable
 from cosim.exceptions import InvalidFmu, WiringError
-from cosim.system import System
+from cosim.fmu_description import FmuPort
+from cosim.start_values import numbers_of
+from cosim.system import System, mismatch, proposed_step
+from cosim.units import UNKNOWN, BaseExponents, Unit
+
+M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 
 FmuOf = Callable[..., Path]
 
@@ -107,3 +113,36 @@ def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
                 (p.name, p.signature, p.minimum, p.maximum) for p in y.values()
             ]
         assert a.feedthrough == b.feedthrough
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "fault"),
+    [
+        (Unit("N.m", NM), Unit("Nm", NM), None),
+        (Unit("m", M), UNKNOWN, None),
+        (Unit("m", defined=False), Unit("m", M), None),
+        (Unit("furlong", defined=False), Unit("m", M), "the unit 'furlong' is not defined in its FMU"),
+        (Unit("mm", M, 1e-3), Unit("m", M), "same dimension"),
+        (Unit("m", M), Unit("N.m", NM), "differ in dimension"),
+    ],
+)
+def test_units_are_compared_by_what_they_mean(a: Unit, b: Unit, fault: str | None):
+    made = [
+        FmuPort(name="x", kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="Float64", references=(1,), unit=u)
+        for u in (a, b)
+    ]
+    found = mismatch(*made)
+    assert (found is None) if fault is None else (found is not None and fault in found)
+
+
+@pytest.mark.parametrize(
+    ("told", "meant"),
+    [(0.0333333, Fraction(1, 30)), (0.02, Fraction(1, 50)), (0.012, Fraction(3, 250)), (1e-7, Fraction(1, 10**7))],
+)
+def test_a_proposed_step_is_taken_as_it_is_meant(told: float, meant: Fraction):
+    assert proposed_step(told) == meant
+
+
+def test_large_integers_keep_their_digits():
+    seed = Variable(name="seed", kind=Kind.INTEGER, causality=Causality.PARAMETER, start=0)
+    assert numbers_of(seed, 2**53 + 1).tolist() == [2**53 + 1]
