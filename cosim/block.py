@@ -130,8 +130,12 @@ def describe(block: type[Any]) -> Description:
     """Read a block class's declarations.
 
     Raises:
-        DeclarationError: a field has no `parameter`, `port` or `output` declaration, or a type that is no port's.
+        DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
+            declaration, or a type that is no port's.
     """
+    for name in ("feedthrough", "period", "step"):
+        if not hasattr(block, name):
+            raise DeclarationError(block.__name__, name, "a block has this attribute; see cosim.block.Block")
     params_type = _annotation(block, "__init__", "params")
     inputs_type = _annotation(block, "step", "u")
     outputs_type = _annotation(block, "step", "return")

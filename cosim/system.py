@@ -157,7 +157,7 @@ def _value_faults(unit: PlacedUnit) -> list[str]:
     faults: list[str] = []
     for name, value in unit.start.items():
         if name not in ports:
-            faults.append(f"{unit.name} has no parameter {name!r}; {nearest(name, unit.description.parameters)}")
+            faults.append(f"{unit.name} has no parameter or input {name!r}; {nearest(name, ports)}")
             continue
         fault = fault_of(ports[name], value)
         if fault:

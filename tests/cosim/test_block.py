@@ -94,3 +94,11 @@ def test_feedthrough_names_ports():
 
     with pytest.raises(DeclarationError, match="f_X"):
         describe(Wrong)
+
+
+def test_a_block_without_what_a_block_has_is_refused():
+    class Bare:
+        feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    with pytest.raises(DeclarationError, match=r"Bare\.period"):
+        describe(Bare)

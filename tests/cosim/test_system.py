@@ -50,7 +50,7 @@ def test_unknown_names_are_told_with_the_nearest_valid_ones(fmu: FmuOf):
     s.connect(mass.u.f, spring.u.x)
     s.connect(mass.y.x, spring.y.f)
     told = "\n".join(faults_of(s))
-    assert "mass has no parameter 'mas'; did you mean m" in told
+    assert "mass has no parameter or input 'mas'; did you mean m" in told
     assert "mass has no output 'xx'; did you mean x?" in told
     assert "spring has no input 'stretch'; valid: x" in told
     assert "mass.f is an input, not an output" in told
