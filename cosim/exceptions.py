@@ -16,6 +16,12 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     return f"valid: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}"
 
 
+def last_line(log: Iterable[str]) -> str:
+    """Return the last line of a log that says anything: of a traceback, what was raised."""
+    lines = [line.strip() for entry in log for line in entry.splitlines() if line.strip()]
+    return lines[-1] if lines else ""
+
+
 class CosimError(Exception):
     """Base of what this engine raises on purpose."""
 
@@ -52,8 +58,7 @@ class UnitFailure(CosimError):
     @property
     def told(self) -> str:
         """The last line of the unit's log, or the status where it logged nothing."""
-        lines = [line.strip() for entry in self.log for line in entry.splitlines() if line.strip()]
-        return lines[-1] if lines else self.status
+        return last_line(self.log) or self.status
 
     @property
     def cause(self) -> str:

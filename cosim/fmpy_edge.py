@@ -3,6 +3,7 @@
 import ctypes
 import os
 import zipfile
+import zlib
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -104,7 +105,7 @@ def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
                     f"no binary for this machine ({here}); it has {', '.join(has) or 'none'}",
                 )
             z.extractall(folder)
-    except (zipfile.BadZipFile, OSError, EOFError) as e:
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, OSError, EOFError) as e:
         raise InvalidFmu(path, f"the archive is damaged: {_one_line(e)}") from e
 
 

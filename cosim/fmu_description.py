@@ -148,27 +148,25 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
 
 def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
     groups: dict[str, list[tuple[tuple[int, ...], FmuPort]]] = defaultdict(list)
-    plain: list[FmuPort] = []
     for p in ports:
         match = _ELEMENT.match(p.name)
-        if match:
-            groups[match["base"]].append((tuple(int(i) for i in match["indices"].split(",")), p))
-        else:
-            plain.append(p)
+        indices = tuple(int(i) for i in match["indices"].split(",")) if match else ()
+        groups[match["base"] if match else p.name].append((indices, p))
+    grouped: list[FmuPort] = []
     for base, members in groups.items():
         members.sort(key=lambda m: m[0])
         first = members[0][1]
         shape = members[-1][0]
         whole = [m[0] for m in members] == indices_of(shape)
         alike = len({(p.fmi_type, p.causality, p.unit) for _, p in members}) == 1
-        if whole and alike:
+        if shape and whole and alike:
             starts = [p.start for _, p in members]
             start = None if None in starts else " ".join(str(s) for s in starts)
             references = tuple(p.references[0] for _, p in members)
-            plain.append(replace(first, name=base, references=references, shape=shape, start=start))
+            grouped.append(replace(first, name=base, references=references, shape=shape, start=start))
         else:
-            plain.extend(p for _, p in members)
-    return plain
+            grouped.extend(p for _, p in members)
+    return grouped
 
 
 def _feedthrough(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.block import Kind
-from cosim.exceptions import InvalidFmu, UnitFailure
+from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.fmpy_edge import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
@@ -36,7 +36,7 @@ class Instance:
         try:
             self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
         except InvalidFmu as e:
-            raise InvalidFmu(e.path, "\n  ".join([e.fault, *self.log])) from e
+            raise InvalidFmu(e.path, last_line(self.log) or e.fault) from e
         self._component = self._fmu.component
         self._failed: int | None = None
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])

@@ -35,7 +35,10 @@ class StepSizeError(ValueError):
 class Inputs:
     """What the motors are told, and what pulls at the gripper."""
 
-    dl_t: Vector9[Metre] = port(np.zeros(9), "tendon length changes from calibration: three of each segment")
+    dl_t: Vector9[Metre] = port(
+        np.zeros(9),
+        "tendon length changes from calibration, three of each segment; the motors have end stops",
+    )
     f_G: Vector3[Newton] = port(np.zeros(3), "external force on the gripper, in the world")
     closure: Number = port(0.0, "commanded closure of the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)
 
@@ -58,7 +61,8 @@ class TendonArm:
 
     Each element obeys N = EA eps, Q = GA gamma, M = EI kappa, M_z = GJ tau, with damping on all but shear. A tendon is
     a spring through the discs of its segment that goes slack; it pulls with k L_c (L - L_0) / L_0, L_c its calibrated
-    length. Motors follow dl_t as critically damped systems of second order. The gripper closes at a constant rate.
+    length. Motors follow dl_t as critically damped systems of second order, between end stops. The gripper closes at a
+    constant rate.
 
     The arm hangs from the world's origin. It starts at rest for dl_t = 0, with p_WG at z = -(sum of tendon_length +
     d_gripper). A shortened tendon bends its segment towards its own angle s_k = 0, 120, 240 degrees in the base frame B
@@ -75,10 +79,13 @@ class TendonArm:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     period: ClassVar[Fraction | None] = None
+    variable_step: ClassVar[bool] = False
 
     def __init__(self, params: Params) -> None:
         self._params = params
         self._chain = TendonChain(TendonDesign(params))
+        length = np.repeat(params.tendon_length, 3)
+        self._end_stops = (length * (params.shortest - 1.0), length * (params.longest - 1.0))
         self._grip = 0.0
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
@@ -101,7 +108,7 @@ class TendonArm:
         steps = round(dt / self._params.internal_step)
         if steps < 1 or abs(steps * self._params.internal_step - dt) > 1e-6 * self._params.internal_step:
             raise StepSizeError(dt, self._params.internal_step)
-        self._chain.pull(u.dl_t, _R_WB @ u.f_G)
+        self._chain.pull(np.clip(u.dl_t, *self._end_stops), _R_WB @ u.f_G)
         self._chain.edge.advance(t, steps)
         travel = dt / self._params.closing_time
         self._grip = min(max(self._grip + min(max(u.closure - self._grip, -travel), travel), 0.0), 1.0)

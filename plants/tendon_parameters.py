@@ -63,6 +63,12 @@ class Params:
     plate_mass: Vector3[Kilogram] = parameter(
         np.array([0.03, 0.03, 0.05]), "masses of the plates that end the segments", minimum=0.0, maximum=10.0
     )
+    shortest: Number = parameter(
+        0.4, "lower end stop of a motor: tendon length over calibrated length", minimum=0.1, maximum=1.0
+    )
+    longest: Number = parameter(
+        2.0, "upper end stop of a motor: tendon length over calibrated length", minimum=1.0, maximum=10.0
+    )
     gripper_mass: Kilogram = parameter(0.10, "mass of the gripper", minimum=0.0, maximum=10.0)
     gravity: MetrePerSecond2 = parameter(9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0)
     tendon_stiffness: NewtonPerMetre = parameter(

@@ -109,6 +109,7 @@ def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
     for name in ("Mass", "Spring"):
         a, b = (s.add(f"{name}{v}", fmu(name, v)).description for v in (2, 3))
         for x, y in ((a.inputs, b.inputs), (a.outputs, b.outputs), (a.parameters, b.parameters)):
+            assert list(x) == list(y)
             assert [(p.name, p.signature, p.minimum, p.maximum) for p in x.values()] == [
                 (p.name, p.signature, p.minimum, p.maximum) for p in y.values()
             ]

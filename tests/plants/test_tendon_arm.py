@@ -259,3 +259,13 @@ def test_bad_parameters_are_refused_all_at_once():
 def test_an_arm_with_slack_tendons_at_rest_is_refused():
     with pytest.raises(UnusableArm, match="segment 2 would hang slack"):
         TendonArm(Params(natural_length=np.array([0.14, 0.20, 0.262])))
+
+
+def test_motors_stop_at_their_ends():
+    far, end = TendonArm(Params()), TendonArm(Params())
+    length = np.repeat(Params().tendon_length, 3)
+    for k in range(50):
+        a = far.step(k * 0.02, 0.02, Inputs(dl_t=np.full(9, -1000.0)))
+        b = end.step(k * 0.02, 0.02, Inputs(dl_t=-0.6 * length))
+    assert np.array_equal(a.p_WG, b.p_WG)
+    assert a.p_WG[2] > -0.55
