@@ -32,6 +32,9 @@ class Params:
     filtered error first is small: hence settle_steps.
     """
 
+    control_period: Second = parameter(
+        0.5, "time between two updates of the command (own choice; 1.45)", minimum=0.01, maximum=60.0
+    )
     alpha: Number = parameter(
         0.4, "step size: part of the way to the goal in a control period", minimum=0.0, maximum=1.0
     )
@@ -96,7 +99,15 @@ class Params:
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         infinite = [n for n, v in values.items() if not np.all(np.isfinite(v))]
         positive = ["d_gripper", "d", "l_calib", "A_pose_upd", "K_initialize", "epsilon_pose_bound", "epsilon_control"]
-        positive += ["N_max_iter", "threshold", "threshold_grasp", "settle_steps", "patience", "max_steps"]
+        positive += [
+            "control_period",
+            "N_max_iter",
+            "threshold",
+            "threshold_grasp",
+            "settle_steps",
+            "patience",
+            "max_steps",
+        ]
         positive += [n for n in values if n.startswith(("P_", "Q_", "R_"))]
         negative = [n for n in positive if np.any(np.asarray(values[n]) <= 0.0)]
         faults = [f"{n} = {_text(values[n])} is not finite" for n in infinite]

@@ -22,6 +22,7 @@ __all__ = ["Inputs", "Outputs", "Params", "Phase", "UnusableParameters", "Visual
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1), for both points of a pose
 _UP = np.array([0.0, 0.0, 1.0])
+_SAME_TIME = 1e-9  # s, what a host may lose by adding up steps
 
 
 class Phase(enum.IntEnum):
@@ -67,9 +68,10 @@ class Outputs:
 class VisualServo:
     """Algorithm 3: filter, estimate the state (eq. 16), step towards the goal (algorithm 1), close when it is reached.
 
-    A step is one control period. The goal pose has the gripper pointing down, at the ball or (APPROACH) d_grasp_offset
-    above it: X_goal = [p_WG_goal + d_gripper z, p_WG_goal]. The error is the norm |X_goal - X_meas| over all six
-    coordinates, in m, where the source prints its square and compares it with metres.
+    Inputs are looked at, and the command is updated, once in each control_period, at the beginning of a step; between,
+    the outputs are held. A longer step is one control period. The goal pose has the gripper pointing down, at the ball
+    or (APPROACH) d_grasp_offset above it: X_goal = [p_WG_goal + d_gripper z, p_WG_goal]. The error is the norm |X_goal
+    - X_meas| over all six coordinates, in m, where the source prints its square and compares it with metres.
 
     Own additions: the command is held while the ring is not seen, since there is nothing to close the loop with; an
     error above threshold_retreat in DESCEND (the ball was moved) leads back to APPROACH; an error that makes no
@@ -99,6 +101,7 @@ class VisualServo:
         self._wrist = PositionFilter(-p.l_calib.sum() * _UP, p.P_init, p.Q_wrist, p.R_wrist)
         self._direction = PositionFilter(-p.d_gripper * _UP, p.P_init, p.Q_direction, p.R_direction)
         self._phase = Phase.WAIT
+        self._t_next = -math.inf
         self._t_close = 0.0
         self._settled = 0
         self._steps = 0
@@ -121,11 +124,15 @@ class VisualServo:
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        """Run the main loop of algorithm 3 once."""
+        """Run the main loop of algorithm 3 once if a control period has passed since it ran."""
+        if t < self._t_next - _SAME_TIME:
+            return self.outputs(t + dt, u)
+        following = self._t_next + self.params.control_period
+        self._t_next = following if following > t + _SAME_TIME else t + self.params.control_period
         self._filter(u)
         if u.seen_R:
             self._estimate()
-        self._decide(t + dt)
+        self._decide(t)
         if u.seen_R and self._phase in (Phase.APPROACH, Phase.DESCEND):
             self._move()
         return self.outputs(t + dt, u)
@@ -140,9 +147,8 @@ class VisualServo:
             self._wrist.update(u.p_WR_meas, u.cov_R if p.use_covariance else None)
             direction = self._direction.position
             self._direction.update(u.p_WG_meas - u.p_WR_meas, u.cov_R + u.cov_G if p.use_covariance else None)
-            length = math.sqrt(
-                self._direction.position @ self._direction.position
-            )  # eq. (13): the gripper's length is fixed
+            # eq. (13): the gripper's length is fixed
+            length = math.sqrt(self._direction.position @ self._direction.position)
             self._direction.position = self._direction.position * (p.d_gripper / length) if length > 1e-9 else direction
 
     def _estimate(self) -> None:
@@ -220,7 +226,7 @@ class VisualServo:
     def get_state(self) -> bytes:
         """Return filters, states, phase and counters."""
         filters = [f.get_state() for f in (self._ball, self._wrist, self._direction)]
-        counters = (self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best)
+        counters = (self._t_next, self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best)
         return pickle.dumps((filters, self._q_sys, self._q_est, int(self._phase), counters))
 
     def set_state(self, state: bytes) -> None:
@@ -230,4 +236,5 @@ class VisualServo:
         for f, s in zip((self._ball, self._wrist, self._direction), filters, strict=True):
             f.set_state(s)
         self._phase = Phase(phase)
+        self._t_next, *counters = counters
         self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best = counters

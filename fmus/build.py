@@ -119,7 +119,8 @@ def file_name(name: str, fmi: int) -> str:
 
 
 def _model(entry: Entry, token: str) -> Model:
-    description = describe(_import_block(entry.block))
+    block = _import_block(entry.block)
+    description = describe(block)
     return Model(
         name=entry.name,
         summary=entry.summary or description.doc.partition("\n")[0],
@@ -127,6 +128,7 @@ def _model(entry: Entry, token: str) -> Model:
         token=token,
         description=description,
         layout=Layout(description),
+        variable_step=description.period is None and getattr(block, "variable_step", True),
     )
 
 

@@ -14,7 +14,17 @@ from pathlib import Path
 
 RUNTIME = Path(__file__).with_name("runtime")
 
-SHARED_SOURCES = ("instance.c", "log.c", "platform.c", "python_api.c", "slave.c", "state.c", "text.c", "variables.c")
+SHARED_SOURCES = (
+    "instance.c",
+    "log.c",
+    "platform.c",
+    "process_lock.c",
+    "python_api.c",
+    "slave.c",
+    "state.c",
+    "text.c",
+    "variables.c",
+)
 SOURCES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_unsupported.c", "fmi3_values.c")}
 
 # by FMI 3.0's name of the platform: zig's name, the suffix of a shared library

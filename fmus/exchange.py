@@ -3,6 +3,7 @@
 What a step costs beyond the block's own work is spent here, so all that can be prepared is prepared once.
 """
 
+import enum
 import functools
 import operator
 import struct
@@ -10,6 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.block import Causality, Variable
 from cosim.ports import Raster
@@ -25,6 +27,8 @@ class UnfitOutput(TypeError):
 
     def __init__(self, variable: Variable, value: object) -> None:
         declared = f"array of shape {variable.shape}" if variable.shape else variable.kind.value
+        if variable.items:
+            declared = "one of " + ", ".join(f"{number} {name}" for name, number in variable.items)
         if variable.raster:
             declared = f"uint8 array of shape {(variable.raster.height, variable.raster.width, 3)}"
         given = type(value).__name__
@@ -82,9 +86,10 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
             _blame(scalars, y)
         for variable, shape, view in arrays:
             value = getattr(y, variable.name)
-            if getattr(value, "shape", None) != shape and np.shape(value) != shape:
+            array: NDArray[Any] = np.asarray(value)
+            if array.shape != shape or array.dtype.kind not in "fiu":
                 raise UnfitOutput(variable, value)
-            view[...] = value
+            view[...] = array
         for variable, put in others:
             value = getattr(y, variable.name)
             try:
@@ -134,14 +139,28 @@ def _writer(buffers: Buffers, slot: Slot) -> Callable[[Any], None]:
     """Return what writes one output that is not real; it raises TypeError, ValueError or OverflowError."""
     at = slot.offset
     if slot.buffer is Buffer.INT64:
-        return lambda value: buffers.integers.__setitem__(at, operator.index(value))
+        number = functools.partial(_number, slot.variable.enumeration)
+        return lambda value: buffers.integers.__setitem__(at, number(value))
     if slot.buffer is Buffer.BOOLEAN:
-        return lambda value: buffers.booleans.__setitem__(at, bool(value))
+        return lambda value: buffers.booleans.__setitem__(at, _instance(value, bool, np.bool_))
     if slot.buffer is Buffer.STRING:
-        return lambda value: buffers.strings.__setitem__(at, str(value).encode())
+        return lambda value: buffers.strings.__setitem__(at, _instance(value, str).encode())
     if slot.variable.raster:
         return _picture_writer(buffers, slot, slot.variable.raster)
     return functools.partial(_write_bytes, buffers, slot)
+
+
+def _instance(value: Any, *types: type[Any]) -> Any:
+    if not isinstance(value, types):
+        raise TypeError("not of the declared type")
+    return value
+
+
+def _number(items: type[enum.IntEnum] | None, value: Any) -> int:
+    if isinstance(value, bool):
+        raise TypeError("a truth value is not a number")
+    number = operator.index(value)
+    return number if items is None else items(number)
 
 
 def _picture_writer(buffers: Buffers, slot: Slot, raster: Raster) -> Callable[[Any], None]:
@@ -155,7 +174,8 @@ def _picture_writer(buffers: Buffers, slot: Slot, raster: Raster) -> Callable[[A
     return write
 
 
-def _write_bytes(buffers: Buffers, slot: Slot, value: bytes) -> None:
+def _write_bytes(buffers: Buffers, slot: Slot, value: Any) -> None:
+    _instance(value, bytes)
     if len(value) > capacity(slot.variable):
         raise ValueError(f"{len(value)} bytes where {capacity(slot.variable)} have room")
     buffers.binaries[slot.offset][: len(value)] = np.frombuffer(value, dtype=np.uint8)

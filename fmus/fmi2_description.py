@@ -55,7 +55,7 @@ def fmi2_description(model: Model) -> bytes:
         "CoSimulation",
         modelIdentifier=model.name,
         needsExecutionTool="true",  # Python
-        canHandleVariableCommunicationStepSize=boolean(model.description.period is None),
+        canHandleVariableCommunicationStepSize=boolean(model.variable_step),
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",

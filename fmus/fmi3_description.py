@@ -44,7 +44,7 @@ def fmi3_description(model: Model) -> bytes:
         needsExecutionTool="true",  # Python
         canGetAndSetFMUState="true",
         canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize=boolean(period is None),
+        canHandleVariableCommunicationStepSize=boolean(model.variable_step),
         attrib={} if period is None else {"fixedInternalStepSize": number(float(period))},
     )
     add_units(root, model.description.variables)

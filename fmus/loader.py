@@ -8,10 +8,12 @@ FMUs or of other versions of this one, are neither seen nor touched. Standard li
 import builtins
 import importlib
 import importlib.machinery
+import importlib.metadata
 import importlib.util
 import json
 import linecache
 import os
+import re
 import site
 import sys
 import threading
@@ -49,6 +51,16 @@ def start(resources: str, token: str) -> Any:
     return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["fmi"])
 
 
+def warning(resources: str) -> str:
+    """Return what the log is to say of packages that are older than those that the FMU was built with, or nothing."""
+    with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
+        packages: list[dict[str, str]] = json.load(file)["packages"]
+    found = [(p["distribution"], p["version"], _installed(p["distribution"])) for p in packages]
+    return "; ".join(
+        f"{name}: built with {built}, found {here}" for name, built, here in found if _release(here) < _release(built)
+    )
+
+
 def explain(error: BaseException) -> str:
     """Return what the log says of an exception: its message if that is enough, else the traceback."""
     if getattr(error, "is_refusal", False):
@@ -60,6 +72,8 @@ def _require(unit: dict[str, Any], resources: str) -> None:
     """Make sure that the packages are importable; those of the environment that built the FMU are the last resort."""
     if not _missing(unit):
         return
+    if sys.flags.ignore_environment:  # so the runtime starts Python; an installation may rest on this variable
+        sys.path += [f for f in os.environ.get("PYTHONPATH", "").split(os.pathsep) if f and f not in sys.path]
     noted = _noted(os.path.join(resources, "python.txt"))
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     if noted.get("version") == [version]:
@@ -88,6 +102,19 @@ def _findable(module: str) -> bool:
         return importlib.util.find_spec(module) is not None
     except (ImportError, ValueError):
         return False
+
+
+def _installed(distribution: str) -> str:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+
+
+def _release(version: str) -> tuple[int, ...]:
+    """Return major and minor; a version that is not known, or not made of numbers, counts as the newest."""
+    numbers = re.match(r"(\d+)(?:\.(\d+))?", version)
+    return tuple(int(n or 0) for n in numbers.groups()) if numbers else (sys.maxsize,)
 
 
 def _noted(path: str) -> dict[str, list[str]]:

@@ -28,6 +28,7 @@ class Model:
         token: GUID of FMI 2, instantiation token of FMI 3.
         description: the block's declarations.
         layout: its variables' places, which give the value references.
+        variable_step: whether a step may have any size.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Model:
     token: str
     description: Description
     layout: Layout
+    variable_step: bool
 
 
 def text(root: ET.Element) -> bytes:

@@ -9,6 +9,19 @@ from fmus.layout import Layout
 from fmus.parameters import read_parameters
 from fmus.table import table
 
+PERIOD_TOLERANCE = 1e-6
+"""Relative; hosts add up step sizes, and write them as decimals."""
+
+
+class UnfitStep(ValueError):
+    """A sampled block was to make a step that is not its period."""
+
+    is_refusal = True
+
+    def __init__(self, block: str, dt: float, period: float) -> None:
+        super().__init__(f"a step of {dt:.9g} s: {block} is sampled, each of its steps is its period, {period!r} s")
+        self.dt, self.period = dt, period
+
 
 class Slave:
     """One instance: a block, its buffers, and the way between them.
@@ -25,7 +38,9 @@ class Slave:
     def __init__(self, block: type[Any], fmi: int) -> None:
         self._type = block
         self._fmi = fmi
-        self._buffers = Buffers(Layout(describe(block)))
+        description = describe(block)
+        self._period = None if description.period is None else float(description.period)
+        self._buffers = Buffers(Layout(description))
         self._clock = self._buffers.floats[:2]
         self._read = input_reader(self._buffers)
         self._write = output_writer(self._buffers)
@@ -52,8 +67,14 @@ class Slave:
         self._write(self._block.outputs(float(self._clock[0]), self._read()))
 
     def step(self) -> None:
-        """Advance from t by dt, as the buffers have them, and write the outputs."""
+        """Advance from t by dt, as the buffers have them, and write the outputs.
+
+        Raises:
+            UnfitStep: the block is sampled and dt is not its period; nothing has changed.
+        """
         t, dt = self._clock.tolist()
+        if self._period is not None and abs(dt - self._period) > PERIOD_TOLERANCE * self._period:
+            raise UnfitStep(self._type.__name__, dt, self._period)
         self._write(self._block.step(t, dt, self._read()))
 
     def reset(self) -> None:
@@ -70,17 +91,23 @@ class Slave:
         """Take over what `get_state` gave, here or in another instance.
 
         Raises:
-            UnfitState: it is a state of another unit.
+            UnfitState: it is a state of another unit; nothing has changed.
+            ParameterOutOfRange, UnknownItem: it has such a parameter; nothing has changed.
         """
         parts = split(state)
         if len(parts) not in (1, 2):
             raise UnfitState
+        before = self._buffers.to_bytes()
         self._buffers.from_bytes(parts[0])
         if len(parts) == 1:
             self._made_from = None
             return
         if self._made_from != self._buffers.parameters():
-            self._make()
+            try:
+                self._make()
+            except BaseException:
+                self._buffers.from_bytes(before)
+                raise
         self._block.set_state(parts[1])
 
     def get_string(self, index: int) -> bytes:
@@ -97,7 +124,7 @@ class Slave:
         self._buffers.strings[index] = value
 
     def _make(self) -> None:
-        self._made_from = None
-        self._block = self._type(read_parameters(self._buffers))
-        self._fresh = self._block.get_state()
-        self._made_from = self._buffers.parameters()
+        """Make a block of the parameters; if that fails, the block of before stays, with what it was made from."""
+        block: Block = self._type(read_parameters(self._buffers))
+        self._fresh = block.get_state()
+        self._block, self._made_from = block, self._buffers.parameters()

@@ -10,7 +10,7 @@ from cosim.block import Causality, Variable
 from fmus.buffers import Buffers
 from fmus.layout import Buffer
 
-HEADER = struct.Struct("=9Q")
+HEADER = struct.Struct("=11Q")
 BINARY_BUFFER = struct.Struct("=3Q")
 VARIABLE = struct.Struct("=BBHIII")
 
@@ -41,10 +41,15 @@ def table(buffers: Buffers, fmi: int) -> bytes:
         BINARY_BUFFER.pack(buffer.ctypes.data, buffer.nbytes, v.raster is not None)
         for v, buffer in zip(buffers.binary_variables, buffers.binaries, strict=True)
     ]
-    inputs = layout.span(Causality.INPUT, Buffer.FLOAT64)
+    spans = [layout.span(causality, Buffer.FLOAT64) for causality in (Causality.INPUT, Causality.OUTPUT)]
     addresses = [a.ctypes.data for a in (buffers.floats, buffers.integers, buffers.booleans, buffers.sizes)]
-    counts = [inputs.start, inputs.stop - inputs.start, len(rows), len(binaries), len(names)]
-    return HEADER.pack(*addresses, *counts) + b"".join(binaries) + b"".join(rows) + bytes(names)
+    places = [n for span in spans for n in (span.start, span.stop - span.start)]
+    return (
+        HEADER.pack(*addresses, *places, len(rows), len(binaries), len(names))
+        + b"".join(binaries)
+        + b"".join(rows)
+        + bytes(names)
+    )
 
 
 def element_names(variable: Variable) -> list[str]:

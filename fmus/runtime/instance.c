@@ -30,15 +30,21 @@ void instance_free(Instance *instance) {
     free(instance);
 }
 
-static bool inputs_finite(const Instance *instance, const char *function) {
+static bool all_finite(const Instance *instance, const char *function, size_t first, size_t n) {
     Text bad = {0};
-    if (!find_bad_input(instance, &bad)) return true;
+    if (!find_not_finite(instance, first, n, &bad)) return true;
     refuse(instance, function, "%s", text_of(&bad));
     text_clear(&bad);
     return false;
 }
 
-static Status fail(Instance *instance) {
+static bool inputs_finite(const Instance *instance, const char *function) {
+    return all_finite(instance, function, instance->first_input, instance->n_inputs);
+}
+
+/* The block has got there by itself, so it is of no further use. */
+static Status check_outputs(Instance *instance, const char *function) {
+    if (all_finite(instance, function, instance->first_output, instance->n_outputs)) return STATUS_OK;
     instance->mode = FAILED;
     return STATUS_ERROR;
 }
@@ -62,7 +68,8 @@ Status instance_enter_initialisation(Instance *instance, const char *function) {
 Status instance_refresh_outputs(Instance *instance, const char *function) {
     if (instance->mode != INITIALISATION || !instance->outputs_stale) return STATUS_OK;
     if (!inputs_finite(instance, function)) return STATUS_ERROR;
-    if (slave_call(instance, function, "initialise") != STATUS_OK) return fail(instance);
+    if (slave_call(instance, function, "initialise") != STATUS_OK) return STATUS_ERROR;
+    if (check_outputs(instance, function) != STATUS_OK) return STATUS_ERROR;
     instance->outputs_stale = false;
     instance->has_outputs = true;
     return STATUS_OK;
@@ -85,11 +92,15 @@ Status instance_step(Instance *instance, const char *function, double t, double 
         return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
                       instance->stop_time);
     if (!inputs_finite(instance, function)) return STATUS_ERROR;
+    double before = instance->floats[0];
     instance->floats[0] = t;
     instance->floats[1] = dt;
-    if (slave_step(instance, function) != STATUS_OK) return fail(instance);
+    if (slave_step(instance, function) != STATUS_OK) {
+        instance->floats[0] = before;
+        return STATUS_ERROR;
+    }
     instance->floats[0] = t + dt;
-    return STATUS_OK;
+    return check_outputs(instance, function);
 }
 
 Status instance_terminate(Instance *instance, const char *function) {
@@ -99,7 +110,7 @@ Status instance_terminate(Instance *instance, const char *function) {
 }
 
 Status instance_reset(Instance *instance, const char *function) {
-    if (slave_call(instance, function, "reset") != STATUS_OK) return fail(instance);
+    if (slave_call(instance, function, "reset") != STATUS_OK) return STATUS_ERROR;
     instance->mode = INSTANTIATED;
     instance->has_outputs = instance->outputs_stale = false;
     instance->stop_time = INFINITY;

@@ -3,8 +3,9 @@
  * fmi2.c and fmi3_*.c translate the standards' functions into these. `function` is always the name of the standard's
  * function that the host called; it begins the log line of every refusal.
  *
- * A refused call (wrong mode, unknown variable, NULL) changes nothing. A failure in the block's own code puts the
- * instance into the mode FAILED: it can be reset, set back to a saved state, or freed.
+ * A refused call (wrong mode, unknown variable, NULL) changes nothing, be it refused here or by a Python exception
+ * with a true `is_refusal`. A failure in the block's own code puts the instance into the mode FAILED: it can be reset,
+ * set back to a saved state, or freed.
  */
 #ifndef INSTANCE_H
 #define INSTANCE_H
@@ -47,6 +48,7 @@ typedef struct {
 typedef struct {
     uint64_t floats, integers, booleans, sizes; /* addresses; floats begin with the time and the step size */
     uint64_t first_input, inputs;               /* where the real inputs lie in `floats` */
+    uint64_t first_output, outputs;             /* likewise */
     uint64_t variables, binaries, names;        /* entries and bytes of what follows this structure */
 } TableHeader;
 
@@ -78,7 +80,7 @@ struct Instance {
     int64_t *integers;
     uint8_t *booleans;
     uint64_t *sizes;
-    size_t first_input, n_inputs;
+    size_t first_input, n_inputs, first_output, n_outputs;
 
     SavedState *states;
 };
@@ -99,7 +101,8 @@ bool allowed(const Instance *instance, const char *function, unsigned modes);
 bool given(const Instance *instance, const char *function, const void *pointer, const char *what);
 Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]);
 
-/* slave.c: calls into Python. Each takes and releases the interpreter's lock. */
+/* slave.c: calls into Python. Each takes and releases the interpreter's lock. Those that change the block (call, step,
+ * set_state) put the instance into the mode FAILED if they fail otherwise than by a refusal. */
 
 bool slave_start(Instance *instance, const char *function, const char *resources, const char *token);
 void slave_release(Instance *instance);
@@ -144,8 +147,8 @@ Status get_strings(Instance *instance, const char *function, const uint32_t vr[]
 Status set_strings(Instance *instance, const char *function, const uint32_t vr[], size_t n, const char *const values[],
                    size_t);
 
-/* The real input that is not finite, described, or false if all are. */
-bool find_bad_input(const Instance *instance, Text *description);
+/* The first of `n` real entries that is not finite, described, or false if all are. */
+bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *description);
 
 /* state.c */
 

@@ -82,6 +82,8 @@ bool platform_exists(const char *path) {
     return there;
 }
 
+char *platform_real_path(const char *path) { return copy_of(path); }
+
 char *platform_read_file(const char *path) {
     wchar_t *w = wide(path);
     FILE *file = w ? _wfopen(w, L"rb") : NULL;
@@ -167,6 +169,8 @@ bool platform_exists(const char *path) {
     struct stat facts;
     return stat(path, &facts) == 0;
 }
+
+char *platform_real_path(const char *path) { return realpath(path, NULL); }
 
 char *platform_read_file(const char *path) {
     FILE *file = fopen(path, "rb");

@@ -18,6 +18,7 @@ void *platform_loaded_python(void);
 
 char *platform_environment(const char *name);
 bool platform_exists(const char *path);
+char *platform_real_path(const char *path); /* behind symbolic links, or NULL */
 char *platform_read_file(const char *path);
 
 /* What `interpreter script` writes to its standard output, or NULL if it could not be run or failed. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "platform.h"
+#include "process_lock.h"
 
 PythonApi py;
 
@@ -32,75 +33,130 @@ static Interpreter interpreter_of(char *lines) {
     return found;
 }
 
+/* Fills `py`, or leaves it as it was. */
 static bool load_functions(void *library, const char *from, Text *tried) {
+    PythonApi found;
 #define LOAD(Result, name, Arguments)                                                                     \
-    if (!(py.name = (Result(*) Arguments)platform_function(library, #name))) {                            \
+    if (!(found.name = (Result(*) Arguments)platform_function(library, #name))) {                         \
         text_add(tried, "\n  %s: has no function %s; it is not a usable Python", from, #name);            \
         return false;                                                                                     \
     }
     PYTHON_FUNCTIONS(LOAD)
 #undef LOAD
-    int minor = strncmp(py.Py_GetVersion(), "3.", 2) == 0 ? atoi(py.Py_GetVersion() + 2) : 0;
-    if (minor >= OLDEST_MINOR) return true;
-    text_add(tried, "\n  %s: Python %.6s is too old, 3.%d or later is needed", from, py.Py_GetVersion(), OLDEST_MINOR);
+    const char *version = found.Py_GetVersion();
+    int minor = strncmp(version, "3.", 2) == 0 ? atoi(version + 2) : 0;
+    if (minor >= OLDEST_MINOR) {
+        py = found;
+        return true;
+    }
+    text_add(tried, "\n  %s: Python %.6s is too old, 3.%d or later is needed", from, version, OLDEST_MINOR);
     return false;
 }
 
-/* The interpreter that a library belongs to lies in a folder `bin` beside or above it (Windows asks for no help). */
-static char *executable_near(const char *library) {
-    char *folder = copy_of(library);
-    char *slash;
+/* Whether folder/pattern is there; `pattern` has a place for Python's minor version. */
+static bool exists_in(const char *folder, const char *pattern, int minor) {
+    Text path = {0};
+    text_add(&path, "%s", folder);
+    text_add(&path, pattern, minor);
+    bool there = platform_exists(text_of(&path));
+    text_clear(&path);
+    return there;
+}
+
+static bool has_standard_library(const char *folder, int minor) {
+    static const char *const places[] = {"/lib/python3.%d/os.py", "/lib64/python3.%d/os.py", "/lib/python3.%dt/os.py",
+                                         "/Lib/os.py",            "/lib/python3%d.zip",      "/python3%d.zip"};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++)
+        if (exists_in(folder, places[i], minor)) return true;
+    return false;
+}
+
+/* The folder, beside or above a library, below which its standard library lies, or NULL. */
+static char *home_of(const char *library) {
     int minor = atoi(py.Py_GetVersion() + 2);
-    for (int up = 0; up < 4 && folder && (slash = strrchr(folder, '/')) != NULL; up++) {
-        *slash = 0;
-        Text candidate = {0};
-        text_add(&candidate, "%s/bin/python3.%d", folder, minor);
-        if (platform_exists(text_of(&candidate))) {
-            free(folder);
-            return candidate.chars;
-        }
-        text_clear(&candidate);
+    char *folder = copy_of(library);
+    for (int up = 0; up < 5 && folder; up++) {
+        char *slash = strrchr(folder, '/'), *backslash = strrchr(folder, '\\');
+        char *last = backslash > slash ? backslash : slash;
+        if (!last || last == folder) break;
+        *last = 0;
+        if (has_standard_library(folder, minor)) return folder;
     }
     free(folder);
     return NULL;
 }
 
-/* The interpreter's own path is how Python finds its standard library and, in a virtual environment, its packages. */
+/* By its interpreter's path Python finds its standard library and, in a virtual environment, its packages. */
 static void tell_program_name(void *library, const char *executable) {
     void (*set)(const wchar_t *) = (void (*)(const wchar_t *))platform_function(library, "Py_SetProgramName");
-    if (set && executable && platform_exists(executable)) set(py.Py_DecodeLocale(executable, NULL));
+    if (set && executable) set(py.Py_DecodeLocale(executable, NULL));
 }
 
-static void initialise(void) {
+/* Python ends the process if it cannot start, so what could keep it from starting is looked at before. Of the
+ * environment it must not take PYTHONHOME and the like, which are for another Python or the host's own. */
+static bool initialise(void *library, const char *from, Text *tried) {
+    AnyFunction flag = platform_function(library, "Py_IgnoreEnvironmentFlag"); /* a variable */
+    char *home = flag ? NULL : platform_environment("PYTHONHOME");
+    if (home) {
+        text_add(tried, "\n  %s: PYTHONHOME is set, to %s; it must not be", from, home);
+        free(home);
+        return false;
+    }
+    if (flag) {
+        int *ignore;
+        memcpy(&ignore, &flag, sizeof ignore);
+        *ignore = 1;
+    }
     py.Py_InitializeEx(0);  /* 0: signals stay the host's */
     py.PyEval_SaveThread(); /* every call takes the lock for itself, from whatever thread it comes */
+    return true;
+}
+
+/* Starts the Python of a library from a file. */
+static bool start_from(void *library, const Interpreter *found, const char *from, Text *tried) {
+    char *real = platform_real_path(found->library);
+    char *home = home_of(found->library);
+    if (!home && real) home = home_of(real);
+    free(real);
+    bool bare = !strpbrk(found->library, "/\\"); /* found by the system, which knows where it belongs */
+    bool started = false;
+    if (home || bare) {
+        Text guess = {0};
+        if (home) text_add(&guess, "%s/bin/python3.%d", home, atoi(py.Py_GetVersion() + 2));
+        bool known = found->executable && platform_exists(found->executable);
+        tell_program_name(library, known ? found->executable : guess.chars);
+        text_clear(&guess);
+        started = initialise(library, from, tried);
+    } else {
+        text_add(tried, "\n  %s: the standard library of %s is not beside or above it", from, found->library);
+    }
+    free(home);
+    return started;
 }
 
 static bool start(const Interpreter *found, const char *from, Text *tried) {
     text_add(tried, "\n  %s: ", from);
     void *library = platform_open_library(found->library, tried);
     if (!library) return false;
-    if (!load_functions(library, found->library, tried)) {
-        platform_close_library(library); /* its symbols would stand before those of the next */
-        return false;
+    if (load_functions(library, found->library, tried)) {
+        if (py.Py_IsInitialized() || start_from(library, found, from, tried)) return true;
+        py = (PythonApi){0};
     }
-    if (py.Py_IsInitialized()) return true;
-    char *guess = found->executable ? NULL : executable_near(found->library);
-    tell_program_name(library, found->executable ? found->executable : guess);
-    free(guess);
-    initialise();
-    return true;
+    platform_close_library(library); /* its symbols would stand before those of the next */
+    return false;
 }
 
-static bool use_loaded(Text *tried) {
-    void *process = platform_loaded_python();
-    if (!process) {
-        text_add(tried, "\n  this process: no Python is loaded");
-        return false;
+static bool use_loaded(void *process, Text *tried) {
+    static const char from[] = "the Python in this process";
+    if (load_functions(process, from, tried)) {
+        if (py.Py_IsInitialized() || initialise(process, from, tried)) return true;
+        py = (PythonApi){0};
     }
-    if (!load_functions(process, "the Python in this process", tried)) return false;
-    if (!py.Py_IsInitialized()) initialise();
-    return true;
+    text_add(tried,
+             "\nCure: there cannot be a second Python beside it. Run the host with Python 3.%d or later, or keep it "
+             "from loading this one.",
+             OLDEST_MINOR);
+    return false;
 }
 
 static bool use_environment(Text *tried) {
@@ -127,33 +183,34 @@ static bool use_description(char *lines, const char *from, Text *tried) {
 }
 
 static bool search(const char *resources, Text *tried) {
-    if (use_loaded(tried) || use_environment(tried)) return true;
+    text_add(tried, "no usable Python; tried in this order:");
+    void *process = platform_loaded_python();
+    if (process) return use_loaded(process, tried);
+    text_add(tried, "\n  this process: no Python is loaded");
     Text noted = {0}, script = {0};
     text_add(&noted, "%s/python.txt", resources);
     text_add(&script, "%s/sources/fmus/interpreter.py", resources);
-    bool done = use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
+    bool done = use_environment(tried) ||
+                use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
                 use_description(platform_run("python3", text_of(&script)), "python3 on the PATH", tried);
     text_clear(&noted);
     text_clear(&script);
+    text_add(tried,
+             "\nCure: set the environment variable FMU_LIBPYTHON to the shared library of a Python 3.%d or later "
+             "that has the packages of this unit, such as /usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0 "
+             "(python311.dll, libpython3.11.dylib). A Python without one is rebuilt with ./configure "
+             "--enable-shared (pyenv: PYTHON_CONFIGURE_OPTS=--enable-shared pyenv install 3.11).",
+             OLDEST_MINOR);
     return done;
 }
 
 bool python_attach(const char *resources, Text *tried) {
-    static atomic_flag busy = ATOMIC_FLAG_INIT;
-    static bool attached = false;
-    while (atomic_flag_test_and_set(&busy)) {
-    }
-    if (!attached || !py.Py_IsInitialized()) {
-        text_add(tried, "no usable Python; tried in this order:");
-        attached = search(resources, tried);
-        text_add(tried,
-                 "\nCure: set the environment variable FMU_LIBPYTHON to the shared library of a Python 3.%d or later "
-                 "that has the packages of this unit, such as /usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0 "
-                 "(python311.dll, libpython3.11.dylib). A Python without one is rebuilt with ./configure "
-                 "--enable-shared (pyenv: PYTHON_CONFIGURE_OPTS=--enable-shared pyenv install 3.11).",
-                 OLDEST_MINOR);
-    }
+    static atomic_bool attached = false;
+    if (attached && py.Py_IsInitialized()) return true;
+    ProcessLock lock;
+    if (!process_lock(&lock, tried)) return false;
+    if (!attached || !py.Py_IsInitialized()) attached = search(resources, tried);
     bool result = attached;
-    atomic_flag_clear(&busy);
+    process_unlock(&lock);
     return result;
 }

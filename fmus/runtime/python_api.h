@@ -29,6 +29,7 @@ typedef ptrdiff_t Py_ssize_t;
     F(void, PyErr_Clear, (void))                                              \
     F(int, PyException_SetTraceback, (PyObject *, PyObject *))                \
     F(PyObject *, PyObject_GetAttrString, (PyObject *, const char *))         \
+    F(int, PyObject_IsTrue, (PyObject *))                                     \
     F(PyObject *, PyObject_CallNoArgs, (PyObject *))                          \
     F(PyObject *, PyObject_CallFunctionObjArgs, (PyObject *, ...))            \
     F(PyObject *, PyObject_Str, (PyObject *))                                 \

@@ -22,8 +22,17 @@ static void add_string(Text *text, PyObject *string) {
     py.PyErr_Clear();
 }
 
-/* Logs the exception that is set and clears it. */
-static Status refuse_exception(const Instance *instance, const char *function) {
+/* Whether an exception says that nothing has changed. */
+static bool is_refusal(PyObject *error) {
+    PyObject *mark = error ? py.PyObject_GetAttrString(error, "is_refusal") : NULL;
+    bool is = mark && py.PyObject_IsTrue(mark) == 1;
+    drop(mark);
+    py.PyErr_Clear();
+    return is;
+}
+
+/* Logs the exception that is set and clears it; tells whether it is a refusal. */
+static bool log_exception(const Instance *instance, const char *function) {
     PyObject *type = NULL, *error = NULL, *trace = NULL;
     py.PyErr_Fetch(&type, &error, &trace);
     py.PyErr_NormalizeException(&type, &error, &trace);
@@ -35,12 +44,24 @@ static Status refuse_exception(const Instance *instance, const char *function) {
         text_add(&text, " ");
         if (error) add_string(&text, py.PyObject_Str(error));
     }
+    bool refused = is_refusal(error);
     drop(type);
     drop(error);
     drop(trace);
     py.PyErr_Clear();
     refuse(instance, function, "%s", text_of(&text));
     text_clear(&text);
+    return refused;
+}
+
+static Status refuse_exception(const Instance *instance, const char *function) {
+    log_exception(instance, function);
+    return STATUS_ERROR;
+}
+
+/* The same after a call that may have left the block's state half changed: only a refusal leaves the mode as it is. */
+static Status fail_by_exception(Instance *instance, const char *function) {
+    if (!log_exception(instance, function)) instance->mode = FAILED;
     return STATUS_ERROR;
 }
 
@@ -112,7 +133,19 @@ static bool take_table(Instance *instance) {
     instance->sizes = (uint64_t *)(uintptr_t)header.sizes;
     instance->first_input = header.first_input;
     instance->n_inputs = header.inputs;
+    instance->first_output = header.first_output;
+    instance->n_outputs = header.outputs;
     return true;
+}
+
+/* Logs what the loader has to say about an instance that it started. */
+static void warn_of(const Instance *instance, const char *function, PyObject *loader, PyObject *folder) {
+    PyObject *warning = item(loader, "warning");
+    Text text = {0};
+    if (warning) add_string(&text, py.PyObject_CallFunctionObjArgs(warning, folder, NULL));
+    if (text.length) warn(instance, function, "%s", text_of(&text));
+    text_clear(&text);
+    drop(warning);
 }
 
 bool slave_start(Instance *instance, const char *function, const char *resources, const char *token) {
@@ -133,7 +166,10 @@ bool slave_start(Instance *instance, const char *function, const char *resources
             instance->slave = py.PyObject_CallFunctionObjArgs(begin, folder, wanted, NULL);
         instance->step = instance->slave ? py.PyObject_GetAttrString(instance->slave, "step") : NULL;
         started = instance->step && take_table(instance);
-        if (!started) refuse_exception(instance, function);
+        if (started)
+            warn_of(instance, function, loader, folder);
+        else
+            refuse_exception(instance, function);
         drop(begin);
         drop(folder);
         drop(wanted);
@@ -144,7 +180,8 @@ bool slave_start(Instance *instance, const char *function, const char *resources
 }
 
 void slave_release(Instance *instance) {
-    if (!py.Py_IsInitialized || !py.Py_IsInitialized()) return; /* never attached, or the host's Python has ended */
+    if (!instance->slave && !instance->explain) return; /* never attached */
+    if (!py.Py_IsInitialized()) return;                 /* the host's Python has ended */
     int lock = py.PyGILState_Ensure();
     drop(instance->step);
     drop(instance->slave);
@@ -155,7 +192,7 @@ void slave_release(Instance *instance) {
 Status slave_call(Instance *instance, const char *function, const char *method) {
     int lock = py.PyGILState_Ensure();
     PyObject *result = invoke(instance, method, NULL, NULL);
-    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    Status status = result ? STATUS_OK : fail_by_exception(instance, function);
     drop(result);
     py.PyGILState_Release(lock);
     return status;
@@ -164,7 +201,7 @@ Status slave_call(Instance *instance, const char *function, const char *method) 
 Status slave_step(Instance *instance, const char *function) {
     int lock = py.PyGILState_Ensure();
     PyObject *result = py.PyObject_CallNoArgs(instance->step);
-    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    Status status = result ? STATUS_OK : fail_by_exception(instance, function);
     drop(result);
     py.PyGILState_Release(lock);
     return status;
@@ -195,7 +232,7 @@ Status slave_set_state(Instance *instance, const char *function, const char *byt
     int lock = py.PyGILState_Ensure();
     PyObject *state = py.PyBytes_FromStringAndSize(bytes, (Py_ssize_t)size);
     PyObject *result = state ? invoke(instance, "set_state", state, NULL) : NULL;
-    Status status = result ? STATUS_OK : refuse_exception(instance, function);
+    Status status = result ? STATUS_OK : fail_by_exception(instance, function);
     drop(result);
     py.PyGILState_Release(lock);
     return status;

@@ -86,10 +86,7 @@ Status state_set(Instance *instance, const char *function, void *state) {
     SavedState **at = find(instance, function, state);
     if (!at) return STATUS_ERROR;
     const StateHeader *header = &(*at)->header;
-    if (slave_set_state(instance, function, (*at)->bytes, header->size) != STATUS_OK) {
-        instance->mode = FAILED;
-        return STATUS_ERROR;
-    }
+    if (slave_set_state(instance, function, (*at)->bytes, header->size) != STATUS_OK) return STATUS_ERROR;
     instance->mode = (Mode)header->mode;
     instance->has_outputs = header->has_outputs;
     instance->outputs_stale = header->outputs_stale;

@@ -129,14 +129,14 @@ static void describe_bad(const Instance *instance, size_t at, Text *description)
     for (size_t i = 0; i < instance->n_variables; i++) {
         const Variable *v = &instance->variables[i];
         if (v->kind != FLOAT64 || at < v->offset || at >= (size_t)v->offset + v->count) continue;
-        text_add(description, "input '%s' is %g", name_of(instance, v), instance->floats[at]);
+        text_add(description, "%s '%s' is %g", v->causality == OUTPUT ? "output" : "input", name_of(instance, v), instance->floats[at]);
         if (v->count > 1) text_add(description, " (entry %zu of %u)", at - v->offset + 1, v->count);
         return;
     }
 }
 
-bool find_bad_input(const Instance *instance, Text *description) {
-    for (size_t i = instance->first_input; i < instance->first_input + instance->n_inputs; i++) {
+bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *description) {
+    for (size_t i = first; i < first + n; i++) {
         if (isfinite(instance->floats[i])) continue;
         describe_bad(instance, i, description);
         return true;

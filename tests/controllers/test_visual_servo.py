@@ -85,7 +85,7 @@ class Loop:
 
 
 def loop(seed: int = 0, dt: float = 0.5, **values: Any) -> Loop:
-    return Loop(VisualServo(Params(**values)), SaggingArm(seed), [], dt)
+    return Loop(VisualServo(Params(control_period=dt, **values)), SaggingArm(seed), [], dt)
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -297,6 +297,52 @@ def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int):
         assert everything(other.step(n * 0.5, 0.5, u)) == everything(first.history[n])
 
 
+@pytest.mark.parametrize(("dt", "per_period"), [(0.02, 25), (0.001, 500)])
+def test_short_steps_give_the_commands_of_steps_of_a_control_period(dt: float, per_period: int):
+    whole, inputs = loop(closing_time=2.0), list[Inputs]()
+    periods = 45 if dt > 0.01 else 8
+    for n in range(periods):
+        inputs.append(whole.arm.measured(ball_at(45.0), seen=n % 7 != 5))
+        whole.step(inputs[-1])
+    servo, t = VisualServo(Params(closing_time=2.0)), 0.0
+    between = SaggingArm(seed=9).measured(ball_at(180.0))
+    for n, u in enumerate(inputs):
+        for k in range(per_period):
+            y = servo.step(t, dt, u if k == 0 else between)  # what comes between is not looked at
+            t += dt
+            assert everything(y) == everything(whole.history[n])
+    assert dt < 0.01 or whole.history[-1].phase is Phase.HOLD
+
+
+def test_steps_that_do_not_divide_the_control_period_update_at_the_first_step_after_it():
+    run = loop(dt=0.3)
+    run.servo = VisualServo(Params(control_period=0.5))
+    for _ in range(11):
+        run.step(run.arm.measured(ball_at(0.0)))
+    changed = [n for n in range(1, 11) if not np.array_equal(run.history[n].p_WO_est, run.history[n - 1].p_WO_est)]
+    assert changed == [2, 4, 5, 7, 9, 10]  # 0.6, 1.2, 1.5, 2.1, 2.7, 3.0 s
+
+
+def test_a_step_longer_than_the_control_period_is_one_update():
+    run, longer = loop(dt=1.45), loop(dt=1.45)
+    longer.servo = VisualServo(Params(control_period=0.5))
+    for _ in range(12):
+        assert everything(run.step(run.arm.measured(ball_at(0.0)))) == everything(
+            longer.step(longer.arm.measured(ball_at(0.0)))
+        )
+
+
+def test_the_sampling_time_is_part_of_the_state():
+    run, dt = loop(), 0.02
+    inputs = [run.arm.measured(ball_at(0.0)) for _ in range(80)]
+    first, other = VisualServo(Params()), VisualServo(Params())
+    for n in range(40):
+        first.step(n * dt, dt, inputs[n])
+    other.set_state(first.get_state())
+    for n in range(40, 80):
+        assert everything(other.step(n * dt, dt, inputs[n])) == everything(first.step(n * dt, dt, inputs[n]))
+
+
 def test_patience_is_part_of_the_state():
     def steps_until_given_up(run: Loop) -> int:
         run.run(Phase.GRASP, lambda _t: np.array([0.8, 0.0, -0.6]))
@@ -347,6 +393,7 @@ def test_outputs_at_the_start_are_those_of_the_calibrated_arm():
         ({"l_calib": np.array([0.12, 0.3, 0.24])}, r"l_calib = \[0.12, 0.3, 0.24\] is outside the limits"),
         ({"threshold_retreat": 0.1}, "threshold_retreat = 0.1 must exceed"),
         ({"closing_time": -1.0}, "closing_time = -1.0 must not be negative"),
+        ({"control_period": 0.0}, "control_period = 0.0 must be positive"),
         ({"N_max_iter": 0}, "N_max_iter = 0 must be positive"),
     ],
 )

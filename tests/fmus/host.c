@@ -2,6 +2,7 @@
 #include <dlfcn.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "fmi.h"
 
@@ -21,6 +22,8 @@ static void log_message(fmi2ComponentEnvironment e, fmi2String name, fmi2Status 
 int main(int argc, char **argv) { /* library, GUID, resource URI, value references of a and b */
     unsigned a, b;
     if (argc != 6 || sscanf(argv[4], "%u", &a) != 1 || sscanf(argv[5], "%u", &b) != 1) return 2;
+    const char *before = getenv("HOST_LOADS_BEFORE");
+    if (before && !dlopen(before, RTLD_NOW | RTLD_GLOBAL)) return printf("%s\n", dlerror()), 2;
     void *library = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL);
     if (!library) return printf("%s\n", dlerror()), 2;
     LOAD(fmi2Instantiate);

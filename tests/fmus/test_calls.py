@@ -148,6 +148,35 @@ def test_a_number_that_is_no_item_of_an_enumeration_is_refused(workshop: Worksho
     assert "input 'mood_in' is 3; its items are 0 CALM, 1 KEEN, 5 WILD" in host.log[-1]
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_output_that_is_not_finite_is_a_failure_that_names_it(workshop: Workshop, fmi: int):
+    host = workshop.host(BLOCK, fmi)
+    host.set("gain", [10.0])
+    assert host.initialise() == OK
+    host.set("a", [1e308])
+    assert host.step(0.0, 0.1) == ERROR
+    assert "output 'b' is inf" in host.log[-1]
+    assert host.step(0.1, 0.1) == ERROR
+    assert "failed: only reset" in host.log[-1]
+
+
+def test_outputs_at_the_start_that_are_not_finite_are_a_failure(workshop: Workshop):
+    host = workshop.host(BLOCK, 3)
+    host.set("gain", [10.0])
+    host.set("a", [1e308])
+    assert host.initialise() == ERROR
+    assert "output 'b' is inf" in host.log[-1]
+
+
+def test_a_step_that_is_not_a_sampled_blocks_period_is_refused_and_changes_nothing(workshop: Workshop):
+    host = workshop.host("eye:Eye", 3)
+    assert host.initialise() == OK
+    for dt in (1 / 30 + 1e-6, 0.1):
+        assert host.step(0.0, dt) == ERROR
+        assert "Eye is sampled, each of its steps is its period, 0.0333" in host.log[-1]
+    assert host.step(0.0, 1 / 30 + 1e-9) == OK
+
+
 def test_an_output_of_the_wrong_shape_is_an_error_that_names_it(workshop: Workshop):
     host = workshop.host("careless:Careless", 3)
     assert host.initialise() == ERROR

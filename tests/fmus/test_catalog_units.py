@@ -1,6 +1,7 @@
 """The catalogued units in FMPy, a host that knows nothing of this project."""
 
 import json
+import xml.etree.ElementTree as ET
 import zipfile
 
 import fmpy
@@ -45,6 +46,16 @@ def test_a_unit_lists_the_package_that_it_stands_on(name: str, package: str):
     names = {p["distribution"] for p in listed}
     assert package in names
     assert "fmpy" not in names
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("name", "any_step"), [("TendonArm", "false"), ("VisualServo", "true")])
+def test_only_a_unit_that_takes_any_step_says_so(name: str, any_step: str, fmi: int):
+    with zipfile.ZipFile(cached(name, fmi)) as archive:
+        unit = ET.fromstring(archive.read("modelDescription.xml")).find("CoSimulation")
+    assert unit is not None
+    assert unit.attrib["canHandleVariableCommunicationStepSize"] == any_step
+    assert "fixedInternalStepSize" not in unit.attrib
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

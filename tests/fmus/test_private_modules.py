@@ -4,6 +4,7 @@ import importlib
 import json
 import sys
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,23 @@ def test_missing_packages_are_named_with_version_interpreter_and_cure(workshop: 
     assert not host.instantiate()
     for part in ("no-such-package (built with version 4.5.6)", sys.executable, "pip install no-such-package==4.5.6"):
         assert part in host.log[-1]
+
+
+@pytest.mark.parametrize(("change", "warned"), [(1, True), (0, False), (-1, False)])
+def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop, change: int, warned: bool):
+    host = workshop.host("scalars:Scalars", 3)
+    host.free()
+    host.log.clear()
+    here = metadata.version("numpy")
+    major, minor = (int(n) for n in here.split(".")[:2])
+    built = f"{major}.{minor + change}.99"
+    file = host.folder / "resources" / "unit.json"
+    unit = json.loads(file.read_text())
+    unit["packages"] = [{"module": "numpy", "distribution": "numpy", "version": built}]
+    file.write_text(json.dumps(unit))
+    assert host.instantiate()
+    expected = [f"fmi3InstantiateCoSimulation: numpy: built with {built}, found {here}"]
+    assert host.log == (expected if warned else [])
 
 
 def test_a_missing_source_is_a_logged_error(workshop: Workshop):

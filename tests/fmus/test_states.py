@@ -1,4 +1,5 @@
 import ctypes
+import struct
 
 import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
@@ -120,6 +121,29 @@ def test_a_damaged_or_foreign_state_is_refused_when_set(workshop: Workshop):
     assert status == OK
     assert other.call("SetFMUState", state) == ERROR
     assert "saved by another unit" in other.log[-1]
+    assert other.step(0.0, DT) == OK
+
+
+def test_a_state_with_a_parameter_out_of_range_changes_nothing(workshop: Workshop):
+    host, other = ready(workshop, 3), ready(workshop, 3)
+    expected = ten_steps(ready(workshop, 3))
+    state = deserialise(other, serialised(host, save(host)).replace(struct.pack("d", 2.0), struct.pack("d", 12.0), 1))[
+        1
+    ]
+    assert other.call("SetFMUState", state) == ERROR
+    assert "parameter 'gain'" in other.log[-1]
+    assert ten_steps(other) == expected
+
+
+def test_an_instance_whose_block_fails_to_take_a_state_has_failed(workshop: Workshop):
+    host, other = ready(workshop, 3), ready(workshop, 3)
+    data = serialised(host, save(host))
+    state = deserialise(other, data[:-40] + bytes(40))[1]
+    assert other.call("SetFMUState", state) == ERROR
+    assert other.step(3 * DT, DT) == ERROR
+    assert "failed: only reset" in other.log[-1]
+    assert other.call("SetFMUState", deserialise(other, data)[1]) == OK
+    assert ten_steps(other) == ten_steps(host)
 
 
 def test_a_freed_state_and_one_of_another_instance_are_refused(workshop: Workshop):

@@ -1,0 +1,78 @@
+"""Outputs that are not of their declared type are refused by name, and none is made to fit."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from sample_units import every_kind, eye
+
+from cosim.block import describe
+from fmus.buffers import Buffers
+from fmus.exchange import UnfitOutput, output_writer
+from fmus.layout import Layout
+
+
+def write(block: Any, y: Any, **changed: Any) -> Buffers:
+    buffers = Buffers(Layout(describe(block)))
+    output_writer(buffers)(replace(y, **changed))
+    return buffers
+
+
+def every_kind_with(**changed: Any) -> Buffers:
+    block = every_kind.EveryKind(every_kind.Params())
+    return write(every_kind.EveryKind, block.outputs(0.0, every_kind.Inputs()), **changed)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("b", None),
+        ("b", "1.0"),
+        ("b", np.zeros(2)),
+        ("p", np.array(["1", "2", "3"])),
+        ("p", np.ones(3) * 1j),
+        ("p", [True, False, True]),
+        ("p", [None, 1.0, 2.0]),
+        ("total", 1.0),
+        ("total", True),
+        ("total", 1 << 63),
+        ("off", "False"),
+        ("off", 1),
+        ("off", None),
+        ("mood_out", 3),
+        ("mood_out", True),
+        ("mood_out", 1.0),
+        ("sentence", None),
+        ("sentence", b"words"),
+        ("sentence", "\ud800"),
+    ],
+)
+def test_an_output_of_another_type_is_refused(name: str, value: Any):
+    with pytest.raises(UnfitOutput, match=f"output '{name}' is declared as"):
+        every_kind_with(**{name: value})
+
+
+@pytest.mark.parametrize("value", ["text", bytearray(b"x"), None, bytes(1 << 17)])
+def test_bytes_of_another_type_or_without_room_are_refused(value: Any):
+    y = eye.Outputs(brighter=np.zeros((720, 1280, 3), np.uint8), note_back=b"")
+    with pytest.raises(UnfitOutput, match="output 'note_back' is declared as binary"):
+        write(eye.Eye, y, note_back=value)
+
+
+def test_the_items_of_an_enumeration_are_named():
+    with pytest.raises(UnfitOutput, match="one of 0 CALM, 1 KEEN, 5 WILD; the block gave int: 3"):
+        every_kind_with(mood_out=3)
+
+
+def test_numpys_scalars_and_lists_of_numbers_are_taken():
+    buffers = every_kind_with(
+        b=np.float32(0.5), p=[1, 2.0, 3], total=np.int32(7), off=np.bool_(True), mood_out=5, sentence=np.str_("ä")
+    )
+    entries = {name: slot.entries for name, slot in buffers.layout.slots.items()}
+    assert buffers.floats[entries["b"]] == [0.5]
+    assert buffers.floats[entries["p"]].tolist() == [1.0, 2.0, 3.0]
+    assert buffers.integers[entries["total"]] == [7]
+    assert buffers.integers[entries["mood_out"]] == [5]
+    assert buffers.booleans[entries["off"]] == [True]
+    assert buffers.strings[entries["sentence"]] == ["ä".encode()]
