@@ -58,8 +58,11 @@ class Params:
     tremor_bandwidth: Hertz = parameter(2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0)
     drift_rms: Metre = parameter(0.003, "root mean square length of the drift", minimum=0.0, maximum=0.1)
     drift_time: Second = parameter(5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0)
-    capture_radius: Metre = parameter(
-        0.05, "distance of ball and gripper within which a closed gripper has the ball", minimum=0.0, maximum=0.5
+    capture_lateral: Metre = parameter(
+        0.03, "how far beside the gripper's axis the fingers get hold of the ball", minimum=0.0, maximum=0.2
+    )
+    capture_axial: Metre = parameter(
+        0.03, "how far along the axis from the gripper's point they do", minimum=0.0, maximum=0.2
     )
     capture_grip: Number = parameter(0.95, "closure from which the gripper holds", minimum=0.0, maximum=1.0)
     release_grip: Number = parameter(0.5, "closure below which the gripper lets fall", minimum=0.0, maximum=1.0)
@@ -119,8 +122,10 @@ class HandoverPartner:
     - HAND: the ball is at p_WO_0 plus `HandTremor`. If guide_stiffness k > 0, a person leads the gripper to it, with
       f_G = k (p_WO - p_WG) - c v_WG cut at guide_force_max, v_WG from the last two positions. Forces trail positions by
       a step: with the arm, at 20 ms, k from 10 to 50 N/m is calm with c = 2 N s/m, and swings up with c = 0 or 4.
-    - GRIPPER, once grip >= capture_grip within capture_radius: the ball keeps its place in G, f_G is its weight (its
-      inertia and its lever about G are left out), and the hand withdraws, outwards from the arm's axis and down.
+    - GRIPPER, once grip >= capture_grip with the ball between the fingers: p_GO, seen from the gripper's frame G whose
+      z points along its axis to its tip, is at most capture_lateral beside that axis and capture_axial along it. The
+      ball keeps its place in G, f_G is its weight (its inertia and its lever about G are left out), and the hand
+      withdraws, outwards from the arm's axis and down. A ball beside the fingers stays in the hand.
     - FREE, once grip < release_grip: the ball falls with the velocity that it had, and rests on the floor.
 
     The conditions are judged at the beginning of a step, with inputs and ball of the same instant, and the outputs at
@@ -182,10 +187,11 @@ class HandoverPartner:
 
     def _change_holder(self, u: Inputs) -> None:
         p = self._params
-        reach = self._p_WO - u.p_WG
-        if self._holder is Holder.HAND and u.grip >= p.capture_grip and np.linalg.norm(reach) <= p.capture_radius:
-            self._holder = Holder.GRIPPER
-            self._p_GO = np.transpose(rotation_of(u.q_WG)) @ reach
+        if self._holder is Holder.HAND and u.grip >= p.capture_grip:
+            p_GO = np.transpose(rotation_of(u.q_WG)) @ (self._p_WO - u.p_WG)
+            if np.hypot(p_GO[0], p_GO[1]) <= p.capture_lateral and abs(p_GO[2]) <= p.capture_axial:
+                self._holder = Holder.GRIPPER
+                self._p_GO = p_GO
         elif self._holder is Holder.GRIPPER and u.grip < p.release_grip:
             self._holder = Holder.FREE
 

@@ -1,12 +1,10 @@
 """The command `handover`."""
 
-import signal
 import sys
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import click
@@ -15,13 +13,15 @@ from cosim.exceptions import CosimError, nearest
 from fmus.binaries import NotCompiled
 from fmus.build import build, cached
 from fmus.catalog import UNITS
+from fmus.compile import CompilationError
 from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
+from scenarios.interruption import Interruption
 from scenarios.listing import print_catalog, print_scenario, print_summary
 from scenarios.parameters import BadParameter, parse_parameters
 from scenarios.progress import progress_bar
-from scenarios.run_folder import BadRunFolder, RunFolder
+from scenarios.run_folder import BadRunFolder, RunFolder, check_place
 from scenarios.runner import Task, carry_out
 
 _PATH = click.Path(path_type=Path)
@@ -49,6 +49,7 @@ Exit status
   1  the run ended, but the task failed
   2  bad call or bad input; nothing was written
   3  a unit failed; what was recorded until then is kept
+  130  aborted with Ctrl-C
 
 \b
 Environment
@@ -90,7 +91,8 @@ def build_(units: Sequence[str], fmi: str, out: Path) -> None:
     unknown = [u for u in units if u not in UNITS]
     if unknown:
         raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown))
-    with _told_in_one_line():
+    with Interruption(), _told_in_one_line():
+        check_place(out)
         for line in _build_all(units or list(UNITS), fmi, out, named=bool(units)):
             click.echo(line)
 
@@ -106,30 +108,29 @@ def build_(units: Sequence[str], fmi: str, out: Path) -> None:
 def run_(scenario: str, parameters: Sequence[str], seed: int, replaced: Sequence[str], out: Path | None) -> None:
     """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 
-    Ctrl-C ends the run; what was recorded until then is kept.
+    Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
     """
     experiment = _scenario(scenario)
-    with _told_in_one_line():
+    with Interruption() as interruption, _told_in_one_line():
         values = parse_parameters(experiment, parameters)
         folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{scenario}"))
-        others = _replacements(experiment, replaced)
-        fmus = {name: others.get(name) or cached(unit, 3) for name, unit in experiment.units.items()}
+        fmus = _fmus(experiment, _replacements(experiment, replaced))
         task = Task(experiment=experiment(), parameters=values, seed=seed, fmus=fmus, folder=folder)
-        with _interruptible() as interrupted, progress_bar(sys.stderr) as progress:
-            ended = carry_out(task, progress, lambda: bool(interrupted))
+        with progress_bar(sys.stderr) as progress:
+            ended = carry_out(task, progress, interruption)
     if ended.failure:
         click.echo(str(ended.failure), err=True)
-    print_summary(ended, folder)
+    print_summary(ended, experiment.headline, folder)
     sys.exit(UNIT_FAILED if ended.failure else 0 if ended.outcome.success else TASK_FAILED)
 
 
-def _scenario(name: str) -> type[Experiment]:
+def _scenario(name: str) -> type[Experiment[Any]]:
     if name not in SCENARIOS:
         raise BadCall(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
     return SCENARIOS[name]
 
 
-def _replacements(experiment: type[Experiment], given: Sequence[str]) -> dict[str, Path]:
+def _replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, Path]:
     found: dict[str, Path] = {}
     for text in given:
         name, equals, file = text.partition("=")
@@ -141,6 +142,13 @@ def _replacements(experiment: type[Experiment], given: Sequence[str]) -> dict[st
     return found
 
 
+def _fmus(experiment: type[Experiment[Any]], others: Mapping[str, Path]) -> dict[str, Path]:
+    try:
+        return {name: others.get(name) or cached(unit, 3) for name, unit in experiment.units.items()}
+    except OSError as e:
+        raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+
+
 def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Iterator[str]:
     for name in units:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
@@ -149,6 +157,8 @@ def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Ite
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise BadCall(str(e)) from e
+            except OSError as e:
+                raise BadCall(f"{name} cannot be built: {e}") from e
 
 
 @contextmanager
@@ -157,18 +167,5 @@ def _told_in_one_line() -> Generator[None, None, None]:
         yield
     except (CosimError, BadParameter, BadRunFolder, NotCompiled) as e:
         raise BadCall(str(e)) from e
-
-
-@contextmanager
-def _interruptible() -> Generator[list[int], None, None]:
-    """Let Ctrl-C ask the run to end; a unit's step that is under way is finished, so that the record stays whole."""
-    asked: list[int] = []
-
-    def ask(number: int, _frame: FrameType | None) -> None:
-        asked.append(number)
-
-    before: Any = signal.signal(signal.SIGINT, ask)
-    try:
-        yield asked
-    finally:
-        signal.signal(signal.SIGINT, before)
+    except CompilationError as e:
+        raise BadCall(str(e).replace("\n", " ", 1)) from e

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from cosim.block import Causality, Variable, declared_variables
 from cosim.signals import Signals
@@ -46,12 +46,18 @@ class Watch(abc.ABC):
     def over(self) -> bool:
         """Whether the task has ended, well or not."""
 
+    def finish(self, signals: Signals) -> None:  # noqa: B027 (many watches need nothing of it)
+        """Look at the signals once more when the run has ended, however it did."""
+
     @abc.abstractmethod
     def outcome(self) -> Outcome:
         """Return the verdict on what was seen so far."""
 
 
-class Experiment(abc.ABC):
+AnyWatch = TypeVar("AnyWatch", bound=Watch)
+
+
+class Experiment(abc.ABC, Generic[AnyWatch]):
     """A scenario. Subclasses name it, declare its parameters, wire its system and judge its runs."""
 
     name: ClassVar[str]
@@ -59,6 +65,8 @@ class Experiment(abc.ABC):
     parameters_type: ClassVar[type[Any]]
     units: ClassVar[Mapping[str, str]]
     """The catalogued unit behind each of the system's units, by name in the system."""
+    headline: ClassVar[tuple[str, ...]]
+    """Names of the metrics that are told first, in their order; a run need not have all of them."""
 
     @classmethod
     def parameters(cls) -> tuple[Variable, ...]:
@@ -74,7 +82,7 @@ class Experiment(abc.ABC):
         """Return the time at which a run ends at the latest, in seconds."""
 
     @abc.abstractmethod
-    def watch(self, parameters: Any) -> Watch:
+    def watch(self, parameters: Any) -> AnyWatch:
         """Return an observer of one run."""
 
     @abc.abstractmethod
@@ -82,7 +90,7 @@ class Experiment(abc.ABC):
         """Return the units that make up one control cycle, whose CPU time the summary tells."""
 
     @abc.abstractmethod
-    def draw(self, parameters: Any, watch: Watch, record: Record, folder: Path) -> list["Figure"]:
+    def draw(self, parameters: Any, watch: AnyWatch, record: Record, folder: Path) -> list["Figure"]:
         """Draw the run's figures into a folder."""
 
 

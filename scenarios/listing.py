@@ -1,6 +1,7 @@
 """What `handover` prints: the catalog, a scenario's parameters, a run's summary."""
 
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,6 @@ from scenarios.report import told
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Ended
 
-_SHOWN = ("final_distance", "steps", "arm_time", "handover_time", "cpu_per_cycle", "pace_arm", "peak_memory")
-
 
 def print_catalog() -> None:
     """Print scenarios and units, a line each."""
@@ -27,7 +26,7 @@ def print_catalog() -> None:
     _print_rows(console, [(name, unit.summary) for name, unit in UNITS.items()])
 
 
-def print_scenario(experiment: type[Experiment]) -> None:
+def print_scenario(experiment: type[Experiment[Any]]) -> None:
     """Print a scenario's parameters with defaults and ranges, and its units."""
     console = _console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold")
@@ -41,14 +40,15 @@ def print_scenario(experiment: type[Experiment]) -> None:
     _print_rows(console, list(experiment.units.items()))
 
 
-def print_summary(ended: Ended, folder: RunFolder) -> None:
-    """Print how a run ended, its main figures, and where the report is."""
+def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> None:
+    """Print how a run ended, the figures named in the headline, and where the report is."""
     console = _console()
     summary = ended.summary
     verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
     console.print(f"{summary['scenario']} {verdict}: ", end="")
     console.print(summary["reason"], markup=False, soft_wrap=True)
-    rows = [(m["description"] or n, told(m)) for n, m in summary["metrics"].items() if n in _SHOWN]
+    metrics = summary["metrics"]
+    rows = [(metrics[n]["description"] or n, told(metrics[n])) for n in headline if n in metrics]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
     _print_rows(console, rows)
     console.print(f"report: {folder.report}", markup=False, soft_wrap=True)

@@ -19,7 +19,7 @@ class BadParameter(ValueError):
         self.faults = tuple(faults)
 
 
-def parse_parameters(experiment: type[Experiment], given: Sequence[str]) -> Any:
+def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) -> Any:
     """Return the scenario's parameters with the given ones set.
 
     Numbers are in SI units; arrays are numbers between commas; enumerations are given by name.

@@ -40,8 +40,16 @@ class Record:
 
     def unit(self, signal: str) -> str:
         """Return a signal's unit."""
-        metadata = self._table.schema.field(self._columns[signal][0]).metadata or {}
-        return metadata.get(b"unit", b"1").decode()
+        return self._metadata(signal).get(b"unit", b"1").decode()
+
+    def items(self, signal: str) -> dict[int, str]:
+        """Return the names of an enumeration's values; none for another signal."""
+        told = self._metadata(signal).get(b"items", b"").decode()
+        pairs = (item.partition(" ") for item in told.split(", ") if item)
+        return {int(value): name for value, _, name in pairs}
+
+    def _metadata(self, signal: str) -> dict[bytes, bytes]:
+        return self._table.schema.field(self._columns[signal][0]).metadata or {}
 
     def _values(self, name: str) -> NDArray[Any]:
         return self._table.column(name).to_numpy()

@@ -7,13 +7,13 @@ from typing import Any
 
 import jinja2
 
-from scenarios.experiment import Figure
+from scenarios.experiment import Experiment, Figure
 from scenarios.run_folder import RunFolder
 
 
 def write_report(
     folder: RunFolder,
-    title: str,
+    experiment: Experiment[Any],
     summary: Mapping[str, Any],
     parameters: Sequence[tuple[str, str, str]],
     units: Sequence[tuple[str, str, str, int, float]],
@@ -23,7 +23,7 @@ def write_report(
 
     Args:
         folder: the run's folder; the figures are in it.
-        title: what the scenario is, in a line.
+        experiment: the scenario; the figures of merit in its headline are shown first.
         summary: what is in `summary.json`.
         parameters: name, value with unit, and description of each parameter.
         units: name, FMU, step, number of steps and CPU seconds of each unit.
@@ -34,7 +34,12 @@ def write_report(
     environment.filters["figure"] = told
     pictures = [(f, _inline(folder, f)) for f in figures]
     page = environment.from_string(source).render(
-        title=title, summary=summary, parameters=parameters, units=units, pictures=pictures
+        title=experiment.title,
+        metrics=_in_order(summary["metrics"], experiment.headline),
+        summary=summary,
+        parameters=parameters,
+        units=units,
+        pictures=pictures,
     )
     folder.report.write_text(page, encoding="utf-8")
 
@@ -42,6 +47,8 @@ def write_report(
 def told(metric: Mapping[str, Any]) -> str:
     """Write a metric with a unit that reads well: mm for small lengths, ms for small times, MB for memory."""
     value, unit = metric["value"], metric["unit"]
+    if value is None:
+        return "undefined"
     if unit == "m" and abs(value) < 1:
         return f"{value * 1000:.1f} mm"
     if unit == "s" and abs(value) < 0.1:
@@ -49,6 +56,13 @@ def told(metric: Mapping[str, Any]) -> str:
     if unit == "B":
         return f"{value / 1e6:.0f} MB"
     return f"{value:.4g}" + ("" if unit == "1" else f" {unit}")
+
+
+def _in_order(metrics: Mapping[str, Any], headline: Sequence[str]) -> list[tuple[str, Any]]:
+    """Return the headline's metrics, then the others but the units' CPU times, which have a table of their own."""
+    first = [n for n in headline if n in metrics]
+    others = [n for n in metrics if n not in headline and not n.startswith(("cpu_", "pace_"))]
+    return [(n, metrics[n]) for n in first + others]
 
 
 def _inline(folder: RunFolder, figure: Figure) -> str:

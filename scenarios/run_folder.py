@@ -20,6 +20,19 @@ class BadRunFolder(ValueError):
         self.path, self.fault = path, fault
 
 
+def check_place(path: Path) -> None:
+    """Check that files can be written to a folder, which need not exist yet.
+
+    Raises:
+        BadRunFolder: they cannot.
+    """
+    existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise BadRunFolder(path, f"{existing} is a file, so no folder can be made in it")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise BadRunFolder(path, f"no permission to write to {existing}")
+
+
 class RunFolder:
     """Paths of what a run leaves: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `figures/`.
 
@@ -34,11 +47,7 @@ class RunFolder:
                 raise BadRunFolder(path, "there is a file of that name; name a new or an empty folder")
             if any(path.iterdir()):
                 raise BadRunFolder(path, "it is not empty; name a new or an empty folder")
-        existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
-        if not existing.is_dir():
-            raise BadRunFolder(path, f"{existing} is a file, so no folder can be made in it")
-        if not os.access(existing, os.W_OK | os.X_OK):
-            raise BadRunFolder(path, f"no permission to write to {existing}")
+        check_place(path)
 
     @property
     def signals(self) -> Path:
@@ -74,8 +83,15 @@ class RunFolder:
         """Write `run.json`: configuration, versions, and name and hash of every unit's FMU."""
         units = {n: {"fmu": p.name, "sha256": hashlib.sha256(p.read_bytes()).hexdigest()} for n, p in fmus.items()}
         versions = {"python": platform.python_version(), "platform": platform.platform()}
-        versions |= {p: importlib.metadata.version(p) for p in _PACKAGES}
+        versions |= {p: _version(p) for p in _PACKAGES}
         _write_json(self.path / "run.json", {**configuration, "units": units, "versions": versions})
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:

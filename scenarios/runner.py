@@ -1,6 +1,6 @@
 """Carries out one run of a scenario: everything is checked, then the folder is made, then it runs and is reported."""
 
-import resource
+import math
 import statistics
 import sys
 import time
@@ -16,6 +16,7 @@ from cosim.master import Master
 from cosim.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.experiment import Experiment, Metric, Outcome, Watch
+from scenarios.interruption import Interruption
 from scenarios.record import Record
 from scenarios.report import write_report
 from scenarios.run_folder import RunFolder
@@ -28,7 +29,7 @@ Progress = Callable[[float, float], None]
 class Task:
     """What to run: scenario, parameters, seed, the FMU of each unit, the folder for what it leaves."""
 
-    experiment: Experiment
+    experiment: Experiment[Any]
     parameters: Any
     seed: int
     fmus: Mapping[str, Path]
@@ -44,11 +45,12 @@ class Ended:
     failure: UnitFailure | None = None
 
 
-def carry_out(task: Task, progress: Progress, interrupted: Callable[[], bool]) -> Ended:
+def carry_out(task: Task, progress: Progress, interruption: Interruption) -> Ended:
     """Run a scenario to its end, its failure or its interruption and write its folder.
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, UnitRefused, BadRunFolder: before anything was written.
+        KeyboardInterrupt: it was aborted; what was recorded stays.
     """
     experiment, parameters = task.experiment, task.parameters
     stop = experiment.stop_time(parameters)
@@ -57,6 +59,7 @@ def carry_out(task: Task, progress: Progress, interrupted: Callable[[], bool]) -
     began, cpu_began = time.perf_counter(), time.process_time()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
     with Master(system) as master:
+        interruption.begin()
         task.folder.make()
         with Recorder(task.folder.signals) as recorder:
 
@@ -64,11 +67,13 @@ def carry_out(task: Task, progress: Progress, interrupted: Callable[[], bool]) -
                 progress(t, float(stop))
 
             try:
-                master.run(stop, [recorder, watch, tell], until=lambda: watch.over or interrupted())
+                master.run(stop, [recorder, watch, tell], until=lambda: watch.over or interruption.asked)
+                watch.finish(master.signals)
             except UnitFailure as e:
+                interruption.check()
                 failure = e
     spent = {"wall": time.perf_counter() - began, "cpu": time.process_time() - cpu_began}
-    outcome = _outcome(watch, failure, interrupted())
+    outcome = _outcome(watch, failure, interruption.asked)
     metrics = {**outcome.metrics, **_speed(experiment, master)}
     summary = _summary(task, outcome, metrics, master, spent)
     task.folder.write_summary(summary)
@@ -96,11 +101,13 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
     return seen
 
 
-def _speed(experiment: Experiment, master: Master) -> dict[str, Metric]:
+def _speed(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
     cycle = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    peak = _peak_memory()
     units = " + ".join(experiment.cycle())
-    metrics = {"peak_memory": Metric(float(peak), "B", "largest resident memory of the process")}
+    metrics: dict[str, Metric] = {}
+    if peak is not None:
+        metrics["peak_memory"] = Metric(peak, "B", "largest resident memory of the process")
     if cycle:
         metrics["cpu_per_cycle"] = Metric(sum(cycle), "s", f"median CPU time of a control cycle ({units})")
     for name, spent in master.cpu.items():
@@ -109,6 +116,15 @@ def _speed(experiment: Experiment, master: Master) -> dict[str, Metric]:
         simulated = len(spent) * float(master.system.units[name].period)
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
     return metrics
+
+
+def _peak_memory() -> float | None:
+    """Return the process's largest resident memory in bytes, None where the system does not tell (Windows)."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * (1 if sys.platform == "darwin" else 1024)
 
 
 def _configuration(task: Task) -> dict[str, Any]:
@@ -123,11 +139,16 @@ def _summary(
         **_configuration(task),
         "success": outcome.success,
         "reason": outcome.reason,
-        "metrics": {k: {"value": m.value, "unit": m.unit, "description": m.description} for k, m in metrics.items()},
+        "metrics": {k: _metric(m) for k, m in metrics.items()},
         "simulated_seconds": master.time,
         "wall_seconds": spent["wall"],
         "cpu_seconds": spent["cpu"],
     }
+
+
+def _metric(m: Metric) -> dict[str, Any]:
+    """Return a metric as JSON, which knows no infinity: what is not finite is null."""
+    return {"value": m.value if math.isfinite(m.value) else None, "unit": m.unit, "description": m.description}
 
 
 def _present(
@@ -137,7 +158,7 @@ def _present(
     if task.folder.signals.exists():
         record = Record(task.folder.signals)
         figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
-    write_report(task.folder, task.experiment.title, summary, _parameter_rows(task), units, figures)
+    write_report(task.folder, task.experiment, summary, _parameter_rows(task), units, figures)
 
 
 def _parameter_rows(task: Task) -> list[tuple[str, str, str]]:

@@ -56,7 +56,7 @@ def test_a_unit_runs_in_fmpy(tmp_path: Path):
 
 def test_a_block_of_ones_own_is_built(tmp_path: Path):
     (tmp_path / "spring.py").write_text(PROGRAMS[1])
-    printed = program("from fractions import Fraction\n" + PROGRAMS[2], tmp_path)
+    printed = program(PROGRAMS[2], tmp_path)
     assert (tmp_path / printed.strip()).is_file()
 
 

@@ -1,6 +1,6 @@
 """Figures of a Helix handover: error and phases, paths, tendons, and the camera pictures of three moments."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,13 @@ from scenarios.helix_handover.snapshot import Snapshot
 from scenarios.plotting import COLOURS, figure
 from scenarios.record import Record
 
-_PHASES = ("WAIT", "APPROACH", "DESCEND", "GRASP", "HOLD", "GIVEN_UP")
 _SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
-_TITLES = {"WAIT": "start", "APPROACH": "start", "DESCEND": "above the ball", "GRASP": "at the ball", "HOLD": "end"}
 
 
-def draw_handover(parameters: Parameters, snapshots: Sequence[Snapshot], record: Record, folder: Path) -> list[Figure]:
-    """Draw all figures of a run into a folder; return them in the order of a report."""
+def draw_handover(
+    parameters: Parameters, snapshots: Mapping[str, Snapshot], record: Record, folder: Path
+) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report. Snapshots are by their titles."""
     made = [_pictures(snapshots, folder)] if snapshots else []
     return [*made, _error(parameters, record, folder), _paths(record, folder), _tendons(record, folder)]
 
@@ -31,7 +31,7 @@ def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t = record.time
     true = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
     with figure(folder / "error", 1) as (axes,):
-        _shade_phases(axes, t, record["servo.phase"])
+        _shade_phases(axes, t, record["servo.phase"], record.items("servo.phase"))
         seen = record["servo.phase"] > 0
         axes.plot(
             t[seen],
@@ -79,13 +79,13 @@ def _tendons(record: Record, folder: Path) -> Figure:
     return Figure("tendons", "Commanded tendon lengths, from calibration, and tendon forces. A slack tendon is at 0 N.")
 
 
-def _pictures(snapshots: Sequence[Snapshot], folder: Path) -> Figure:
-    chosen = [snapshots[0], *[s for s in snapshots[1:] if s.phase == "GRASP"][:1], snapshots[-1]]
-    with figure(folder / "pictures", 2, len(chosen), size=(4.0 * len(chosen), 4.7)) as axes:
-        for i, shot in enumerate(chosen):
-            for side, axis in (("left", axes[i]), ("right", axes[i + len(chosen)])):
+def _pictures(snapshots: Mapping[str, Snapshot], folder: Path) -> Figure:
+    n = len(snapshots)
+    with figure(folder / "pictures", 2, n, size=(4.0 * n, 4.7)) as axes:
+        for i, (role, shot) in enumerate(snapshots.items()):
+            for side, axis in (("left", axes[i]), ("right", axes[i + n])):
                 _show(axis, shot, side)
-            axes[i].set_title(f"{shot.t:.1f} s, {_TITLES.get(shot.phase, shot.phase.lower())}")
+            axes[i].set_title(f"{shot.t:.1f} s, {role}")
     caption = "Left (above) and right camera. Marked as estimated: ball (circle), wrist (cross), gripper (plus)."
     return Figure("pictures", caption)
 
@@ -109,7 +109,7 @@ def _pixel(camera: Pinhole, p_WP: NDArray[np.float64]) -> tuple[float, float]:
     return float(u), float(v)
 
 
-def _shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64]) -> None:
+def _shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64], names: Mapping[int, str]) -> None:
     edges = np.flatnonzero(np.diff(phase)) + 1
     starts = [0, *edges.tolist()]
     ends = [*edges.tolist(), len(t) - 1]
@@ -117,5 +117,5 @@ def _shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64]) 
         if k % 2:
             axes.axvspan(t[a], t[b], color="#eef2f7", lw=0, zorder=0)
         if t[b] - t[a] > 0.06 * (t[-1] - t[0]):
-            name = _PHASES[int(phase[a])].replace("_", " ").lower()
+            name = names.get(int(phase[a]), str(phase[a])).replace("_", " ").lower()
             axes.text((t[a] + t[b]) / 2, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color="#4d5866")

@@ -1,4 +1,4 @@
-"""What both cameras saw at one moment, and what the controller made of it."""
+"""What both cameras saw at one moment, and where the controller took ball and arm to be."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,6 @@ class Snapshot:
     """Pictures, shape (720, 1280, 3), blue green red, and estimated positions in W, m."""
 
     t: float
-    phase: str
     left: NDArray[np.uint8]
     right: NDArray[np.uint8]
     p_WO_est: Floats
@@ -24,8 +23,8 @@ class Snapshot:
     p_WG_est: Floats
 
     @classmethod
-    def take(cls, t: float, phase: str, signals: Signals) -> "Snapshot":
+    def take(cls, t: float, signals: Signals) -> "Snapshot":
         """Copy the pictures and estimates as they are."""
         left, right = (signals[f"camera.{side}"].reshape(_SHAPE) for side in ("left", "right"))
         estimates = {f"{p}_est": signals[f"servo.{p}_est"] for p in ("p_WO", "p_WR", "p_WG")}
-        return cls(t, phase, left, right, **estimates)
+        return cls(t, left, right, **estimates)

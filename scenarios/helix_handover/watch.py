@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.geometry import rotation_of
 from cosim.ports import Floats
 from cosim.signals import Signals
 from scenarios.experiment import Metric, Outcome, Watch
@@ -15,22 +16,27 @@ _SETTLING = 1.0
 _NOTHING_SEEN = 10.0
 """How long the controller may wait for its first sight of ball and ring, s (assumed)."""
 
-_TAKEN_WITHIN = 0.05
-"""Largest distance between gripper and ball at the end, m (assumed: the thesis's threshold)."""
-
 
 class HandoverWatch(Watch):
-    """Follows one handover, keeps pictures of three moments and tells how it ended."""
+    """Follows one handover, keeps pictures of three moments and tells how it ended.
+
+    Attributes:
+        snapshots: what the cameras saw by the moment's role, in the order of time: `start`, `at the ball` (the first
+            entry into GRASP), `end`. Moments that did not come, or came at the time of another, are not there.
+        phases: the controller's phases and when each was first entered, in s.
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
-        self.snapshots: list[Snapshot] = []
+        self.snapshots: dict[str, Snapshot] = {}
         self.phases: dict[str, float] = {}
         self._t = 0.0
         self._phase = ""
         self._holder = ""
         self._p_WG: Floats = np.zeros(3)
         self._p_WO: Floats = np.zeros(3)
+        self._p_GO: Floats = np.zeros(3)
+        self._offset: Floats | None = None  # p_GO when the hand let go
         self._error = 0.0
         self._control_steps = 0
         self._released_at: float | None = None
@@ -39,17 +45,25 @@ class HandoverWatch(Watch):
         """Follow phases and positions."""
         phase, holder = signals.text("servo.phase"), signals.text("hand.holder")
         self._p_WG, self._p_WO = signals["arm.p_WG"], signals["hand.p_WO"]
+        self._p_GO = np.transpose(rotation_of(signals["arm.q_WG"])) @ (self._p_WO - self._p_WG)
         self._error = float(signals["servo.error"])
         self._t = t
-        if phase != self._phase:
-            self.phases.setdefault(phase, t)
-            if phase in ("DESCEND", "GRASP") or not self.snapshots:
-                self.snapshots.append(Snapshot.take(t, phase, signals))
+        if not self.snapshots:
+            self._keep("start", signals)
+        if phase == "GRASP" and phase not in self.phases:
+            self._keep("at the ball", signals)
+        self.phases.setdefault(phase, t)
         if holder == "GRIPPER" and self._released_at is None:
-            self._released_at = t
+            self._released_at, self._offset = t, self._p_GO
         self._phase, self._holder = phase, holder
-        if self.over:
-            self.snapshots.append(Snapshot.take(t, phase, signals))
+
+    def finish(self, signals: Signals) -> None:
+        """Keep the last picture."""
+        self._keep("end", signals)
+
+    def _keep(self, role: str, signals: Signals) -> None:
+        if all(shot.t != self._t for shot in self.snapshots.values()):
+            self.snapshots[role] = Snapshot.take(self._t, signals)
 
     @property
     def over(self) -> bool:
@@ -74,8 +88,7 @@ class HandoverWatch(Watch):
 
     def outcome(self) -> Outcome:
         """Return whether the gripper has the ball, why, and the figures."""
-        held = self._holder == "GRIPPER"
-        success = held and self.distance <= _TAKEN_WITHIN
+        success = self._holder == "GRIPPER"
         begun = self.phases.get("GRASP")
         metrics = {
             "final_distance": Metric(self.distance, "m", "gripper to ball at the end, ground truth"),
@@ -87,23 +100,39 @@ class HandoverWatch(Watch):
             metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
         if self._released_at is not None:
             metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the hand lets go")
-        return Outcome(success=success, reason=self._reason(success, held), metrics=metrics)
+        if self._offset is not None:
+            lateral, axial = _beside_and_along(self._offset)
+            metrics["grasp_offset_lateral"] = Metric(
+                lateral, "m", "ball beside the gripper's axis when the hand let go, ground truth"
+            )
+            metrics["grasp_offset_axial"] = Metric(
+                axial, "m", "ball along the gripper's axis, towards its tip, when the hand let go, ground truth"
+            )
+        return Outcome(success=success, reason=self._reason(success), metrics=metrics)
 
-    def _reason(self, success: bool, held: bool) -> str:
+    def _reason(self, success: bool) -> str:
         if success:
             return f"the hand let go at {self._released_at:.1f} s and the gripper holds the ball"
-        if held:
-            return f"the ball is {self.distance:.3f} m from the gripper, more than {_TAKEN_WITHIN} m"
         where = f"ball at {_told(self._p_WO)} m, gripper at {_told(self._p_WG)} m"
         if self._phase == "WAIT":
             return f"the cameras did not see both ball and arm within {_NOTHING_SEEN:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
             return f"out of reach: the arm came no nearer than {self._error:.2f} m to its goal; {where}"
+        if self._released_at is not None:
+            return f"the hand let go at {self._released_at:.1f} s, and the gripper did not keep the ball; {where}"
         if "HOLD" in self.phases:
-            return f"the gripper closed {self.distance:.3f} m beside the ball; the hand kept it"
+            lateral, axial = _beside_and_along(self._p_GO)
+            return (
+                f"the gripper closed with the ball {lateral:.3f} m beside its axis and {axial:+.3f} m along it, not "
+                "between the fingers; the hand kept the ball"
+            )
         if self._t < self._deadline:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"
         return f"no grasp within {self.parameters.patience:.0f} s: error {self._error:.3f} m; {where}"
+
+
+def _beside_and_along(p_GO: Floats) -> tuple[float, float]:
+    return float(np.hypot(p_GO[0], p_GO[1])), float(p_GO[2])
 
 
 def _told(p: NDArray[np.float64]) -> str:

@@ -88,16 +88,23 @@ def test_palm_keeps_its_distance_from_the_offered_ball():
 
 
 @pytest.mark.parametrize(
-    ("p_WG", "grip", "holder"),
+    ("p_GO", "grip", "holder"),
     [
-        (AT_BALL, 0.95, Holder.GRIPPER),
-        (AT_BALL, 0.94, Holder.HAND),
-        (np.array([0.18, 0.0, -0.5501]), 1.0, Holder.GRIPPER),
-        (np.array([0.18, 0.0, -0.5499]), 1.0, Holder.HAND),
+        ((0.0, 0.0, 0.0), 0.95, Holder.GRIPPER),
+        ((0.0, 0.0, 0.0), 0.94, Holder.HAND),
+        ((0.0299, 0.0, 0.0299), 1.0, Holder.GRIPPER),
+        ((0.0, -0.0299, -0.0299), 1.0, Holder.GRIPPER),
+        ((0.0, 0.04, 0.0), 1.0, Holder.HAND),
+        ((0.022, 0.022, 0.0), 1.0, Holder.HAND),
+        ((0.0, 0.0, 0.0301), 1.0, Holder.HAND),
+        ((0.0, 0.0, -0.0301), 1.0, Holder.HAND),
     ],
 )
-def test_hand_lets_go_when_a_closed_gripper_has_the_ball(p_WG: Floats, grip: float, holder: Holder):
+def test_hand_lets_go_when_a_closed_gripper_has_the_ball_between_its_fingers(
+    p_GO: tuple[float, float, float], grip: float, holder: Holder
+):
     partner = HandoverPartner(STILL)
+    p_WG = np.array([0.18, 0.0, -0.6]) - TURNED.as_matrix() @ np.array(p_GO)
     assert partner.step(0.0, 0.02, inputs(p_WG, grip)).holder is holder
 
 

@@ -81,6 +81,30 @@ def test_an_fmu_that_does_not_fit_is_refused_with_every_fault(tmp_path: Path):
     assert "arm has no input 'dl_t'" in result.output
 
 
+@pytest.mark.parametrize("below", ["", "x"])
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_built(tmp_path: Path, below: str):
+    (tmp_path / "file").write_text("precious")
+    result = call("build", "TendonArm", "--out", tmp_path / "file" / below)
+    assert_refused(result, "is a file, so no folder can be made in it")
+    assert len(result.output.splitlines()) == 1
+
+
+def test_a_platform_that_is_not_known_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "foo")
+    for arguments in (("build", "TendonArm", "--out", tmp_path / "u"), ("run", "helix_handover", "--out", tmp_path)):
+        result = call(*arguments)
+        assert_refused(result, "for foo: unknown platform; known: x86_64-linux", tmp_path / "u")
+        assert len(result.output.splitlines()) == 1
+
+
+def test_a_cache_that_cannot_be_used_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "file").write_text("precious")
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "file"))
+    result = call("run", "helix_handover", "--out", tmp_path / "r")
+    assert_refused(result, "HANDOVER_CACHE", tmp_path / "r")
+    assert len(result.output.splitlines()) == 1
+
+
 def test_build_writes_the_files_it_names(tmp_path: Path):
     result = call("build", "TendonArm", "VisualServo", "--out", tmp_path)
     assert result.exit_code == 0, result.output

@@ -118,7 +118,7 @@ def test_ctrl_c_ends_a_run_and_keeps_its_record(tmp_path: Path):
     out = tmp_path / "r"
     going = subprocess.Popen(command("run", "helix_handover", "--out", out), stdout=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
-    while not (out / "signals.parquet").exists():
+    while not (out / "signals.arrows").exists():
         assert going.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.1)

@@ -1,3 +1,5 @@
+import importlib.metadata
+import json
 import os
 from pathlib import Path
 
@@ -40,3 +42,14 @@ def test_a_place_without_permission_is_refused(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(os, "access", denied)
     with pytest.raises(BadRunFolder, match="no permission"):
         RunFolder(tmp_path / "new")
+
+
+def test_a_package_that_is_not_installed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def missing(package: str) -> str:
+        raise importlib.metadata.PackageNotFoundError(package)
+
+    monkeypatch.setattr(importlib.metadata, "version", missing)
+    RunFolder(tmp_path).write_run({"seed": 1}, {})
+    told = json.loads((tmp_path / "run.json").read_text())
+    assert told["versions"]["exudyn"] == "not installed"
+    assert told["seed"] == 1

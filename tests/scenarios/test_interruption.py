@@ -1,0 +1,112 @@
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from fmus.build import build_block
+from scenarios.interruption import Interruption
+
+sys.path.insert(0, str(Path(__file__).parent))  # hanging_arm
+
+BLOCKS = ["HangingArm", "NativelyHangingArm"][: 2 if sys.platform.startswith("linux") else 1]
+
+
+def start(*arguments: str | Path) -> "subprocess.Popen[str]":
+    call = [sys.executable, "-c", "from scenarios.command import main; main()", "run", "helix_handover"]
+    return subprocess.Popen([*call, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(going: "subprocess.Popen[str]", file: Path) -> None:
+    deadline = time.monotonic() + 120
+    while not file.exists():
+        assert going.poll() is None, going.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def read_line(going: "subprocess.Popen[str]", wanted: str) -> None:
+    assert going.stderr is not None
+    for line in going.stderr:
+        if wanted in line:
+            return
+    raise AssertionError(f"ended without telling {wanted!r}")
+
+
+def interrupt(times: int, *, begun: bool = False) -> list[bool]:
+    asked: list[bool] = []
+    with Interruption() as interruption:
+        if begun:
+            interruption.begin()
+        for _ in range(times):
+            os.kill(os.getpid(), signal.SIGINT)
+            asked.append(interruption.asked)
+    return asked
+
+
+def swallow() -> None:
+    with Interruption() as interruption:
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+        interruption.begin()
+        raise AssertionError("the run began")
+
+
+def test_the_first_interrupt_before_a_run_aborts():
+    with pytest.raises(SystemExit) as caught:
+        interrupt(1)
+    assert caught.value.code == 130
+
+
+def test_an_interrupt_that_was_taken_for_a_failure_aborts_all_the_same():
+    with pytest.raises(SystemExit) as caught:
+        swallow()
+    assert caught.value.code == 130
+
+
+def test_during_a_run_the_first_interrupt_asks_and_the_second_aborts():
+    assert interrupt(1, begun=True) == [True]
+    with pytest.raises(SystemExit) as caught:
+        interrupt(2, begun=True)
+    assert caught.value.code == 130
+
+
+def test_without_an_interrupt_nothing_changes():
+    before = signal.getsignal(signal.SIGINT)
+    with Interruption() as interruption:
+        interruption.begin()
+    assert not interruption.asked
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    cache, out = tmp_path / "cache", tmp_path / "r"
+    monkeypatch.setenv("HANDOVER_CACHE", str(cache))
+    going = start("--out", out)
+    wait_for(going, cache)
+    os.kill(going.pid, signal.SIGINT)
+    _, errors = going.communicate(timeout=60)
+    assert going.returncode == 130
+    assert "Traceback" not in errors
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HANGING_ARM_TELLS", str(tmp_path / "hangs"))
+    arm = build_block(f"hanging_arm:{block}", 3, tmp_path, step=Fraction(1, 50))
+    out = tmp_path / "r"
+    going = start("--unit", f"arm={arm}", "--out", out)
+    wait_for(going, tmp_path / "hangs")
+    os.kill(going.pid, signal.SIGINT)
+    read_line(going, "Ctrl-C again to abort")
+    os.kill(going.pid, signal.SIGINT)
+    _, errors = going.communicate(timeout=60)
+    assert going.returncode == 130
+    assert "aborted" in errors
+    assert "Traceback" not in errors

@@ -1,0 +1,93 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from controllers.visual_servo import Phase
+from cosim.block import Causality, Kind
+from cosim.fmu_description import FmuPort
+from cosim.signals import Signals
+from plants.handover_partner import Holder
+from scenarios.helix_handover.parameters import Parameters
+from scenarios.helix_handover.watch import HandoverWatch
+
+PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
+P_WG = np.array([0.16, 0.0, -0.6])
+
+
+def signals(phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0) -> Signals:
+    """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
+    reals = {
+        "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
+        "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along])},
+        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG},
+    }
+    units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
+        unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
+    }
+    ports: dict[str, dict[str, FmuPort]] = {
+        unit: {name: port(name, Kind.REAL, shape=v[0].shape if v[0].size > 1 else ()) for name, v in values.items()}
+        for unit, values in units.items()
+    }
+    for unit, name, item in (("servo", "phase", phase), ("hand", "holder", holder)):
+        units[unit][name] = (np.array([int(item)]),)
+        ports[unit][name] = port(name, Kind.ENUMERATION, items=tuple((i.name, int(i)) for i in type(item)))
+    seen = (np.array([PICTURE.ctypes.data]), np.array([PICTURE.size]))
+    units["camera"] = dict.fromkeys(("left", "right"), seen)
+    ports["camera"] = {side: port(side, Kind.BINARY) for side in ("left", "right")}
+    return Signals(units, ports, PICTURE)
+
+
+def port(name: str, kind: Kind, **more: Any) -> FmuPort:
+    return FmuPort(name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), **more)
+
+
+def follow(*moments: tuple[float, Signals]) -> HandoverWatch:
+    watch = HandoverWatch(Parameters())
+    for t, seen in moments:
+        watch(t, seen)
+    watch.finish(moments[-1][1])
+    return watch
+
+
+def test_a_gripper_that_closed_beside_the_ball_fails_and_says_how_far():
+    beside = [signals(phase, beside=0.04, along=-0.01) for phase in (Phase.GRASP, Phase.HOLD, Phase.HOLD)]
+    watch = follow((8.0, beside[0]), (18.0, beside[1]), (19.1, beside[2]))
+    assert watch.over
+    outcome = watch.outcome()
+    assert not outcome.success
+    assert "0.040 m beside its axis and -0.010 m along it" in outcome.reason
+    assert "grasp_offset_lateral" not in outcome.metrics
+
+
+def test_offsets_are_those_of_the_moment_when_the_hand_let_go():
+    taken = signals(Phase.HOLD, Holder.GRIPPER, beside=-0.012, along=0.02)
+    later = signals(Phase.HOLD, Holder.GRIPPER, beside=-0.001)
+    outcome = follow((8.0, signals(Phase.GRASP)), (18.0, taken), (19.1, later)).outcome()
+    assert outcome.success
+    assert outcome.metrics["grasp_offset_lateral"].value == pytest.approx(0.012)
+    assert outcome.metrics["grasp_offset_axial"].value == pytest.approx(0.02)
+
+
+def test_a_ball_that_fell_from_the_gripper_fails():
+    taken = signals(Phase.HOLD, Holder.GRIPPER)
+    outcome = follow((18.0, taken), (19.1, signals(Phase.HOLD, Holder.FREE, along=0.3))).outcome()
+    assert not outcome.success
+    assert "did not keep the ball" in outcome.reason
+
+
+def test_pictures_are_of_the_start_the_first_grasp_and_the_end():
+    course = (Phase.WAIT, Phase.APPROACH, Phase.DESCEND, Phase.APPROACH, Phase.DESCEND, Phase.GRASP, Phase.DESCEND)
+    watch = follow(*((float(t), signals(phase)) for t, phase in enumerate((*course, Phase.GRASP, Phase.HOLD))))
+    assert {role: shot.t for role, shot in watch.snapshots.items()} == {"start": 0.0, "at the ball": 5.0, "end": 8.0}
+
+
+def test_a_run_that_timed_out_has_a_start_and_an_end():
+    watch = follow((0.0, signals(Phase.APPROACH)), (60.0, signals(Phase.APPROACH)))
+    assert {role: shot.t for role, shot in watch.snapshots.items()} == {"start": 0.0, "end": 60.0}
+
+
+def test_a_moment_is_shown_once():
+    watch = follow((0.0, signals(Phase.WAIT)))
+    assert list(watch.snapshots) == ["start"]
