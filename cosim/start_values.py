@@ -17,7 +17,7 @@ def fault_of(port: Declared, value: Any) -> str | None:
         return f"{_told(value)} is neither true nor false"
     if port.kind is Kind.ENUMERATION and isinstance(value, str):
         if value.upper() not in [name.upper() for name, _ in port.items]:
-            return f"{_told(value)} is none of {', '.join(name for name, _ in port.items)}"
+            return f"{_told(value)} is none of {', '.join(name.lower() for name, _ in port.items)}"
         return None
     try:
         numbers = numbers_of(port, value)
@@ -28,7 +28,7 @@ def fault_of(port: Declared, value: Any) -> str | None:
     if port.kind is not Kind.REAL and not np.all(numbers == np.round(numbers)):
         return f"{_told(value)} is not {_wanted(port)}"
     if port.kind is Kind.ENUMERATION and int(numbers[0]) not in [v for _, v in port.items]:
-        return f"{_told(value)} is none of {', '.join(f'{v} ({n})' for n, v in port.items)}"
+        return f"{_told(value)} is none of {', '.join(f'{v} ({n.lower()})' for n, v in port.items)}"
     return _range_fault(port, value, numbers)
 
 

@@ -126,6 +126,8 @@ def run_(scenario: str, parameters: Sequence[str], seed: int, replaced: Sequence
 
 def _scenario(name: str) -> type[Experiment[Any]]:
     if name not in SCENARIOS:
+        if name in UNITS:
+            raise BadCall(f"{name} is a unit, not a scenario: {', '.join(SCENARIOS)}")
         raise BadCall(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
     return SCENARIOS[name]
 

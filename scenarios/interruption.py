@@ -16,7 +16,7 @@ _GRACE = 2.0
 
 
 class Interruption:
-    """Takes SIGINT over. Use as a context manager in the main thread; leaving it aborted exits with status 130.
+    """Takes SIGINT and SIGTERM over. Use it as a context manager in the main thread; if aborted it exits with 130.
 
     Until `begin` the first signal raises KeyboardInterrupt. After it the first only sets `asked`, so that the step
     under way is finished and the record stays whole; the second puts the former handler back and raises
@@ -54,11 +54,13 @@ class Interruption:
         ours, pythons = socket.socketpair()
         pythons.setblocking(False)
         self._before = signal.signal(signal.SIGINT, self._take)
+        term_before = signal.signal(signal.SIGTERM, self._end)
         wakeup_before = signal.set_wakeup_fd(pythons.fileno(), warn_on_full_buffer=False)
         listener = threading.Thread(target=self._listen, args=(ours,), daemon=True)
         listener.start()
         self._undo = [
             lambda: signal.signal(signal.SIGINT, self._before),
+            lambda: signal.signal(signal.SIGTERM, term_before),
             lambda: signal.set_wakeup_fd(wakeup_before),
             pythons.close,  # which ends the listener
             listener.join,
@@ -84,6 +86,13 @@ class Interruption:
         self._handled.set()
         signal.signal(signal.SIGINT, self._before)
         raise KeyboardInterrupt
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        """Let SIGTERM, as of a batch system, end a run that has begun as one Ctrl-C does."""
+        if self._running:
+            self.asked = True
+        else:
+            self._take(number, frame)
 
     def _listen(self, ours: socket.socket) -> None:
         while numbers := ours.recv(1):

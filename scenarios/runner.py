@@ -175,4 +175,4 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     name = getattr(value, "name", None)
-    return name if name is not None else value
+    return value if name is None else name.lower()

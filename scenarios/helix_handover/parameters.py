@@ -48,14 +48,14 @@ class Parameters:
     alpha: Number = parameter(0.4, "step size of the Jacobian control, eq. (21)", minimum=0.01, maximum=1.0)
     place: Place = parameter(Place.FRONT, "where the hand offers the ball")
     radius: Metre = parameter(0.16, "distance of the offered ball from the arm's axis", minimum=0.0, maximum=2.0)
-    height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-2.0, maximum=0.0)
+    height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-1.1, maximum=0.0)
     control_period: Second = parameter(0.5, "period of the controller", minimum=0.1, maximum=10.0)
     threshold: Metre = parameter(0.05, "error at which the arm descends onto the ball", minimum=0.001, maximum=0.08)
     tuning: Tuning = parameter(Tuning.OWN, "bounds and weights of the controller: ours, or the thesis's")
     cover: Cover = parameter(Cover.NONE, "camera whose lens is covered for a while")
     cover_from: Second = parameter(4.0, "time at which the lens is covered", minimum=0.0, maximum=600.0)
     cover_for: Second = parameter(2.0, "how long the lens is covered", minimum=0.0, maximum=600.0)
-    patience: Second = parameter(60.0, "time after which the run ends without a grasp", minimum=1.0, maximum=600.0)
+    patience: Second = parameter(60.0, "time by which the gripper must begin to close", minimum=1.0, maximum=600.0)
 
     @property
     def p_WO(self) -> Floats:

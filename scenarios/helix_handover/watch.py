@@ -38,7 +38,7 @@ class HandoverWatch(Watch):
         self._p_GO: Floats = np.zeros(3)
         self._offset: Floats | None = None  # p_GO when the hand let go
         self._error = 0.0
-        self._control_steps = 0
+        self._nearest = np.inf
         self._released_at: float | None = None
 
     def __call__(self, t: float, signals: Signals) -> None:
@@ -47,6 +47,8 @@ class HandoverWatch(Watch):
         self._p_WG, self._p_WO = signals["arm.p_WG"], signals["hand.p_WO"]
         self._p_GO = np.transpose(rotation_of(signals["arm.q_WG"])) @ (self._p_WO - self._p_WG)
         self._error = float(signals["servo.error"])
+        if phase in ("APPROACH", "DESCEND"):
+            self._nearest = min(self._nearest, self._error)
         self._t = t
         if not self.snapshots:
             self._keep("start", signals)
@@ -78,7 +80,7 @@ class HandoverWatch(Watch):
     @property
     def _deadline(self) -> float:
         if self._phase == "WAIT":
-            return _NOTHING_SEEN
+            return min(_NOTHING_SEEN, self.parameters.patience)
         return self.parameters.patience if "GRASP" not in self.phases else np.inf
 
     @property
@@ -92,8 +94,9 @@ class HandoverWatch(Watch):
         begun = self.phases.get("GRASP")
         metrics = {
             "final_distance": Metric(self.distance, "m", "gripper to ball at the end, ground truth"),
-            "controller_error": Metric(self._error, "m", "error that the controller saw last"),
         }
+        if np.isfinite(self._nearest):  # else the controller never saw ball and arm, and its error means nothing
+            metrics["controller_error"] = Metric(self._error, "m", "error that the controller saw last")
         if begun is not None:
             steps = round(begun / float(self.parameters.period)) + 1
             metrics["arm_time"] = Metric(begun, "s", "from the start until the gripper begins to close")
@@ -115,9 +118,9 @@ class HandoverWatch(Watch):
             return f"the hand let go at {self._released_at:.1f} s and the gripper holds the ball"
         where = f"ball at {_told(self._p_WO)} m, gripper at {_told(self._p_WG)} m"
         if self._phase == "WAIT":
-            return f"the cameras did not see both ball and arm within {_NOTHING_SEEN:.0f} s; {where}"
+            return f"the cameras did not see both ball and arm within {self._deadline:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
-            return f"out of reach: the arm came no nearer than {self._error:.2f} m to its goal; {where}"
+            return f"out of reach: the arm came no nearer than {self._nearest:.2f} m to its goal; {where}"
         if self._released_at is not None:
             return f"the hand let go at {self._released_at:.1f} s, and the gripper did not keep the ball; {where}"
         if "HOLD" in self.phases:
@@ -128,7 +131,9 @@ class HandoverWatch(Watch):
             )
         if self._t < self._deadline:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"
-        return f"no grasp within {self.parameters.patience:.0f} s: error {self._error:.3f} m; {where}"
+        reach = "out of reach or too slow" if self._nearest > 2 * self.parameters.threshold else "no grasp"
+        within = f"within {self.parameters.patience:.0f} s"
+        return f"{reach}: {within} the arm came no nearer than {self._nearest:.3f} m to its goal; {where}"
 
 
 def _beside_and_along(p_GO: Floats) -> tuple[float, float]:

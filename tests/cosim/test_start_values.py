@@ -34,8 +34,8 @@ def variable(kind: Kind, **facts: Any) -> Variable:
         (variable(Kind.REAL, shape=(2,), minimum=0.0), [1.0, -2.0], "out of range"),
         (variable(Kind.INTEGER), 1.5, "a whole number"),
         (variable(Kind.BOOLEAN), "maybe", "neither true nor false"),
-        (variable(Kind.ENUMERATION), "behind", "none of FRONT, LEFT"),
-        (variable(Kind.ENUMERATION), 3, "none of 0 (FRONT), 4 (LEFT)"),
+        (variable(Kind.ENUMERATION), "behind", "none of front, left"),
+        (variable(Kind.ENUMERATION), 3, "none of 0 (front), 4 (left)"),
         (variable(Kind.STRING), 5, "5 is not a string"),
     ],
 )

@@ -114,7 +114,8 @@ def test_an_fmi_2_arm_takes_the_arms_place(tmp_path: Path):
     assert status == 0, summary["reason"]
 
 
-def test_ctrl_c_ends_a_run_and_keeps_its_record(tmp_path: Path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_and_keeps_its_record(tmp_path: Path, number: signal.Signals):
     out = tmp_path / "r"
     going = subprocess.Popen(command("run", "helix_handover", "--out", out), stdout=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
@@ -122,7 +123,7 @@ def test_ctrl_c_ends_a_run_and_keeps_its_record(tmp_path: Path):
         assert going.poll() is None
         assert time.monotonic() < deadline
         time.sleep(0.1)
-    os.kill(going.pid, signal.SIGINT)
+    os.kill(going.pid, number)
     printed, _ = going.communicate(timeout=120)
     assert going.returncode == 1
     assert "interrupted" in printed

@@ -24,7 +24,7 @@ def test_what_is_not_given_has_its_default():
         ("alpha=nan", "not finite"),
         ("alpha=1e999", "not finite"),
         ("alpha=0.1,0.2", "is not a number"),
-        ("place=behind", "none of FRONT"),
+        ("place=behind", "none of front"),
         ("alpha", "not of the form name=value"),
     ],
 )
