@@ -62,6 +62,7 @@ class HelixHandover(Experiment[HandoverWatch]):
             "servo",
             fmu("servo"),
             period=p.period,
+            sampled=True,
             control_period=float(p.period),
             alpha=p.alpha,
             threshold=p.threshold,

@@ -13,6 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cosim.schedule import Schedule
+from fmus.build import cached
+from scenarios.helix_handover.helix_handover import HelixHandover
+from scenarios.helix_handover.parameters import Parameters
 from scenarios.record import Record
 
 
@@ -25,6 +29,13 @@ def run(out: Path, *arguments: str) -> tuple[int, dict[str, Any]]:
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     assert (out / "summary.json").is_file(), done.stderr
     return done.returncode, json.loads((out / "summary.json").read_text())
+
+
+def test_a_command_acts_in_the_step_that_follows_its_picture():
+    system = HelixHandover().build(Parameters(), 0, lambda name: cached(HelixHandover.units[name], 3))
+    schedule = Schedule(system)
+    assert [s.unit for s in schedule.sampled] == ["camera", "vision", "servo"]
+    assert [s.unit for s in schedule.continuous] == ["arm", "hand"]
 
 
 @pytest.fixture(scope="module")
@@ -108,8 +119,6 @@ def test_a_ball_out_of_reach_ends_with_status_1_and_says_why(tmp_path: Path):
 
 
 def test_an_fmi_2_arm_takes_the_arms_place(tmp_path: Path):
-    from fmus.build import cached
-
     status, summary = run(tmp_path / "r", "--unit", f"arm={cached('TendonArm', 2)}", "--seed", "3")
     assert status == 0, summary["reason"]
 
