@@ -30,7 +30,7 @@ def draw_handover(
 def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t = record.time
     true = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
-    with figure(folder / "error", 1) as (axes,):
+    with figure(folder / "error", 1, size=(8.0, 3.6)) as (axes,):
         _shade_phases(axes, t, record["servo.phase"], record.items("servo.phase"))
         seen = record["servo.phase"] > 0
         axes.plot(
@@ -43,7 +43,7 @@ def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
         axes.axhline(parameters.threshold * 1000, color="#4d5866", lw=0.8, ls="--")
         axes.axhline(parameters.settings["threshold_grasp"] * 1000, color="#4d5866", lw=0.8, ls=":")
         axes.set(xlabel="time (s)", ylabel="distance (mm)", ylim=(0, None), xlim=(t[0], t[-1]))
-        axes.legend(loc="upper right")
+        axes.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2))
     return Figure("error", "Distance to the goal over time. Dashed: threshold for the descent; dotted: for the grasp.")
 
 
