@@ -3,18 +3,18 @@
 Blocks are named, not imported: looking at the catalog loads no physics engine.
 """
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+
+from cosim.exceptions import nearest
 
 
 class UnknownUnit(LookupError):
     """No unit has this name."""
 
     def __init__(self, name: str, valid: list[str]) -> None:
-        near = difflib.get_close_matches(name, valid) or sorted(valid)
-        super().__init__(f"there is no unit {name!r}; did you mean {' or '.join(near)}?")
+        super().__init__(f"there is no unit {name!r}; {nearest(name, valid)}")
         self.name, self.valid = name, valid
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from controllers.constant_curvature import forward_kinematics, tendon_lengths
-from controllers.visual_servo import Inputs, Outputs, Params, Phase, UnusableParameters, VisualServo
+from controllers.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
 from cosim.block import describe
 from cosim.ports import Floats
 
@@ -376,36 +376,6 @@ def test_outputs_at_the_start_are_those_of_the_calibrated_arm():
     np.testing.assert_array_equal(y.q_sys, Q_CALIB)
     np.testing.assert_allclose(y.p_WG_est, [0.0, 0.0, -0.7])
     assert servo.get_state() == state
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"alpha": 0.0}, r"alpha = 0.0 is outside \(0, 1\]"),
-        ({"alpha": 1.5}, r"alpha = 1.5 is outside \(0, 1\]"),
-        ({"alpha": math.nan}, "alpha = nan is not finite"),
-        ({"Q_ball": 0.0}, "Q_ball = 0.0 must be positive"),
-        ({"R_wrist": -0.1}, "R_wrist = -0.1 must be positive"),
-        ({"P_init": 0.0}, "P_init = 0.0 must be positive"),
-        ({"K_initialize": np.zeros(9)}, "K_initialize = .* must be positive"),
-        ({"L_sys_LB": np.array([0, 0.08, 0, 0.27, 0, 0.16])}, "limits of l_2: lower 0.27 > upper 0.26"),
-        ({"L_sys_LB": np.array([0.1, 0.08, 0, 0.16, 0, 0.16])}, "rotations d_i have the lower bound 0"),
-        ({"l_calib": np.array([0.12, 0.3, 0.24])}, r"l_calib = \[0.12, 0.3, 0.24\] is outside the limits"),
-        ({"threshold_retreat": 0.1}, "threshold_retreat = 0.1 must exceed"),
-        ({"closing_time": -1.0}, "closing_time = -1.0 must not be negative"),
-        ({"control_period": 0.0}, "control_period = 0.0 must be positive"),
-        ({"N_max_iter": 0}, "N_max_iter = 0 must be positive"),
-    ],
-)
-def test_unusable_parameters_are_refused_by_name(values: dict[str, Any], message: str):
-    with pytest.raises(UnusableParameters, match=message):
-        VisualServo(Params(**values))
-
-
-def test_all_faults_are_named_at_once():
-    with pytest.raises(UnusableParameters) as caught:
-        VisualServo(Params(alpha=2.0, Q_ball=-1.0, closing_time=-1.0))
-    assert len(caught.value.faults) == 3
 
 
 def test_the_block_declares_its_ports():
