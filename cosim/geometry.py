@@ -12,12 +12,14 @@ from scipy.spatial.transform import Rotation
 from cosim.ports import Floats
 
 FRAMES: Final = {
-    "W": "world: right-handed, z up; origin at the middle of the Helix's mount",
-    "B": "base of an arm or a free-flying body; the Helix's has z down, along the hanging arm (R_WB = diag(1, -1, -1))",
+    "W": "world: right-handed, z up; origin at the middle of the Helix's mount, at the foot of the VSL arm, near the "
+    "place of a free-flyer's handover, on the table of the grasp scene",
+    "B": "base of an arm or a free-flying body; the Helix's has z down, along the hanging arm (R_WB = diag(1, -1, -1)) "
+    "and a free-flyer's has its origin at the centre of mass and its arm along -x",
     "R": "marker ring at the wrist: z along the arm towards the gripper",
-    "G": "gripper: the point where an object is held; same axes as R on the Helix",
-    "O": "object that is handed over: the ball's centre",
-    "H": "hand: middle of the palm",
+    "G": "gripper: the point where an object is held; same axes as R on the Helix, as B on the free-flyer",
+    "O": "object that is handed over or grasped: its centre",
+    "H": "hand: middle of the palm; for the soft hand of the grasp scene its wrist, x towards the object",
     "C": "camera: z along the optical axis, x to the right and y down in the picture",
     "M": "one fiducial marker: z out of its face",
 }

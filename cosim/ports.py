@@ -49,7 +49,10 @@ Vector3 = TypeAliasType("Vector3", Annotated[Floats, Shape((3,))], type_params=(
 Vector4 = TypeAliasType("Vector4", Annotated[Floats, Shape((4,))], type_params=(U,))
 Vector5 = TypeAliasType("Vector5", Annotated[Floats, Shape((5,))], type_params=(U,))
 Vector6 = TypeAliasType("Vector6", Annotated[Floats, Shape((6,))], type_params=(U,))
+Vector8 = TypeAliasType("Vector8", Annotated[Floats, Shape((8,))], type_params=(U,))
 Vector9 = TypeAliasType("Vector9", Annotated[Floats, Shape((9,))], type_params=(U,))
+Vector12 = TypeAliasType("Vector12", Annotated[Floats, Shape((12,))], type_params=(U,))
+Vector14 = TypeAliasType("Vector14", Annotated[Floats, Shape((14,))], type_params=(U,))
 Matrix3 = TypeAliasType("Matrix3", Annotated[Floats, Shape((3, 3))], type_params=(U,))
 Polyline25 = TypeAliasType("Polyline25", Annotated[Floats, Shape((25, 3))], type_params=(U,))
 
