@@ -10,7 +10,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from cosim.exceptions import CosimError, UnitFailure, UnitRefused
@@ -125,7 +124,7 @@ class Master:
     def _feed(self, unit: str, known: Collection[str] | None = None) -> None:
         """Set a unit's inputs from its sources, or only from those whose outputs are known already."""
         for target, source in self._copies[unit]:
-            np.copyto(target, source, casting="unsafe")
+            target[...] = source
         if known is None:
             self._instances[unit].set_inputs()
         else:

@@ -34,6 +34,7 @@ class Recorder:
         self._columns: list[Column] = []
         self._schema = pa.schema([])
         self._time = np.zeros(_ROWS)
+        self._sources: list[tuple[NDArray[Any], NDArray[Any]]] = []  # a unit's values of one type, and their rows here
         self._block: list[NDArray[Any]] = []
         self._filled = 0
 
@@ -58,8 +59,8 @@ class Recorder:
         if self._writer is None:
             self._open(signals)
         self._time[self._filled] = t
-        for column, block in zip(self._columns, self._block, strict=True):
-            block[self._filled] = column.values[column.index]
+        for values, rows in self._sources:
+            rows[self._filled] = values
         self._filled += 1
         self.rows += 1
         if self._filled == _ROWS:
@@ -67,7 +68,7 @@ class Recorder:
 
     def _open(self, signals: Signals) -> None:
         self._columns = signals.columns()
-        self._block = [np.zeros(_ROWS, dtype=c.values.dtype) for c in self._columns]
+        self._sources, self._block = _rows_of(self._columns)
         time = pa.field("time", pa.float64(), metadata={"unit": "s", "description": "simulated time"})
         self._schema = pa.schema([time, *(_field(c) for c in self._columns)])
         self._file = pa.OSFile(str(self.stream), "wb")
@@ -92,6 +93,22 @@ class Recorder:
             for batch in batches:
                 file.write_batch(batch)
         self.stream.unlink()
+
+
+def _rows_of(columns: list[Column]) -> tuple[list[tuple[NDArray[Any], NDArray[Any]]], list[NDArray[Any]]]:
+    """Return each whole array that columns lie in with rows for it, and each column's part of the rows.
+
+    A unit's outputs of one type are views of one array: copying that at once costs a tenth of going entry by entry.
+    """
+    rows: dict[int, tuple[NDArray[Any], NDArray[Any]]] = {}
+    block: list[NDArray[Any]] = []
+    for c in columns:
+        whole = c.values if c.values.base is None else c.values.base
+        if id(whole) not in rows:
+            rows[id(whole)] = (whole, np.zeros((_ROWS, len(whole)), dtype=whole.dtype))
+        first = (c.values.ctypes.data - whole.ctypes.data) // whole.itemsize
+        block.append(rows[id(whole)][1][:, first + c.index])
+    return list(rows.values()), block
 
 
 def _field(c: Column) -> "pa.Field[Any]":
