@@ -1,0 +1,141 @@
+"""What the arm with variable-stiffness links is made of, and how well its sensors see. [Gandarias2020] sec. II."""
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.ports import Vector2, Vector3, parameter
+from cosim.units import (
+    Ampere,
+    Kilogram,
+    Metre,
+    MetrePerSecond2,
+    Newton,
+    NewtonMetre,
+    NewtonMetre2,
+    NewtonMetre2PerPascal,
+    NewtonMetrePerAmpere,
+    NewtonMetrePerRadian,
+    Number,
+    Pascal,
+    Radian,
+    RadianPerSecond,
+    Second,
+)
+
+TURN = 2.0 * math.pi
+HIGHEST_PRESSURE = 3.0e5
+"""Pa; the published experiments go to 2 bar."""
+
+
+class UnusableVslArm(ValueError):
+    """Parameters of which no arm can be built; `faults` lists all of them."""
+
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("VslArm: " + "; ".join(faults))
+        self.faults = faults
+
+
+class Motion(enum.IntEnum):
+    """Whether the arm swings."""
+
+    QUASI_STATIC = 0
+    DYNAMIC = 1
+
+
+class Link(enum.IntEnum):
+    """What a link is made of: an inflated sleeve of silicone and fabric, or a printed part of the same weight."""
+
+    VSL = 0
+    RIGID = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Dimensions, stiffness, weights and sensors; assumed, but for the kinds of motor, sensor and link.
+
+    The values are chosen so that the tip of the arm errs by about what [Gandarias2020] fig. 5 shows.
+    """
+
+    motion: Motion = parameter(Motion.QUASI_STATIC, "whether the arm swings, or is at rest at every instant")
+    link_2: Link = parameter(Link.VSL, "what the link from shoulder to elbow is made of")
+    link_3: Link = parameter(Link.VSL, "what the link from elbow to gripper is made of")
+    L_1: Metre = parameter(0.150, "height of the shoulder J2 above the base", minimum=0.0, maximum=2.0)
+    L_2: Metre = parameter(0.225, "length from shoulder to elbow", minimum=0.01, maximum=2.0)
+    L_3: Metre = parameter(0.225, "length from elbow to gripper", minimum=0.01, maximum=2.0)
+    cap: Metre = parameter(0.030, "length of the rigid cap at each end of a link", minimum=0.0, maximum=1.0)
+    EI_0: NewtonMetre2 = parameter(0.55, "bending stiffness of a link without pressure", minimum=1e-3, maximum=1e6)
+    EI_p: NewtonMetre2PerPascal = parameter(1.05e-5, "what pressure adds to it", minimum=0.0, maximum=1.0)
+    shear_0: Newton = parameter(60.0, "shear stiffness of a link without pressure", minimum=1.0, maximum=1e9)
+    R_link: Metre = parameter(0.022, "radius of the air in a link: p pi R^2 is added", minimum=0.0, maximum=0.2)
+    EI_rigid: NewtonMetre2 = parameter(
+        150.0, "bending stiffness of a printed link, which does not shear", minimum=1.0, maximum=1e9
+    )
+    link_mass: Kilogram = parameter(0.140, "mass of a link, evenly spread", minimum=0.0, maximum=10.0)
+    servo_mass: Kilogram = parameter(0.125, "mass of the servo J3, at the elbow", minimum=0.0, maximum=10.0)
+    gripper_mass: Kilogram = parameter(0.035, "mass of the gripper, at the tip", minimum=0.0, maximum=10.0)
+    gravity: MetrePerSecond2 = parameter(9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0)
+    joint_stiffness: NewtonMetrePerRadian = parameter(
+        140.0, "stiffness of gear and bracket of J2 and J3, behind the encoder", minimum=1.0, maximum=1e12
+    )
+    servo_stiffness: NewtonMetrePerRadian = parameter(
+        260.0, "torque by the servo's droop, which the encoder sees", minimum=1.0, maximum=1e12
+    )
+    droop_time: Second = parameter(
+        0.1, "time constant of the droop of an arm that swings: the gear holds it longer", minimum=1e-3, maximum=10.0
+    )
+    servo_speed: RadianPerSecond = parameter(4.8, "fastest turn of a joint", minimum=0.01, maximum=100.0)
+    kt: NewtonMetrePerAmpere = parameter(1.78, "torque by current of a servo", minimum=1e-3, maximum=100.0)
+    gear_friction: NewtonMetre = parameter(0.06, "friction of a gear, in the current", minimum=0.0, maximum=10.0)
+    sliding: Radian = parameter(0.002, "turn that reverses all the friction", minimum=1e-6, maximum=1.0)
+    servo_noise: Radian = parameter(
+        math.radians(0.06), "standard deviation of an encoder's reading", minimum=0.0, maximum=1.0
+    )
+    current_noise: Ampere = parameter(0.003, "standard deviation of a current's reading", minimum=0.0, maximum=10.0)
+    tracker_noise: Metre = parameter(
+        0.0005, "standard deviation of the tracker's reading, each axis", minimum=0.0, maximum=1.0
+    )
+    pressure_noise: Pascal = parameter(200.0, "standard deviation of a transducer's reading", minimum=0.0, maximum=1e5)
+    pressure_time: Second = parameter(
+        0.25, "time constant of regulator and hose, valve open", minimum=1e-3, maximum=100.0
+    )
+    leak_time: Second = parameter(600.0, "time constant of the leak, valve closed", minimum=1.0, maximum=1e9)
+    valve_tolerance: Pascal = parameter(500.0, "deviation at which the valve closes", minimum=1.0, maximum=1e5)
+    valve_band: Pascal = parameter(2000.0, "deviation at which it opens again", minimum=1.0, maximum=1e5)
+    q_0: Vector3[Radian] = parameter(
+        np.array([0.0, 0.8411, -1.6821]), "where the joints start, in rest", minimum=-TURN, maximum=TURN
+    )
+    p_0: Vector2[Pascal] = parameter(
+        np.array([1.0e5, 1.0e5]), "pressures of links 2 and 3 at the start", minimum=0.0, maximum=HIGHEST_PRESSURE
+    )
+    hinges: int = parameter(6, "hinges of a flexible link, quasi-statically", minimum=1, maximum=100)
+    hinges_dynamic: int = parameter(2, "hinges of a flexible link that swings", minimum=1, maximum=12)
+    damping_time: Second = parameter(
+        0.005, "damping by stiffness of all springs of an arm that swings", minimum=0.0, maximum=1.0
+    )
+    substep: Second = parameter(0.005, "longest internal time step of an arm that swings", minimum=1e-5, maximum=0.01)
+    high_frequency_damping: Number = parameter(
+        0.8, "spectral radius of the time integration at high frequency", minimum=0.0, maximum=1.0
+    )
+    seed: int = parameter(0, "seed of the random numbers", minimum=0)
+
+    def check(self) -> None:
+        """Raise UnusableVslArm, with all faults, if values contradict each other."""
+        faults: list[str] = []
+        for name, length in (("L_2", self.L_2), ("L_3", self.L_3)):
+            if not 2.0 * self.cap < length:
+                faults.append(
+                    f"two caps of {self.cap:g} m leave nothing flexible of {name} {length:g} m: cap must be less than "
+                    f"{length / 2.0:g} m"
+                )
+        if not self.valve_tolerance < self.valve_band:
+            faults.append(
+                f"valve_tolerance {self.valve_tolerance:g} Pa must be less than valve_band {self.valve_band:g} Pa, or "
+                "the valve chatters"
+            )
+        if self.motion is Motion.DYNAMIC and not (self.link_mass > 0.0 and self.gripper_mass > 0.0):
+            faults.append("link_mass and gripper_mass must be greater than 0 for an arm that swings")
+        if faults:
+            raise UnusableVslArm(faults)

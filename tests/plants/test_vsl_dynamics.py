@@ -1,0 +1,202 @@
+"""Motion of the chain: conserved energy, refined self, measured frequencies, rest as by statics."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.ports import Floats
+from plants.vsl_chain import Pose, VslChain
+from plants.vsl_dynamics import NoConvergence, VslDynamics
+from plants.vsl_parameters import Link, Motion, Params
+from plants.vsl_statics import VslStatics
+
+OUTSTRETCHED = (0.47588225, -0.95176450)
+"""Stiff arm at (0.4, 0, 0.15) m, elbow up."""
+RAISED = (0.84106867, -1.68213734)
+"""Stiff arm at (0.3, 0, 0.15) m, elbow up."""
+P = (1e5, 1e5)
+LOOSE = Params(motion=Motion.DYNAMIC)
+UNDAMPED = replace(LOOSE, damping_time=0.0, high_frequency_damping=1.0, servo_stiffness=1e12, joint_stiffness=3.0)
+
+
+def swinging(params: Params, theta: tuple[float, float] = RAISED, load: float = 0.0, hinges: int = 2) -> VslDynamics:
+    dynamics = VslDynamics(VslChain(params, hinges), params)
+    dynamics.settle(theta, P, load)
+    return dynamics
+
+
+def tip(chain: VslChain, mechanics: VslDynamics | VslStatics) -> complex:
+    return complex(chain.ends(mechanics.pose)[-1])
+
+
+def test_starts_at_rest_and_stays_there():
+    dynamics = swinging(LOOSE, load=0.05)
+    angles = np.array(dynamics.pose.angles)
+    torque, droop = dynamics.pose.torque, dynamics.pose.droop
+    for _ in range(100):
+        dynamics.advance(0.02, (RAISED, RAISED), P, 0.05, 0.0)
+    np.testing.assert_allclose(dynamics.pose.angles, angles, atol=1e-9)
+    np.testing.assert_allclose(dynamics.pose.torque, torque, atol=1e-7)
+    np.testing.assert_allclose(dynamics.pose.droop, droop, atol=1e-9)
+
+
+@pytest.mark.parametrize("hinges", [2, 6])
+def test_comes_to_the_rest_of_statics_with_as_many_hinges(hinges: int):
+    dynamics = swinging(replace(LOOSE, damping_time=0.05), hinges=hinges)
+    dynamics.advance(0.3, (RAISED, OUTSTRETCHED), P, 0.05, 0.0)
+    for _ in range(150):
+        dynamics.advance(0.02, (OUTSTRETCHED, OUTSTRETCHED), P, 0.05, 0.0)
+    chain = VslChain(LOOSE, hinges)
+    statics = VslStatics(chain, 9.81, 1.0 / 260.0)
+    statics.settle(OUTSTRETCHED, P, 0.05)
+    assert abs(tip(chain, dynamics) - tip(chain, statics)) < 1e-6
+    np.testing.assert_allclose(dynamics.pose.shears, statics.pose.shears, atol=1e-6)
+    np.testing.assert_allclose(dynamics.pose.droop, statics.pose.droop, atol=1e-6)
+
+
+def test_two_hinges_rest_almost_where_six_do():
+    ends: list[complex] = []
+    for hinges in (2, 6):
+        chain = VslChain(LOOSE, hinges)
+        statics = VslStatics(chain, 9.81, 1.0 / 260.0)
+        statics.settle(OUTSTRETCHED, P, 0.1)
+        ends.append(tip(chain, statics))
+    assert abs(ends[0] - ends[1]) < 3.1e-4
+
+
+def energies(chain: VslChain, poses: tuple[Pose, Pose, Pose], h: float) -> tuple[float, float]:
+    """Kinetic and potential energy at the second of three poses, h apart, by differences of the bodies."""
+    before, now, after = poses
+    own = UNDAMPED.link_mass * np.array(chain.lengths) / 0.225
+    speed = (chain.ends(after) - chain.ends(before)) / (2.0 * h)
+    turn = (after.angles - before.angles) / (2.0 * h)
+    kinetic = own @ np.abs((speed[1:] + speed[:-1]) / 2.0) ** 2 + UNDAMPED.servo_mass * abs(speed[chain.elbow]) ** 2
+    kinetic += UNDAMPED.gripper_mass * abs(speed[-1]) ** 2 + (own * np.square(chain.lengths) / 12.0) @ turn**2
+    hinge, shear = chain.springs(P)
+    twist = np.diff(now.angles, prepend=0.0)
+    twist[[0, chain.elbow]] -= RAISED
+    springs = np.sum(twist**2 / np.array(hinge)) + np.sum(now.shears**2 / np.array(shear))
+    ends = chain.ends(now)
+    height = own @ (ends[1:] + ends[:-1]).imag / 2.0 + UNDAMPED.servo_mass * ends[chain.elbow].imag
+    return float(kinetic) / 2.0, float(springs) / 2.0 + 9.81 * float(height + UNDAMPED.gripper_mass * ends[-1].imag)
+
+
+def test_without_damping_energy_is_conserved_while_the_arm_swings_far():
+    h = 5e-4
+    chain = VslChain(UNDAMPED, 2)
+    dynamics = VslDynamics(chain, replace(UNDAMPED, substep=h))
+    dynamics.settle(RAISED, P, 0.5)
+    poses: list[Pose] = []
+    for _ in range(800):
+        dynamics.advance(h, (RAISED, RAISED), P, 0.0, 0.0)
+        poses.append(dynamics.pose)
+    found = np.array([energies(chain, (poses[i - 1], poses[i], poses[i + 1]), h) for i in range(10, 799, 9)])
+    assert np.ptp([pose.angles[-1] for pose in poses]) > 0.8
+    assert np.ptp(found[:, 0]) > 0.2
+    assert np.ptp(found.sum(axis=1)) < 2e-5
+
+
+def test_first_modes_are_where_they_were_measured():
+    soft, hard = (
+        [swinging(LOOSE, theta).frequencies((p, p), 0.0)[0] for theta in (OUTSTRETCHED, RAISED)] for p in (0.5e5, 2e5)
+    )
+    np.testing.assert_allclose(soft, [3.22, 3.87], atol=0.02)
+    np.testing.assert_allclose(hard, [4.78, 5.76], atol=0.02)
+    rigid = replace(LOOSE, link_2=Link.RIGID, link_3=Link.RIGID)
+    assert swinging(rigid, OUTSTRETCHED).frequencies(P, 0.0)[0] == pytest.approx(10.6, abs=0.05)
+
+
+def ringing(params: Params, h: float = 0.002) -> Floats:
+    """Height of the tip, every h, after a small load has been taken off."""
+    chain = VslChain(params, 2)
+    dynamics = VslDynamics(chain, params)
+    dynamics.settle(OUTSTRETCHED, P, 0.001)
+    heights: list[float] = []
+    for _ in range(700):
+        dynamics.advance(h, (OUTSTRETCHED, OUTSTRETCHED), P, 0.0, 0.0)
+        heights.append(tip(chain, dynamics).imag)
+    return np.array(heights)
+
+
+def test_rings_down_at_the_first_mode_with_the_damping_that_it_has():
+    params = replace(LOOSE, servo_stiffness=1e12)
+    f = float(swinging(params, OUTSTRETCHED).frequencies(P, 0.0)[0])
+    chain = VslChain(params, 2)
+    statics = VslStatics(chain, 9.81, 0.0)
+    statics.settle(OUTSTRETCHED, P, 0.0)
+    z = ringing(params) - tip(chain, statics).imag
+    peaks = [i for i in range(150, len(z) - 1) if z[i - 1] < z[i] >= z[i + 1]]
+    assert np.diff(peaks).mean() * 0.002 == pytest.approx(1.0 / f, rel=0.01)
+    ratio = math.log(z[peaks[0]] / z[peaks[2]]) / (4.0 * math.pi)
+    assert ratio == pytest.approx(math.pi * f * params.damping_time, rel=0.1)
+
+
+@pytest.mark.parametrize(("substep", "off"), [(0.01, 1.5e-3), (0.005, 5e-4)])
+def test_the_internal_step_costs_little(substep: float, off: float):
+    def course(h: float) -> Floats:
+        params = replace(LOOSE, substep=h)
+        chain, dynamics = VslChain(params, 2), swinging(params)
+        points: list[complex] = []
+        for i in range(20):
+            first, last = (
+                tuple(RAISED[j] + min(k, 10) / 10.0 * (OUTSTRETCHED[j] - RAISED[j]) for j in (0, 1)) for k in (i, i + 1)
+            )
+            dynamics.advance(0.02, ((first[0], first[1]), (last[0], last[1])), P, 0.05, 0.0)
+            points.append(tip(chain, dynamics))
+        return np.abs(np.array(points))
+
+    assert np.abs(course(substep) - course(5e-4)).max() < off
+
+
+def test_stable_at_long_steps_after_a_jump_of_command_and_load():
+    dynamics, p = swinging(LOOSE), (2e5, 0.5e5)
+    for _ in range(400):
+        dynamics.advance(0.02, (OUTSTRETCHED, OUTSTRETCHED), p, 0.5, 0.0)
+    chain = VslChain(LOOSE, 2)
+    statics = VslStatics(chain, 9.81, 1.0 / 260.0)
+    statics.settle(OUTSTRETCHED, p, 0.5)
+    assert abs(tip(chain, dynamics) - tip(chain, statics)) < 3e-4
+
+
+def test_a_turn_about_the_base_pulls_the_arm_outwards():
+    params = replace(
+        LOOSE, gravity=0.0, link_2=Link.RIGID, link_3=Link.RIGID, EI_rigid=1e9, joint_stiffness=1e6, damping_time=1e-3
+    )
+    straight, spin = (0.7, 0.0), 3.0
+    dynamics = swinging(params, straight, hinges=12)
+    for _ in range(100):
+        dynamics.advance(0.02, (straight, straight), P, 0.0, spin)
+    L, m = 0.45, params.link_mass
+    second_moment = 2.0 * m * L**2 / 3.0 + params.servo_mass * (L / 2.0) ** 2 + params.gripper_mass * L**2
+    wanted = spin**2 * math.sin(0.7) * math.cos(0.7) * second_moment
+    assert dynamics.pose.torque[0] == pytest.approx(wanted, rel=5e-3)
+
+
+@pytest.mark.parametrize("droop_time", [1e-3, 1.0])
+def test_droop_follows_the_torque_in_its_time(droop_time: float):
+    params = replace(LOOSE, droop_time=droop_time, link_2=Link.RIGID, link_3=Link.RIGID)
+    dynamics = swinging(params)
+    before = dynamics.pose.droop[0]
+    for _ in range(50):
+        dynamics.advance(0.02, (RAISED, RAISED), P, 0.1, 0.0)
+    followed = (dynamics.pose.droop[0] - before) / (dynamics.pose.torque[0] / 260.0 - before)
+    assert followed == pytest.approx(1.0 - math.exp(-1.0 / droop_time), abs=0.02)
+
+
+def test_continues_bit_for_bit_from_a_state():
+    one, other = swinging(LOOSE), VslDynamics(VslChain(LOOSE, 2), LOOSE)
+    one.advance(0.1, (RAISED, OUTSTRETCHED), P, 0.1, 0.5)
+    other.set_state(one.get_state())
+    for dynamics in (one, other):
+        for _ in range(10):
+            dynamics.advance(0.02, (OUTSTRETCHED, OUTSTRETCHED), P, 0.1, 0.0)
+    assert tip(VslChain(LOOSE, 2), one) == tip(VslChain(LOOSE, 2), other)
+    assert (one.pose.torque, one.pose.droop) == (other.pose.torque, other.pose.droop)
+
+
+def test_no_solution_is_said():
+    dynamics = swinging(LOOSE)
+    with pytest.raises(NoConvergence, match="no solution of the equations of motion"):
+        dynamics.advance(0.02, (RAISED, (math.nan, 0.0)), P, 0.0, 0.0)

@@ -1,0 +1,81 @@
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from plants.vsl_pressure import PressureLine
+
+
+def line(p: float, leak_time: float = 600.0) -> PressureLine:
+    return PressureLine(p, 0.25, leak_time, 500.0, 2000.0)
+
+
+def test_the_regulator_nears_the_command_exponentially():
+    air = line(0.0)
+    air.advance(0.1, 2e5)
+    assert air.open
+    assert air.p == pytest.approx(2e5 * (1.0 - math.exp(-0.1 / 0.25)))
+
+
+@pytest.mark.parametrize("p", [0.5e5, 2.5e5])
+def test_the_valve_closes_when_the_pressure_is_reached_from_either_side(p: float):
+    air = line(p, leak_time=1e9)
+    until = 0.25 * math.log(abs(p - 1.5e5) / 500.0)
+    air.advance(until - 1e-6, 1.5e5)
+    assert air.open
+    air.advance(2e-6, 1.5e5)
+    assert not air.open
+    assert abs(air.p - 1.5e5) == pytest.approx(500.0, rel=1e-4)
+
+
+def test_a_closed_line_leaks_slowly_and_is_filled_up_again():
+    air = line(1e5)
+    air.advance(5.0, 1e5)
+    assert air.p == pytest.approx(1e5 * math.exp(-5.0 / 600.0))
+    assert not air.open
+    air.advance(600.0 * math.log(1e5 / 0.98e5) - 5.0 + 1e-3, 1e5)
+    assert air.open
+    air.advance(1.0, 1e5)
+    assert 0.99e5 < air.p < 1e5
+
+
+def test_small_changes_of_the_command_do_not_move_the_valve():
+    air = line(1e5, leak_time=1e9)
+    air.advance(1.0, 1.015e5)
+    assert air.p == pytest.approx(1e5, rel=1e-6)
+    air.advance(2.0, 1.025e5)
+    assert abs(air.p - 1.025e5) <= 500.1
+
+
+@given(
+    start=st.floats(0.0, 3e5),
+    commands=st.lists(st.floats(0.0, 3e5), min_size=1, max_size=4),
+    times=st.lists(st.floats(0.01, 200.0), min_size=4, max_size=4),
+)
+def test_the_course_does_not_depend_on_the_steps(start: float, commands: list[float], times: list[float]):
+    coarse, fine = line(start), line(start)
+    for command, time in zip(commands, times, strict=False):
+        coarse.advance(time, command)
+        for _ in range(7):
+            fine.advance(time / 7.0, command)
+        assert 0.0 <= coarse.p <= 3e5 + 500.0
+        assert fine.p == pytest.approx(coarse.p, abs=1e-3)
+
+
+@given(p=st.floats(0.0, 3e5), p_cmd=st.floats(0.0, 3e5))
+def test_ends_near_every_command(p: float, p_cmd: float):
+    air = line(p)
+    air.advance(60.0, p_cmd)
+    assert abs(air.p - p_cmd) <= 2000.0 * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("when", [lambda: 0.05, lambda: 3.0])
+def test_continues_from_a_state(when: Callable[[], float]):
+    one, other = line(0.0), line(1e5)
+    one.advance(when(), 2e5)
+    other.set_state(one.get_state())
+    for air in (one, other):
+        air.advance(20.0, 1.7e5)
+    assert one.get_state() == other.get_state()

@@ -1,0 +1,180 @@
+"""The rest of the chain against the formulas of straight beams, its own potential energy, and a refined self."""
+
+import cmath
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from plants.vsl_chain import Pose, VslChain
+from plants.vsl_parameters import Link, Params
+from plants.vsl_statics import NoEquilibrium, VslStatics
+
+STIFF = 1e11
+ONE_LINK = Params(
+    link_2=Link.RIGID,
+    EI_rigid=1e9,
+    cap=0.0,
+    link_mass=0.0,
+    servo_mass=0.0,
+    gripper_mass=0.0,
+    joint_stiffness=STIFF,
+    servo_stiffness=STIFF,
+)
+"""Link 2 does not give: what does is link 3, a straight beam in a wall."""
+
+
+def rest(params: Params, theta: tuple[float, float], p: float, load: float, hinges: int = 6) -> tuple[VslChain, Pose]:
+    chain = VslChain(params, hinges)
+    statics = VslStatics(chain, params.gravity, 1.0 / params.servo_stiffness)
+    statics.settle(theta, (p, p), load)
+    return chain, statics.pose
+
+
+def tip(params: Params, theta: tuple[float, float], p: float, load: float, hinges: int = 6) -> complex:
+    chain, pose = rest(params, theta, p, load, hinges)
+    return complex(chain.ends(pose)[-1])
+
+
+def cantilever(params: Params, p: float, force: float) -> float:
+    """Deflection P L^3 / (3 EI) + P L / GA."""
+    L, EI = params.L_3, params.EI_0 + params.EI_p * p
+    GA = params.shear_0 + p * math.pi * params.R_link**2
+    return force * L**3 / (3.0 * EI) + force * L / GA
+
+
+@pytest.mark.parametrize("p", [0.0, 0.5e5, 2.0e5])
+def test_a_link_with_a_small_load_bends_like_a_cantilever(p: float):
+    load = 1e-4
+    wanted = cantilever(ONE_LINK, p, load * 9.81)
+    deflection = -tip(ONE_LINK, (0.0, 0.0), p, load, 200).imag
+    assert deflection == pytest.approx(wanted, rel=1e-4)
+
+
+def test_the_error_of_the_hinges_falls_with_their_square():
+    wanted = cantilever(ONE_LINK, 1e5, 1e-4 * 9.81)
+    bending = wanted - 1e-4 * 9.81 * ONE_LINK.L_3 / (60.0 + 1e5 * math.pi * 0.022**2)
+    for hinges in (2, 6, 12):
+        off = -tip(ONE_LINK, (0.0, 0.0), 1e5, 1e-4, hinges).imag - wanted
+        assert off / bending == pytest.approx(-1.0 / (4.0 * hinges**2), rel=1e-3)
+
+
+def test_rigid_caps_do_not_bend():
+    params = replace(ONE_LINK, cap=0.05, shear_0=1e9)
+    L, force = 0.225, 1e-4 * 9.81
+    wanted = force * ((L - 0.05) ** 3 - 0.05**3) / (3.0 * (0.55 + 1.05))
+    assert -tip(params, (0.0, 0.0), 1e5, 1e-4, 200).imag == pytest.approx(wanted, rel=1e-4)
+
+
+def test_the_weight_of_a_link_bends_it_like_an_even_load():
+    params = replace(ONE_LINK, link_mass=1e-3, shear_0=1e9)
+    wanted = 1e-3 * 9.81 * 0.225**3 / (8.0 * 1.6)
+    assert -tip(params, (0.0, 0.0), 1e5, 0.0, 200).imag == pytest.approx(wanted, rel=1e-4)
+
+
+def test_joints_give_to_torque_and_only_droop_is_reported():
+    params = replace(ONE_LINK, link_3=Link.RIGID, joint_stiffness=140.0, servo_stiffness=260.0)
+    _, pose = rest(params, (0.0, 0.0), 0.0, 0.01)
+    tau_2, tau_3 = 0.01 * 9.81 * 0.45, 0.01 * 9.81 * 0.225
+    np.testing.assert_allclose(pose.torque, [tau_2, tau_3], rtol=1e-4)
+    np.testing.assert_allclose(pose.droop, np.array(pose.torque) / 260.0, rtol=1e-12)
+    assert pose.angles[0] == pytest.approx(-tau_2 * (1.0 / 140.0 + 1.0 / 260.0), rel=1e-4)
+
+
+def test_stiff_links_obey_the_rigid_kinematics():
+    params = Params(
+        link_2=Link.RIGID, link_3=Link.RIGID, EI_rigid=1e9, joint_stiffness=STIFF, servo_stiffness=STIFF, L_3=0.18
+    )
+    for theta_2, theta_3 in itertools.product([-0.5, 0.3, 1.2, 2.8], [-2.0, -0.4, 0.9]):
+        wanted = cmath.rect(0.225, theta_2) + cmath.rect(0.18, theta_2 + theta_3)
+        assert tip(params, (theta_2, theta_3), 1e5, 0.1) == pytest.approx(wanted, abs=1e-7)
+
+
+def energy(params: Params, chain: VslChain, pose: Pose, theta: tuple[float, float], p: float, load: float) -> float:
+    """Potential energy of springs and masses; a body's mass is at its middle."""
+    hinge, shear = chain.springs((p, p))
+    ends = chain.ends(pose)
+    twist = np.diff(pose.angles, prepend=0.0)
+    twist[0] -= theta[0]
+    twist[chain.elbow] -= theta[1]
+    compliance = np.array(hinge)
+    compliance[[0, chain.elbow]] += 1.0 / params.servo_stiffness
+    flexible = np.array(shear) > 0.0
+    springs = np.sum(twist**2 / compliance) + np.sum(pose.shears[flexible] ** 2 / np.array(shear)[flexible])
+    own = params.link_mass * np.array(chain.lengths) / 0.225
+    height = own @ ends.imag[:-1] / 2.0 + own @ ends.imag[1:] / 2.0
+    height += params.servo_mass * ends[chain.elbow].imag + (params.gripper_mass + load) * ends[-1].imag
+    return float(springs / 2.0 + 9.81 * height)
+
+
+@pytest.mark.parametrize("links", [(Link.VSL, Link.VSL), (Link.RIGID, Link.VSL), (Link.VSL, Link.RIGID)])
+@pytest.mark.parametrize("theta", [(0.9, -1.4), (1.6, 0.1), (-0.7, 2.0), (3.0, 0.5)])
+def test_the_rest_has_the_least_potential_energy(links: tuple[Link, Link], theta: tuple[float, float]):
+    params = Params(link_2=links[0], link_3=links[1])
+    chain, pose = rest(params, theta, 0.7e5, 0.08)
+    least = energy(params, chain, pose, theta, 0.7e5, 0.08)
+    rng = np.random.default_rng(1)
+    flexible = np.array(chain.shearing) > 0.0
+    for _ in range(50):
+        change, shift = 1e-3 * rng.standard_normal(len(chain)), 1e-4 * rng.standard_normal(len(chain)) * flexible
+        sides = [
+            energy(
+                params,
+                chain,
+                pose._replace(angles=pose.angles + s * change, shears=pose.shears + s * shift),
+                theta,
+                0.7e5,
+                0.08,
+            )
+            for s in (-1.0, 1.0)
+        ]
+        assert min(sides) > least
+        slope, curvature = (sides[1] - sides[0]) / 2.0, (sides[0] + sides[1]) / 2.0 - least
+        assert abs(slope) < 1e-3 * curvature
+
+
+@pytest.mark.parametrize(("hinges", "off"), [(2, 4e-4), (3, 2e-4), (6, 5e-5)])
+def test_few_hinges_agree_with_many(hinges: int, off: float):
+    fine = tip(Params(), (0.9, -0.95), 0.5e5, 0.1, 60)
+    assert off / 2.0 < abs(tip(Params(), (0.9, -0.95), 0.5e5, 0.1, hinges) - fine) < off
+
+
+def test_finds_a_rest_in_the_whole_workspace_and_the_same_from_anywhere():
+    params = Params()
+    chain = VslChain(params, 6)
+    near, far = (VslStatics(chain, 9.81, 1.0 / 260.0) for _ in range(2))
+    near.settle((0.8, -1.6), (1e5, 1e5), 0.0)
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        theta = (float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(-math.pi, math.pi)))
+        p, load = (float(rng.uniform(0.0, 3e5)), float(rng.uniform(0.0, 3e5))), float(rng.uniform(0.0, 0.1))
+        near.advance(0.02, ((0.0, 0.0), theta), p, load, 0.0)
+        far.settle(theta, p, load)
+        np.testing.assert_allclose(near.pose.angles, far.pose.angles, atol=1e-10)
+
+
+def test_an_arm_that_buckles_is_refused():
+    upright = (math.pi / 2.0, 0.0)
+    assert rest(Params(EI_0=0.1, EI_p=0.0), upright, 0.0, 0.0)[1].angles[-1] == pytest.approx(math.pi / 2.0)
+    with pytest.raises(NoEquilibrium, match=r"1\.571, 0\) rad with a load of 0\.5 kg.*buckles"):
+        rest(Params(EI_0=0.1, EI_p=0.0), upright, 0.0, 0.5)
+
+
+def critical_load(**changes: Any) -> float:
+    params = replace(ONE_LINK, shear_0=1e9, **changes)
+    low, high = 0.0, 100.0
+    for _ in range(30):
+        middle = (low + high) / 2.0
+        try:
+            rest(params, (math.pi / 2.0, 0.0), 0.0, middle, 40)
+            low = middle
+        except NoEquilibrium:
+            high = middle
+    return low * 9.81
+
+
+def test_buckles_at_eulers_load():
+    assert critical_load() == pytest.approx(math.pi**2 * 0.55 / (4.0 * 0.225**2), rel=1e-3)
