@@ -1,0 +1,101 @@
+"""Paths of straight and circular segments, point by point. [Gandarias2020] algorithms 1 and 2, corrected."""
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.ports import Floats
+
+
+class Path(enum.IntEnum):
+    """Paths of [Gandarias2020] sec. V-A, and a line of one's own."""
+
+    LINEAR = 0
+    CURVE = 1
+    SQUARE = 2
+    CUSTOM = 3
+
+
+@dataclass(frozen=True)
+class Line:
+    """Straight segment from x_0 to x_g, shapes (3,), m: algorithm 1."""
+
+    x_0: Floats
+    x_g: Floats
+
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return float(np.linalg.norm(self.x_g - self.x_0))
+
+    def sampled(self, N: int, V: float) -> tuple[Floats, Floats]:
+        """Return N + 1 points, m, and the velocity at each, m/s, both of shape (N + 1, 3).
+
+        x_{k+1} = x_k + (x_g - x_k) / (N - (k - 1)) comes out as N equal steps.
+        """
+        way = self.x_g - self.x_0
+        points = self.x_0 + np.arange(N + 1)[:, None] / N * way
+        points[N] = self.x_g
+        return points, np.tile(V / self.length * way, (N + 1, 1))
+
+
+@dataclass(frozen=True)
+class QuarterArc:
+    """Quarter circle in a plane y = const about x_c, from x_0 to x_g, shapes (3,), m: algorithm 2.
+
+    At alpha the point is x_c + r [sin, 0, -cos] where x_0 is below x_c, and x_c - r [sin, 0, -cos] where it is above;
+    velocities V [cos, 0, sin] and -V [cos, 0, sin]. The printed algorithm has the first only, which as the second half
+    of the curve would run elsewhere, and takes each velocity at the point after that of its Jacobian; here both are of
+    the same point.
+    """
+
+    x_0: Floats
+    x_c: Floats
+
+    @property
+    def x_g(self) -> Floats:
+        """End, shape (3,), m."""
+        return self.x_c + self._sign * self._radius * np.array([1.0, 0.0, 0.0])
+
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        return self._radius * math.pi / 2.0
+
+    @property
+    def _radius(self) -> float:
+        return float(np.linalg.norm(self.x_c - self.x_0))
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self.x_0[2] < self.x_c[2] else -1.0
+
+    def sampled(self, N: int, V: float) -> tuple[Floats, Floats]:
+        """Return N + 1 points, m, and the velocity at each, m/s, both of shape (N + 1, 3)."""
+        alpha = np.arange(N + 1) * (math.pi / 2.0 / N)
+        none = np.zeros(N + 1)
+        points = self.x_c + self._sign * self._radius * np.column_stack([np.sin(alpha), none, -np.cos(alpha)])
+        velocities = self._sign * V * np.column_stack([np.cos(alpha), none, np.sin(alpha)])
+        return points, velocities
+
+
+Segment = Line | QuarterArc
+
+
+def segments_of(path: Path, x_0: Floats, x_g: Floats) -> Sequence[Segment]:
+    """Return the segments of a path of the paper, or of the straight one from x_0 to x_g, shapes (3,), m."""
+    if path is Path.LINEAR:
+        return [Line(_xz(0.3, 0.05), _xz(0.3, 0.35))]
+    if path is Path.CURVE:
+        return [QuarterArc(_xz(0.3, 0.05), _xz(0.3, 0.15)), QuarterArc(_xz(0.4, 0.15), _xz(0.4, 0.05))]
+    if path is Path.SQUARE:
+        corners = [_xz(0.35, 0.05), _xz(0.25, 0.05), _xz(0.25, 0.15), _xz(0.35, 0.15)]
+        return [Line(corners[i], corners[(i + 1) % 4]) for i in range(4)]
+    return [Line(np.array(x_0), np.array(x_g))]
+
+
+def _xz(x: float, z: float) -> Floats:
+    return np.array([x, 0.0, z])

@@ -1,0 +1,199 @@
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from controllers.trajectory_planner import Elbow, Inputs, Outputs, Params, Path, TrajectoryPlanner, UnusablePath
+from controllers.vsl_kinematics import VslKinematics
+from controllers.vsl_path import Line, QuarterArc
+from cosim.ports import Floats
+
+ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
+DT = 0.02
+
+
+def walk(planner: TrajectoryPlanner, steps: int, u: Inputs | None = None) -> list[Outputs]:
+    return [planner.step(k * DT, DT, u or Inputs()) for k in range(steps)]
+
+
+def moving(**values: Any) -> list[Outputs]:
+    planner, seen = TrajectoryPlanner(Params(settle=0.0, **values)), list[Outputs]()
+    while True:
+        y = planner.step(len(seen) * DT, DT, Inputs())
+        if not y.moving:
+            assert y.done
+            return seen
+        seen.append(y)
+
+
+def goals(ys: list[Outputs]) -> Floats:
+    return np.array([y.p_WG_goal for y in ys])
+
+
+def flat(y: Outputs) -> list[bytes]:
+    return [np.asarray(v).tobytes() for v in vars(y).values()]
+
+
+def test_linear_path_of_the_paper():
+    ys = moving(path=Path.LINEAR, N=50, V=0.3)  # 6 mm in 20 ms: a point a period
+    assert len(ys) == 50
+    heights = 0.05 + 0.006 * np.arange(1, 51)
+    np.testing.assert_allclose(goals(ys), np.column_stack([np.full(50, 0.3), np.zeros(50), heights]), atol=1e-12)
+
+
+@pytest.mark.parametrize("path", [Path.LINEAR, Path.CURVE, Path.SQUARE])
+def test_speed_is_the_wanted_one(path: Path):
+    length = {Path.LINEAR: 0.3, Path.CURVE: 0.1 * math.pi, Path.SQUARE: 0.4}[path]
+    ys = moving(path=path, V=0.05)
+    assert len(ys) * DT == pytest.approx(length / 0.05, abs=DT)
+    for y, before in zip(ys[1:], ys, strict=False):
+        if y.segment == before.segment and not np.array_equal(y.p_WG_goal, before.p_WG_goal):
+            start = ARM.forward(before.q_ref)  # q' is that of the step's first point
+            v = ARM.jacobian(before.q_ref) @ y.qd_ref
+            assert np.linalg.norm(v) == pytest.approx(0.05, rel=1e-9)
+            way = y.p_WG_goal - start
+            assert v @ way / np.linalg.norm(way) == pytest.approx(0.05, rel=1e-3)
+
+
+def test_curve_is_two_quarter_circles():
+    ys = moving(path=Path.CURVE)
+    for segment, centre in ((1, [0.3, 0.0, 0.15]), (2, [0.4, 0.0, 0.05])):
+        points = goals([y for y in ys if y.segment == segment])
+        np.testing.assert_allclose(np.linalg.norm(points - centre, axis=1), 0.1, atol=1e-12)
+        assert np.all((points[:, 0] >= 0.3 - 1e-12) & (points[:, 0] <= 0.4 + 1e-12))
+        assert np.all((points[:, 2] >= 0.05 - 1e-12) & (points[:, 2] <= 0.15 + 1e-12))
+    np.testing.assert_allclose([y.p_WG_goal for y in ys if y.segment == 1][-1], [0.4, 0.0, 0.15], atol=1e-12)
+    np.testing.assert_allclose(ys[-1].p_WG_goal, [0.3, 0.0, 0.05], atol=1e-12)
+
+
+@pytest.mark.parametrize("upwards", [True, False])
+def test_arc_is_tangential_and_ends_beside_its_centre(upwards: bool):
+    x_c = np.array([0.3, 0.0, 0.15])
+    arc = QuarterArc(x_c - np.array([0.0, 0.0, 0.1 if upwards else -0.1]), x_c)
+    points, velocities = arc.sampled(40, 0.05)
+    np.testing.assert_allclose(np.sum((points - x_c) * velocities, axis=1), 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(velocities, axis=1), 0.05)
+    assert np.all(np.sum(np.diff(points, axis=0) * velocities[:-1], axis=1) > 0.0)
+    np.testing.assert_allclose(points[-1], arc.x_g, atol=1e-15)
+    np.testing.assert_allclose(arc.x_g, x_c + np.array([0.1 if upwards else -0.1, 0.0, 0.0]))
+    assert arc.length == pytest.approx(0.05 * math.pi)
+
+
+def test_line_steps_are_those_of_algorithm_1():
+    x_0, x_g, N = np.array([0.3, -0.1, 0.05]), np.array([0.25, 0.1, 0.3]), 7
+    x, expected = x_0, [x_0]
+    for k in range(1, N + 1):
+        x = x + (x_g - x) / (N - (k - 1))
+        expected.append(x)
+    np.testing.assert_allclose(Line(x_0, x_g).sampled(N, 0.1)[0], expected, atol=1e-15)
+
+
+def test_square_visits_its_corners_in_order():
+    ys = moving(path=Path.SQUARE, N=10)
+    corners = [[y.p_WG_goal for y in ys if y.segment == s][-1] for s in (1, 2, 3, 4)]
+    np.testing.assert_allclose(
+        np.array(corners)[:, [0, 2]], [[0.25, 0.05], [0.25, 0.15], [0.35, 0.15], [0.35, 0.05]], atol=1e-12
+    )
+
+
+def test_angles_are_those_of_the_goal_and_elbow():
+    for elbow in Elbow:
+        for y in moving(path=Path.CUSTOM, x_0=np.array([0.2, 0.2, 0.1]), x_g=np.array([0.3, -0.1, 0.3]), elbow=elbow):
+            np.testing.assert_allclose(ARM.forward(y.q_ref), y.p_WG_goal, atol=1e-12)
+            assert bool(y.q_ref[2] < 0.0) is (elbow is Elbow.UP)
+
+
+def test_the_goal_stays_between_points():
+    ys = moving(path=Path.LINEAR, N=3, V=0.1)  # a point a second
+    assert len(ys) == 150
+    assert len(np.unique(goals(ys), axis=0)) == 3
+    np.testing.assert_array_equal(ys[0].p_WG_goal, ys[49].p_WG_goal)
+    np.testing.assert_allclose(ys[0].p_WG_goal, [0.3, 0.0, 0.15])
+    np.testing.assert_allclose(ys[50].p_WG_goal, [0.3, 0.0, 0.25])
+
+
+def test_more_points_than_periods_are_left_out_in_time():
+    ys = moving(path=Path.LINEAR, N=2000, V=0.1)
+    assert len(ys) == 150
+    np.testing.assert_allclose(goals(ys)[:, 2], 0.05 + 0.1 * DT * np.arange(150), atol=2e-4)
+
+
+def test_settles_then_waits_for_go():
+    planner = TrajectoryPlanner(Params(settle=1.0, qd_0=np.array([0.5, 0.6, 0.7])))
+    waiting = walk(planner, 70, Inputs(go=False))
+    assert not any(y.moving or y.done for y in waiting)
+    assert {y.segment for y in waiting} == {0}
+    np.testing.assert_allclose(waiting[-1].p_WG_goal, [0.3, 0.0, 0.05])
+    np.testing.assert_array_equal(waiting[-1].qd_ref, [0.5, 0.6, 0.7])
+    assert planner.step(1.4, DT, Inputs()).moving
+    assert planner.step(1.42, DT, Inputs(go=False)).moving
+    early = walk(TrajectoryPlanner(Params(settle=1.0)), 60)
+    assert [y.moving for y in early].index(True) == 50
+
+
+def test_the_end_is_held():
+    ys = walk(TrajectoryPlanner(Params(path=Path.LINEAR, settle=0.0, V=1.0)), 30)
+    assert ys[-1].done
+    assert not ys[-1].moving
+    assert ys[-1].segment == 1
+    np.testing.assert_allclose(ys[-1].p_WG_goal, [0.3, 0.0, 0.35])
+
+
+def test_pressures_are_passed_on():
+    y = TrajectoryPlanner(Params(pressure=np.array([5e4, 2e5]))).outputs(0.0, Inputs())
+    np.testing.assert_array_equal(y.p_cmd, [5e4, 2e5])
+
+
+@pytest.mark.parametrize("settle", [0.0, 0.1])
+def test_outputs_are_those_of_the_coming_step(settle: float):
+    planner = TrajectoryPlanner(Params(settle=settle))
+    for k in range(12):
+        u = Inputs(go=k > 2)
+        before = flat(planner.outputs(k * DT, u))
+        assert before == flat(planner.step(k * DT, DT, u))
+
+
+@pytest.mark.parametrize("steps", [0, 3, 20, 400])
+def test_a_restored_state_goes_on_bit_for_bit(steps: int):
+    params = Params(settle=0.1)
+    one, other = TrajectoryPlanner(params), TrajectoryPlanner(params)
+    walk(one, steps, Inputs(go=steps > 5))
+    state = one.get_state()
+    after = [flat(y) for y in walk(one, 60)]
+    other.set_state(state)
+    assert [flat(y) for y in walk(other, 60)] == after
+    one.set_state(state)
+    assert [flat(y) for y in walk(one, 60)] == after
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"x_g": np.array([0.5, 0.0, 0.15])}, ["segment 1 of 1, point 75 of 100, (0.45, 0, 0.125) m", "0 .. 0.45 m"]),
+        ({"x_g": np.array([0.45, 0.0, 0.15])}, ["point 100 of 100", "stretched", "0 m to L_2 + L_3 = 0.45 m"]),
+        ({"x_g": np.array([0.0, 0.0, 0.35])}, ["point 100 of 100", "axis of joint 1"]),
+        ({"x_g": np.array([0.3, 0.0, 0.05])}, ["x_0 and x_g are the same point"]),
+        ({"x_g": np.array([np.nan, 0.0, 0.05])}, ["not finite"]),
+        ({"L_2": 0.4, "L_3": 0.1, "x_g": np.array([0.2, 0.0, 0.15])}, ["|L_2 - L_3| = 0.3 m", "out of reach"]),
+    ],
+)
+def test_a_path_that_cannot_be_followed_is_refused(changes: dict[str, Any], told: list[str]):
+    with pytest.raises(UnusablePath) as caught:
+        TrajectoryPlanner(dataclasses.replace(Params(path=Path.CUSTOM), **changes))
+    for part in told:
+        assert part in str(caught.value)
+
+
+def test_every_bad_segment_is_told():
+    with pytest.raises(UnusablePath) as caught:
+        TrajectoryPlanner(Params(path=Path.CURVE, L_2=0.2, L_3=0.2))
+    assert len(caught.value.faults) == 2
+    assert "segment 1 of 2" in caught.value.faults[0]
+    assert "segment 2 of 2" in caught.value.faults[1]
+
+
+def test_values_out_of_range_are_refused():
+    with pytest.raises(UnusablePath, match=r"N: 0 is out of range.*V: -1"):
+        TrajectoryPlanner(Params(N=0, V=-1.0))
