@@ -1,0 +1,178 @@
+"""Figures of a run along a path: the path, the arm's shape, errors, and joints, currents and pressures over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.ports import Floats
+from scenarios.experiment import Figure
+from scenarios.plotting import COLOURS, figure, shade_phases
+from scenarios.record import Record
+from scenarios.vsl.parameters import Parameters
+from scenarios.vsl.path_point import distance
+from scenarios.vsl.watch import PathWatch
+
+_SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[5]
+_ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
+"""The arm's lines at its three moments: where they lie over each other, all are seen."""
+
+_APART = 0.01
+"""Points nearer to each other than this are shown once, m (assumed)."""
+
+
+def draw_path_run(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    made = [_error_over_time(watch, record, folder), _signals(record, folder)]
+    if not watch.points:
+        return made
+    return [_path(watch, folder), _shapes(parameters, watch, record, folder), _errors(watch, folder), *made]
+
+
+def _path(watch: PathWatch, folder: Path) -> Figure:
+    points = watch.points
+    lines: list[tuple[Sequence[Floats], dict[str, Any]]] = [
+        (list(watch.path), {"color": _DESIRED, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
+        ([p.servo for p in points], {"color": _SERVO, "ls": "--", "lw": 1.3, "label": "servos, links taken as rigid"}),
+        ([p.tracked for p in points], {"color": _TIP, "lw": 1.3, "label": "tip, by the tracker"}),
+    ]
+    if watch.hybrid:
+        label = "tip, estimated by the forward model"
+        lines.append(([p.estimated for p in points], {"color": _ESTIMATE, "ls": ":", "lw": 1.8, "label": label}))
+    with figure(folder / "path", 1, size=(6.4, 5.6)) as (axes,):
+        for positions, style in lines:
+            x, z = _in_plane(np.array(positions))
+            axes.plot(x, z, **style)
+        axes.plot(*_in_plane(watch.path[:1]), "o", ms=6, color=_DESIRED, label="start")
+        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
+        axes.set(xlim=_widened(axes.get_xlim(), axes.get_ylim()), ylim=_widened(axes.get_ylim(), axes.get_xlim()))
+        axes.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+    return Figure("path", "The path: desired, by the servos' encoders, and of the tip. Equal scales.")
+
+
+def _shapes(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> Figure:
+    shapes = record["arm.shape"]
+    x, z = _in_plane(watch.path)
+    with figure(folder / "shape", 1, size=(8.0, 5.2)) as (axes,):
+        axes.plot(x, z, color=_DESIRED, lw=3.0, alpha=0.35, label="desired path")
+        for k, (role, t) in enumerate(_moments(watch).items()):
+            arm_x, arm_z = _in_plane(shapes[np.searchsorted(record.time, t - 1e-9)])
+            axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
+            if parameters.load > 0.0:
+                axes.plot(arm_x[-1], arm_z[-1] - 8.0, "s", ms=9, color=COLOURS[k])
+        axes.axhspan(-30.0, 0.0, color="#d8dde4", lw=0, zorder=0)
+        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
+        axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16))
+    load = f" with its load of {parameters.load * 1000:.0f} g" if parameters.load > 0.0 else ""
+    return Figure("shape", f"Centre line of the arm{load} at three moments, above the ground. Equal scales.")
+
+
+def _errors(watch: PathWatch, folder: Path) -> Figure:
+    groups = {
+        "servos": [distance(p.servo, p.desired) for p in watch.points],
+        "tip": [p.error for p in watch.points],
+        "rigid model": [distance(p.servo, p.true) for p in watch.points],
+    }
+    if watch.hybrid:
+        groups["hybrid model"] = [distance(p.estimated, p.true) for p in watch.points]
+    colours = (_SERVO, _TIP, COLOURS[4], _ESTIMATE)
+    with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
+        for k, (values, colour) in enumerate(zip(groups.values(), colours, strict=False)):
+            _draw_box(boxes, k, np.array(values) * 1000, colour)
+        boxes.set_xticks(range(len(groups)), list(groups))
+        boxes.set(ylabel="error (mm)", ylim=(0.0, None))
+        boxes.grid(visible=False, axis="x")
+        where, label = _spread(watch)
+        reach.plot(where, [p.error * 1000 for p in watch.points], ".", color=_TIP)
+        reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
+    caption = (
+        "Left: 25th to 75th percentile (box), range, median (line) and mean (dot); servos and tip against the desired "
+        "points, the models' estimates against the true tip. Right: error of the tip over the desired point's place."
+    )
+    return Figure("errors", caption)
+
+
+def _error_over_time(watch: PathWatch, record: Record, folder: Path) -> Figure:
+    t = record.time
+    goal, moving = record["planner.p_WG_goal"], record["planner.moving"]
+    segments = {0: "before", **{n: f"segment {n}" for n in range(1, int(np.max(record["planner.segment"])) + 1)}}
+    curves = [("arm.p_WG_meas", _TIP, "tip, by the tracker"), ("kinematics.p_WG_model", _SERVO, "servos")]
+    with figure(folder / "error", 1, size=(8.0, 3.8)) as (axes,):
+        shade_phases(axes, t, record["planner.segment"], segments)
+        for signal, colour, label in curves:
+            error = np.linalg.norm(record[signal] - goal, axis=1) * 1000
+            axes.plot(t[moving], error[moving], color=colour, lw=1.2, label=label)
+        if watch.hybrid:
+            error = np.linalg.norm(record["kinematics.p_WG_est"] - record["arm.p_WG"], axis=1) * 1000
+            label = "forward model's estimate, to the true tip"
+            axes.plot(t[moving], error[moving], color=_ESTIMATE, lw=1.2, label=label)
+        axes.axhline(watch.parameters.tolerance * 1000, color="#4d5866", lw=0.8, ls="--")
+        axes.set(xlabel="time (s)", ylabel="distance (mm)", ylim=(0.0, None), xlim=(t[0], t[-1]))
+        axes.legend(ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.2))
+    return Figure("error", "Distance to the desired point over time, on the path. Dashed: the tolerance for its mean.")
+
+
+def _signals(record: Record, folder: Path) -> Figure:
+    t = record.time
+    with figure(folder / "signals", 3, size=(8.0, 7.0)) as (joints, currents, pressures):
+        for k in range(3):
+            colour, name = COLOURS[k], f"J{k + 1}"
+            for signal, style in (("planner.q_ref", ":"), ("kinematics.q_cmd", "--"), ("arm.q_meas", "-")):
+                joints.plot(t, np.degrees(record[signal][:, k]), color=colour, ls=style, lw=1.2)
+            joints.plot([], [], color=colour, label=name)
+            currents.plot(t, record["arm.i_meas"][:, k], color=colour, lw=0.9, label=name)
+        for k in range(2):
+            colour = COLOURS[k + 1]
+            pressures.plot(t, record["planner.p_cmd"][:, k] / 1e5, color=colour, ls="--", lw=1.0)
+            pressures.plot(t, record["arm.p_meas"][:, k] / 1e5, color=colour, lw=1.0, label=f"link {k + 2}")
+        joints.set(ylabel="joint angle (°)")
+        currents.set(ylabel="current (A)")
+        pressures.set(ylabel="pressure (bar)", xlabel="time (s)", ylim=(0.0, None))
+        for axes in (joints, currents, pressures):
+            axes.set_xlim(t[0], t[-1])
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    caption = "Joints (dotted: wanted by rigid kinematics; dashed: commanded; line: measured), currents, pressures."
+    return Figure("signals", caption)
+
+
+def _moments(watch: PathWatch) -> dict[str, float]:
+    """Return three moments by what they are; on a path that reaches farthest at an end, the second is half way."""
+    first, last = watch.points[0], watch.points[-1]
+    role, second = "farthest reach", max(watch.points, key=lambda p: p.reach)
+    if min(distance(second.desired, end.desired) for end in (first, last)) < _APART:
+        role, second = "half way", watch.points[len(watch.points) // 2]
+    return {"start": first.t, role: second.t, "end": last.t}
+
+
+def _spread(watch: PathWatch) -> tuple[Floats, str]:
+    """Return the points' reach, mm, and what it is; their height for a path that reaches equally far throughout."""
+    r, z = _in_plane(np.array([p.desired for p in watch.points]))
+    return (z, "z in W (mm)") if np.ptp(r) < 1000 * _APART else (r, "horizontal distance from the base (mm)")
+
+
+def _widened(limits: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
+    """Return an axis's limits, at least half as far apart as the other axis's."""
+    middle = (limits[0] + limits[1]) / 2.0
+    half = max(limits[1] - limits[0], (others[1] - others[0]) / 2.0) / 2.0
+    return middle - half, middle + half
+
+
+def _draw_box(axes: Axes, x: float, values: Floats, colour: str) -> None:
+    low, q1, median, q3, high = np.percentile(values, (0, 25, 50, 75, 100))
+    axes.vlines(x, low, high, color=colour, lw=1.2)
+    axes.bar(x, q3 - q1, width=0.5, bottom=q1, color=colour, alpha=0.35, edgecolor=colour)
+    axes.hlines(median, x - 0.25, x + 0.25, color=colour, lw=2.0)
+    axes.plot(x, np.mean(values), "o", ms=4, color=colour)
+
+
+def _in_plane(positions: Floats) -> tuple[Floats, Floats]:
+    """Return horizontal distance from the first joint's axis, negative behind it, and height, mm."""
+    mm = positions * 1000
+    return np.copysign(np.hypot(mm[:, 0], mm[:, 1]), mm[:, 0]), mm[:, 2]
+
+
+def _horizontal(watch: PathWatch) -> str:
+    flat = bool(np.all(np.abs(watch.path[:, 1]) < 1e-6))
+    return "x in W (mm)" if flat else "horizontal distance from the base (mm)"

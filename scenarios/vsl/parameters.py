@@ -1,0 +1,75 @@
+"""Parameters of the paths of the arm with variable-stiffness links; origins of the defaults are in `paper.toml`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.trajectory_planner import Elbow, Path
+from cosim.ports import Floats, Vector3, parameter
+from cosim.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
+from plants.vsl_parameters import HIGHEST_PRESSURE, Link, Motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """One run along a path, controlled by rigid-link kinematics."""
+
+    path: Path = parameter(Path.CURVE, "path of the tip; custom is a straight line from x_0 to x_g")
+    load: Kilogram = parameter(
+        0.075, "mass that hangs at the gripper; the paper's are 0 to 0.1 kg", minimum=0.0, maximum=0.3
+    )
+    pressure: Pascal = parameter(
+        5e4,
+        "pressure inside both links: 5e4 Pa is 0.5 bar; the paper's are 0.5 to 2 bar",
+        minimum=0.0,
+        maximum=HIGHEST_PRESSURE,
+    )
+    links: Link = parameter(Link.VSL, "links of variable stiffness, or the printed rigid ones of the same length")
+    motion: Motion = parameter(Motion.QUASI_STATIC, "arm in equilibrium at every instant, or with its oscillations")
+    speed: MetrePerSecond = parameter(0.05, "speed of the tip along the path, V", minimum=0.001, maximum=0.5)
+    points: int = parameter(100, "points of each segment of the path, N", minimum=1, maximum=10000)
+    settle: Second = parameter(
+        5.0, "time before the path, for getting to its start and calming down", minimum=0.0, maximum=600.0
+    )
+    elbow: Elbow = parameter(Elbow.UP, "which way it points; down, it is below the ground on the paper's paths")
+    x_0: Vector3[Metre] = parameter(
+        np.array([0.30, 0.0, 0.05]), "start of a custom path in W", minimum=-1.0, maximum=1.0
+    )
+    x_g: Vector3[Metre] = parameter(np.array([0.40, 0.0, 0.15]), "end of a custom path in W", minimum=-1.0, maximum=1.0)
+    tolerance: Metre = parameter(
+        0.06, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
+    )
+
+    @property
+    def pressures(self) -> Floats:
+        """Pressures of the second and the third link, shape (2,), Pa."""
+        return np.array([self.pressure, self.pressure])
+
+    @property
+    def q_0(self) -> Floats:
+        """Joint angles at which the arm starts, with the tip level with the shoulder, shape (3,), rad."""
+        sign = 1.0 if self.elbow is Elbow.UP else -1.0
+        return sign * np.array([0.0, 0.8411, -1.6821])
+
+    @property
+    def length(self) -> float:
+        """Length of the path, m."""
+        return {
+            Path.LINEAR: 0.3,
+            Path.CURVE: 0.1 * np.pi,
+            Path.SQUARE: 0.4,
+            Path.CUSTOM: float(np.linalg.norm(self.x_g - self.x_0)),
+        }[self.path]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HybridParameters(Parameters):
+    """One run along a path, controlled by rigid-link kinematics with learned corrections."""
+
+    links: Link = parameter(
+        Link.VSL, "links of variable stiffness, or rigid ones, of which the model that ships knows nothing"
+    )
+    tolerance: Metre = parameter(
+        0.005, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
+    )
+    model: str = parameter("", "file of a trained model; empty: the one that ships")

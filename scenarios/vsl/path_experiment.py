@@ -1,0 +1,105 @@
+"""What both experiments share: planner, kinematics and arm, wired, and a path to follow. [Gandarias2020] sec. V."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cosim.system import System
+from scenarios.experiment import Experiment, Figure, FmuOf
+from scenarios.record import Record
+from scenarios.vsl.figures import draw_path_run
+from scenarios.vsl.parameters import Parameters
+from scenarios.vsl.watch import PathWatch
+
+_MORE = 5
+"""Time after which a path that should have been completed is given up, s (assumed)."""
+
+
+class PathExperiment(Experiment[PathWatch]):
+    """The tip is to follow a path; servos, pressures and currents are measured, the tip is not."""
+
+    units: ClassVar[Mapping[str, str]] = {
+        "planner": "TrajectoryPlanner",
+        "kinematics": "HybridKinematics",
+        "arm": "VslArm",
+    }
+    headline: ClassVar[tuple[str, ...]] = (
+        "mean_error",
+        "median_error",
+        "max_error",
+        "servo_error",
+        "model_error",
+        "estimate_error",
+        "outside",
+        "path_time",
+        "cpu_per_cycle",
+        "pace_arm",
+    )
+    hybrid: ClassVar[bool]
+    """Whether the kinematics use what was learned."""
+
+    def kinematics(self, parameters: Any) -> dict[str, Any]:  # noqa: ARG002
+        """Return the parameters of the kinematics that only this experiment has."""
+        return {}
+
+    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+        """Wire planner, kinematics and arm."""
+        p = parameters
+        arm_seed = int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1)
+        s = System()
+        planner = s.add(
+            "planner",
+            fmu("planner"),
+            path=p.path.name,
+            x_0=p.x_0,
+            x_g=p.x_g,
+            N=p.points,
+            V=p.speed,
+            settle=p.settle,
+            elbow=p.elbow.name,
+            pressure=p.pressures,
+        )
+        kinematics = s.add(
+            "kinematics",
+            fmu("kinematics"),
+            method="HYBRID" if self.hybrid else "MODEL_BASED",
+            elbow=p.elbow.name,
+            **self.kinematics(p),
+        )
+        arm = s.add(
+            "arm",
+            fmu("arm"),
+            motion=p.motion.name,
+            link_2=p.links.name,
+            link_3=p.links.name,
+            load=p.load,
+            q_0=p.q_0,
+            seed=arm_seed,
+        )
+        for name in ("q_ref", "qd_ref"):
+            s.connect(getattr(planner.y, name), getattr(kinematics.u, name))
+        s.connect(planner.y.p_cmd, arm.u.p_cmd)
+        for name in ("q_cmd", "qd_cmd"):
+            s.connect(getattr(kinematics.y, name), getattr(arm.u, name))
+        for name in ("q_meas", "p_meas", "i_meas"):
+            s.connect(getattr(arm.y, name), getattr(kinematics.u, name))
+        return s
+
+    def stop_time(self, parameters: Parameters) -> Fraction:
+        """Return the time that the path takes, with what precedes it, and some more."""
+        return Fraction(round(parameters.settle + parameters.length / parameters.speed)) + _MORE
+
+    def watch(self, parameters: Parameters) -> PathWatch:
+        """Return the judge of one run along the path."""
+        return PathWatch(parameters, hybrid=self.hybrid)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the robot's own computing: planning and kinematics."""
+        return ("planner", "kinematics")
+
+    def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
+        """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
+        return draw_path_run(parameters, watch, record, folder)

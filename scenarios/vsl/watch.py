@@ -1,0 +1,132 @@
+"""Judges how well the tip followed its path, by the tracker, which the arm's controller does not see."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from cosim.ports import Floats
+from cosim.signals import Signals
+from scenarios.experiment import Metric, Outcome, Watch
+from scenarios.vsl.parameters import Parameters
+from scenarios.vsl.path_point import PathPoint, distance, distance_to_path
+
+_REACH_SPAN = 0.01
+"""Paths that reach equally far throughout, to this many metres, have no near and far part (assumed)."""
+
+
+class PathWatch(Watch):
+    """Follows one run along a path and tells how far the tip was from it.
+
+    A point counts at the instant when the planner goes on to the next one: until then the arm had time to get there.
+
+    Attributes:
+        points: the path's points in their order, with where the arm was.
+        completed: time at which the path was completed, s; None before.
+    """
+
+    def __init__(self, parameters: Parameters, *, hybrid: bool) -> None:
+        self.parameters, self.hybrid = parameters, hybrid
+        self.points: list[PathPoint] = []
+        self.completed: float | None = None
+        self._began: float | None = None
+        self._t = 0.0
+        self._start: Floats = np.zeros(3)
+        self._segment = 0
+        self._goal: Floats | None = None
+        self._moving = False
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Follow the planner; keep a point when it is left."""
+        goal, moving = signals["planner.p_WG_goal"], bool(signals["planner.moving"])
+        if self._goal is not None and self._moving and not (moving and np.array_equal(goal, self._goal)):
+            self.points.append(PathPoint.take(t, self._goal, signals))
+        if moving and self._began is None:
+            self._began = t
+            self._start = goal if self._goal is None else self._goal
+        if bool(signals["planner.done"]) and self.completed is None:
+            self.completed = t
+        self._t, self._goal, self._moving = t, goal, moving
+        self._segment = int(signals["planner.segment"])
+
+    @property
+    def path(self) -> Floats:
+        """The path as far as it was followed: its start and its points, shape (n, 3), in W, m."""
+        return np.array([self._start, *(p.desired for p in self.points)])
+
+    @property
+    def over(self) -> bool:
+        """Whether the path was completed."""
+        return self.completed is not None
+
+    def outcome(self) -> Outcome:
+        """Return whether the path was completed within the tolerance, and the errors along it."""
+        metrics = self._metrics() if self.points else {}
+        within = "mean_error" in metrics and metrics["mean_error"].value <= self.parameters.tolerance
+        return Outcome(success=self.over and within, reason=self._reason(metrics), metrics=metrics)
+
+    def _reason(self, metrics: dict[str, Metric]) -> str:
+        if self.completed is None:
+            where = "before it began" if self._began is None else f"in segment {self._segment}"
+            return f"the path was not completed: stopped {where} at {self._t:.1f} s, {len(self.points)} points passed"
+        if "mean_error" not in metrics:
+            return f"the path was completed at {self.completed:.1f} s without a point on it"
+        error, tolerance = metrics["mean_error"].value, self.parameters.tolerance
+        verdict = "within" if error <= tolerance else "above"
+        return (
+            f"the path was completed at {self.completed:.1f} s; mean error of the tip {error * 1000:.1f} mm, "
+            f"{verdict} the tolerance of {tolerance * 1000:.1f} mm"
+        )
+
+    def _metrics(self) -> dict[str, Metric]:
+        path = self.path
+        metrics = {
+            **_distribution([p.error for p in self.points]),
+            "mean_error_true": self._mean(lambda p: distance(p.true, p.desired), "mean error of the tip, ground truth"),
+            "path_distance": self._mean(
+                lambda p: distance_to_path(p.tracked, path), "mean distance of the tip, by the tracker, from the path"
+            ),
+            **self._over_reach(),
+            "servo_error": self._mean(
+                lambda p: distance(p.servo, p.desired), "mean error by the encoders, links taken as rigid"
+            ),
+            "model_error": self._mean(
+                lambda p: distance(p.servo, p.true), "mean error of the rigid-link model's estimate of the tip"
+            ),
+        }
+        if self.hybrid:
+            metrics["estimate_error"] = self._mean(
+                lambda p: distance(p.estimated, p.true), "mean error of the hybrid forward model's estimate of the tip"
+            )
+            metrics["outside"] = self._mean(
+                lambda p: float(p.outside), "share of points at which the model had to extrapolate", "1"
+            )
+        if self.completed is not None and self._began is not None:
+            metrics["path_time"] = Metric(self.completed - self._began, "s", "time on the path")
+        return metrics
+
+    def _over_reach(self) -> dict[str, Metric]:
+        """Return the errors of the third of the points that are nearest to the base and of the farthest third."""
+        order = sorted(self.points, key=lambda p: p.reach)
+        if order[-1].reach - order[0].reach < _REACH_SPAN:
+            return {}
+        n = max(1, len(order) // 3)
+        near, far = (float(np.mean([p.error for p in part])) for part in (order[:n], order[-n:]))
+        return {
+            "error_near": Metric(near, "m", "mean error of the tip over the third of the points nearest to the base"),
+            "error_far": Metric(far, "m", "mean error of the tip over the third of the points farthest from the base"),
+        }
+
+    def _mean(self, of: Callable[[PathPoint], float], description: str, unit: str = "m") -> Metric:
+        return Metric(float(np.mean([of(p) for p in self.points])), unit, description)
+
+
+def _distribution(errors: Sequence[float]) -> dict[str, Metric]:
+    low, middle, high = (float(x) for x in np.percentile(errors, (25, 50, 75)))
+    of_tip = "distance of the tip, by the tracker, from the desired point"
+    return {
+        "mean_error": Metric(float(np.mean(errors)), "m", f"mean {of_tip}"),
+        "median_error": Metric(middle, "m", f"median {of_tip}"),
+        "error_p25": Metric(low, "m", f"25th percentile of the {of_tip}"),
+        "error_p75": Metric(high, "m", f"75th percentile of the {of_tip}"),
+        "max_error": Metric(float(np.max(errors)), "m", f"largest {of_tip}"),
+    }

@@ -1,0 +1,174 @@
+"""Points measured on the VSL arm's own FMU, to learn its kinematics from. [Gandarias2020] sec. IV-A, eq. (9)."""
+
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controllers.vsl_kinematics import VslKinematics
+from cosim.block import Kind
+from cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused
+from cosim.fmpy_edge import unpack
+from cosim.fmu_description import FmuDescription, describe_fmu
+from cosim.instance import Instance
+from cosim.ports import Floats
+
+RADII = (0.22, 0.42)
+"""Distances of the wanted tip from J1's axis, m: the published paths with 2 cm around them (assumed)."""
+
+HEIGHTS = (0.03, 0.37)
+"""Heights of the wanted tip, m (assumed)."""
+
+TURN = 0.5
+"""Largest angle of J1 either way, rad (assumed)."""
+
+SAG = 0.075
+"""How far above the wanted tip it is commanded at most, m, at the largest radius; there it sags by about as much."""
+
+STRETCH = 0.44
+"""Distance from the shoulder up to which tips are commanded and kept, m: beyond, rigid kinematics turn singular."""
+
+PRESSURES = (3e4, 2.2e5)
+"""Pa, each link's own; the published ones are 0.5e5 to 2e5."""
+
+LOADS = (0.0, 0.13)
+"""kg; the published ones are 0 to 0.1."""
+
+_STEP, _STEPS, _KEPT = 0.1, 15, 5
+"""Each point: steps of 0.1 s until settled; the mean of the readings after the last ones is kept."""
+
+_WANTED = {
+    "input": {"q_cmd": (3,), "p_cmd": (2,), "load": ()},
+    "output": {"q_meas": (3,), "i_meas": (3,), "p_meas": (2,), "p_WG_meas": (3,)},
+}
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """The matrix D of eq. (9), a row a point, and the commands that led there.
+
+    Attributes:
+        p_WG: tip by the tracker, shape (n, 3), m.
+        p: pressures, shape (n, 2), Pa.
+        i: currents, shape (n, 3), A.
+        q: angles by the encoders, shape (n, 3), rad.
+        q_cmd: commanded angles, shape (n, 3), rad.
+    """
+
+    p_WG: Floats
+    p: Floats
+    i: Floats
+    q: Floats
+    q_cmd: Floats
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def rows(self, chosen: Any) -> "Dataset":
+        """Return some of the points."""
+        return Dataset(self.p_WG[chosen], self.p[chosen], self.i[chosen], self.q[chosen], self.q_cmd[chosen])
+
+
+def describe_arm(fmu: Path) -> FmuDescription:
+    """Read the FMU of an arm that can be learned from.
+
+    Raises:
+        InvalidFmu: it cannot be used, or lacks ports of `VslArm` that are needed.
+    """
+    d = describe_fmu(fmu)
+    faults: list[str] = []
+    for role, ports in (("input", d.inputs), ("output", d.outputs)):
+        for name, shape in _WANTED[role].items():
+            p = ports.get(name)
+            if p is None or p.kind is not Kind.REAL or p.shape != shape:
+                wanted = f"{role} {name!r} ({'x'.join(map(str, shape)) or 'one'} real)"
+                faults.append(f"no {wanted}" if p is None else f"no {wanted}, but {p.signature}")
+    if faults:
+        raise InvalidFmu(fmu, "not an arm to learn from: it has " + ", ".join(faults))
+    return d
+
+
+def parameters_of(d: FmuDescription, seed: int) -> dict[str, Any]:
+    """Return what the arm's parameters are set to: at rest at every instant, with the seed, if it has such."""
+    wanted: dict[str, Any] = {"motion": "QUASI_STATIC", "seed": seed}
+    return {name: value for name, value in wanted.items() if name in d.parameters}
+
+
+def collect(
+    d: FmuDescription,
+    kinematics: VslKinematics,
+    points: int,
+    rng: np.random.Generator,
+    parameters: Mapping[str, Any],
+    progress: Callable[[float, float], None],
+) -> Dataset:
+    """Measure points of the workspace at random pressures, angles and loads, each after the arm has settled.
+
+    The source varies one of the three from point to point; here all are drawn anew, which spreads as many points
+    better. The arm is commanded above the wanted tip by a random share of what it may sag, so that measured tips cover
+    the wanted places.
+
+    Args:
+        d: the arm.
+        kinematics: of rigid links, by which it is commanded.
+        points: how many.
+        rng: random numbers of the points.
+        parameters: what the arm's parameters are set to.
+        progress: told the simulated time and its end, s.
+
+    Raises:
+        InvalidFmu, UnitRefused, UnitFailure: the arm does not load, start or step.
+    """
+    rows: list[tuple[Floats, Floats]] = []
+    with tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True) as folder:
+        unpack(d.path, Path(folder), d.fmi, d.identifier)
+        arm = Instance("arm", d, Path(folder), _WANTED["input"])
+        try:
+            _start(arm, parameters)
+            for k in range(points):
+                q_cmd = kinematics.inverse(_commanded_tip(kinematics, rng))
+                arm.u["q_cmd"][0][:] = q_cmd
+                arm.u["p_cmd"][0][:] = rng.uniform(*PRESSURES, size=2)
+                arm.u["load"][0][:] = rng.uniform(*LOADS)
+                rows.append((_settled(arm, k * _STEPS), q_cmd))
+                progress((k + 1) * _STEPS * _STEP, points * _STEPS * _STEP)
+            arm.end()
+        finally:
+            arm.free()
+    measured = np.array([m for m, _ in rows])
+    p_WG, p, i, q = np.split(measured, [3, 5, 8], axis=1)
+    return Dataset(p_WG, p, i, q, np.array([c for _, c in rows]))
+
+
+def _start(arm: Instance, parameters: Mapping[str, Any]) -> None:
+    try:
+        arm.set_start(parameters)
+        arm.enter_initialization(0.0, None)
+        arm.exit_initialization()
+    except UnitFailure as e:
+        raise UnitRefused(e) from e
+
+
+def _settled(arm: Instance, before: int) -> Floats:
+    """Let the arm settle under its inputs; return p_WG_meas, p_meas, i_meas, q_meas, shape (11,), averaged."""
+    total = np.zeros(11)
+    arm.set_inputs()
+    for k in range(_STEPS):
+        arm.step((before + k) * _STEP, _STEP)
+        if k >= _STEPS - _KEPT:
+            arm.get_outputs()
+            total += np.concatenate([arm.y[name][0] for name in ("p_WG_meas", "p_meas", "i_meas", "q_meas")])
+    return total / _KEPT
+
+
+def _commanded_tip(kinematics: VslKinematics, rng: np.random.Generator) -> Floats:
+    """Return a point to command the tip to, shape (3,), m."""
+    while True:
+        radius, height, lift = rng.uniform(*RADII), rng.uniform(*HEIGHTS), rng.uniform(0.0, SAG)
+        theta_1 = rng.uniform(-TURN, TURN)
+        p_WG = np.array([radius * np.cos(theta_1), radius * np.sin(theta_1), height + lift * (radius / RADII[1]) ** 2])
+        if np.hypot(radius, p_WG[2] - kinematics.L_1) <= STRETCH:
+            return p_WG

@@ -1,0 +1,176 @@
+"""Runs along paths, on the built FMUs, and the claims of [Gandarias2020] sec. V-C."""
+
+import hashlib
+import itertools
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.exceptions import UnitRefused
+from cosim.master import Master, Observer
+from cosim.recorder import Recorder
+from fmus.build import cached
+from scenarios.experiment import Outcome
+from scenarios.interruption import Interruption
+from scenarios.parameters import parse_parameters
+from scenarios.record import Record
+from scenarios.run_folder import RunFolder
+from scenarios.runner import Ended, Task, carry_out
+from scenarios.vsl.path_experiment import PathExperiment
+from scenarios.vsl.vsl_hybrid import VslHybrid
+from scenarios.vsl.vsl_model_based import VslModelBased
+
+BOTH = [VslModelBased, VslHybrid]
+
+
+def run(experiment: type[PathExperiment], out: Path, *parameters: str, seed: int = 0) -> Ended:
+    """Run as the command does, with record, figures and report."""
+    task = Task(
+        experiment=experiment(),
+        parameters=parse_parameters(experiment, parameters),
+        seed=seed,
+        fmus={name: cached(unit, 3) for name, unit in experiment.units.items()},
+        folder=RunFolder(out),
+    )
+    with Interruption() as interruption:
+        return carry_out(task, lambda _t, _stop: None, interruption)
+
+
+def judge(
+    experiment: type[PathExperiment], *parameters: str, seed: int = 0, observers: Sequence[Observer] = ()
+) -> Outcome:
+    """Run without leaving anything."""
+    p, e = parse_parameters(experiment, parameters), experiment()
+    watch = e.watch(p)
+    with Master(e.build(p, seed, lambda name: cached(experiment.units[name], 3))) as master:
+        master.run(e.stop_time(p), [*observers, watch], until=lambda: watch.over)
+    return watch.outcome()
+
+
+def error_of(*parameters: str) -> float:
+    """Return the mean error of a short run by rigid-link kinematics."""
+    outcome = judge(VslModelBased, "settle=2", "speed=0.1", *parameters)
+    assert "the path was completed" in outcome.reason
+    return outcome.metrics["mean_error"].value
+
+
+def digest(out: Path) -> str:
+    return hashlib.sha256((out / "signals.parquet").read_bytes()).hexdigest()
+
+
+Finished = Callable[[type[PathExperiment]], tuple[Path, Ended]]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    runs: dict[str, tuple[Path, Ended]] = {}
+
+    def of(experiment: type[PathExperiment]) -> tuple[Path, Ended]:
+        if experiment.name not in runs:
+            out = tmp_path_factory.mktemp("runs") / experiment.name
+            runs[experiment.name] = out, run(experiment, out)
+        return runs[experiment.name]
+
+    return of
+
+
+@pytest.mark.parametrize("experiment", BOTH)
+def test_the_default_run_succeeds_and_leaves_its_whole_folder(experiment: type[PathExperiment], finished: Finished):
+    out, ended = finished(experiment)
+    assert ended.outcome.success, ended.outcome.reason
+    summary = json.loads((out / "summary.json").read_text())
+    assert set(summary["metrics"]) >= set(PathExperiment.headline) - {"estimate_error", "outside"}
+    figures = {p.name for p in (out / "figures").iterdir()}
+    assert figures == {f"{n}.{s}" for n in ("path", "shape", "errors", "error", "signals") for s in ("png", "svg")}
+    assert (out / "report.html").read_text().count("data:image/png;base64,") == 5
+
+
+@pytest.mark.parametrize("experiment", BOTH)
+def test_the_metrics_are_those_of_the_record(experiment: type[PathExperiment], finished: Finished):
+    out, ended = finished(experiment)
+    record = Record(out / "signals.parquet")
+    goal, moving = record["planner.p_WG_goal"], record["planner.moving"]
+    left = np.flatnonzero(moving[:-1] & (np.any(np.diff(goal, axis=0) != 0.0, axis=1) | ~moving[1:]))
+    error = [float(np.linalg.norm(record["arm.p_WG_meas"][k + 1] - goal[k])) for k in left.tolist()]
+    assert len(error) == 200
+    assert ended.outcome.metrics["mean_error"].value == pytest.approx(sum(error) / 200)
+    assert ended.outcome.metrics["path_time"].value == pytest.approx(0.1 * np.pi / 0.05, abs=0.03)
+    assert record.time[-1] < float(experiment().stop_time(experiment.parameters_type()))
+
+
+def test_the_hybrid_errs_less_than_a_fifth_of_the_model_based(finished: Finished):
+    errors = [finished(e)[1].outcome.metrics["mean_error"].value for e in (VslHybrid, VslModelBased)]
+    assert errors[0] < errors[1] / 5.0
+
+
+def test_the_hybrid_knows_where_the_tip_is(finished: Finished):
+    metrics = finished(VslHybrid)[1].outcome.metrics
+    assert metrics["estimate_error"].value < 0.005
+    assert metrics["estimate_error"].value < metrics["model_error"].value / 5.0
+    assert metrics["outside"].value < 0.1
+
+
+def test_the_same_seed_gives_the_same_signals_and_another_seed_others(finished: Finished, tmp_path: Path):
+    for seed in (0, 1):
+        (tmp_path / str(seed)).mkdir()
+        with Recorder(tmp_path / str(seed) / "signals.parquet") as recorder:
+            judge(VslHybrid, seed=seed, observers=[recorder])
+    assert digest(tmp_path / "0") == digest(finished(VslHybrid)[0])
+    assert digest(tmp_path / "1") != digest(tmp_path / "0")
+
+
+def test_the_error_grows_with_the_load():
+    errors = [error_of(f"load={kg}") for kg in (0.0, 0.025, 0.05, 0.075, 0.1)]
+    assert all(b > a + 0.001 for a, b in itertools.pairwise(errors)), errors
+
+
+def test_the_error_falls_with_the_pressure():
+    errors = [error_of(f"pressure={pa}") for pa in (0.5e5, 1.0e5, 1.5e5, 2.0e5)]
+    assert all(b < a - 0.001 for a, b in itertools.pairwise(errors)), errors
+
+
+@pytest.mark.parametrize("path", ["curve", "square"])
+def test_the_error_grows_with_the_reach(path: str):
+    metrics = judge(VslModelBased, "settle=2", "speed=0.1", f"path={path}").metrics
+    assert metrics["error_far"].value > metrics["error_near"].value + 0.002
+
+
+def test_the_hybrid_errs_less_than_rigid_links_and_they_less_than_the_model_based(finished: Finished):
+    rigid = error_of("links=rigid")
+    hybrid, model_based = (finished(e)[1].outcome.metrics["mean_error"].value for e in (VslHybrid, VslModelBased))
+    assert hybrid < rigid < model_based
+
+
+@pytest.mark.parametrize(
+    "parameters", [("path=linear",), ("path=square",), ("motion=dynamic",), ("load=0", "pressure=2e5")]
+)
+@pytest.mark.parametrize("experiment", BOTH)
+def test_other_paths_loads_and_pressures_succeed(experiment: type[PathExperiment], parameters: tuple[str, ...]):
+    outcome = judge(experiment, *parameters)
+    assert outcome.success, outcome.reason
+
+
+@pytest.mark.parametrize("experiment", BOTH)
+def test_a_point_out_of_reach_is_refused_and_named_before_anything_is_written(
+    experiment: type[PathExperiment], tmp_path: Path
+):
+    with pytest.raises(UnitRefused, match=r"segment 1 of 1, point \d+ of 100, \(0\.4\d+, 0, 0\.05\) m"):
+        run(experiment, tmp_path / "r", "path=custom", "x_g=0.6,0,0.05")
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_model_that_is_not_there_is_refused_and_named(tmp_path: Path):
+    with pytest.raises(UnitRefused, match=r"nowhere\.json"):
+        run(VslHybrid, tmp_path / "r", "model=nowhere.json")
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("experiment", BOTH)
+def test_ten_seeds_succeed(experiment: type[PathExperiment]):
+    outcomes = {seed: judge(experiment, seed=seed) for seed in range(10)}
+    failed = {seed: outcome.reason for seed, outcome in outcomes.items() if not outcome.success}
+    assert not failed

@@ -1,0 +1,125 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cosim.block import Causality, Kind
+from cosim.fmu_description import FmuPort
+from cosim.signals import Signals
+from scenarios.vsl.parameters import HybridParameters, Parameters
+from scenarios.vsl.path_point import distance_to_path
+from scenarios.vsl.watch import PathWatch
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def signals(
+    goal: float,
+    *,
+    at: float | None = None,
+    below: float = 0.02,
+    segment: int = 1,
+    done: bool = False,
+    outside: bool = False,
+) -> Signals:
+    """Return a goal at x = goal and a tip `below` the point at x = at; servos are 1 mm off."""
+    told, reached = (np.array([x, 0.0, 0.1]) for x in (goal, goal if at is None else at))
+    tip = reached - below * UP
+    values: dict[str, dict[str, Any]] = {
+        "planner": {"p_WG_goal": told, "moving": segment > 0 and not done, "done": done, "segment": segment},
+        "arm": {"p_WG": tip, "p_WG_meas": tip},
+        "kinematics": {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.002 * UP, "outside": outside},
+    }
+    views: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
+        unit: {name: (np.atleast_1d(np.array(value)),) for name, value in ys.items()} for unit, ys in values.items()
+    }
+    ports = {unit: {name: port(name, np.shape(value)) for name, value in ys.items()} for unit, ys in values.items()}
+    return Signals(views, ports, values)
+
+
+def port(name: str, shape: tuple[int, ...]) -> FmuPort:
+    return FmuPort(name=name, kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="", references=(), shape=shape)
+
+
+def follow(watch: PathWatch, *moments: Signals) -> PathWatch:
+    for k, seen in enumerate(moments):
+        watch(0.02 * k, seen)
+    return watch
+
+
+def path(*below: float, outside: bool = False) -> list[Signals]:
+    """Return a run along points 1 cm apart; the tip is below each of them by so much when it is left."""
+    x = [0.3 + 0.01 * k for k in range(len(below) + 1)]
+    begun = [signals(x[0], segment=0), signals(x[1], at=x[0], below=0.5)]
+    between = [signals(x[k + 1], at=x[k], below=below[k - 1], outside=outside) for k in range(1, len(below))]
+    return [*begun, *between, signals(x[-1], done=True, below=below[-1])]
+
+
+def test_a_point_counts_when_it_is_left_not_while_the_arm_is_on_its_way():
+    watch = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.02, 0.06))
+    assert [p.error for p in watch.points] == pytest.approx([0.01, 0.02, 0.06])
+    assert [p.desired[0] for p in watch.points] == pytest.approx([0.31, 0.32, 0.33])
+
+
+def test_errors_are_those_of_the_points():
+    metrics = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.02, 0.06, 0.03, 0.05)).outcome().metrics
+    values = {name: m.value for name, m in metrics.items()}
+    assert values["mean_error"] == pytest.approx(0.034)
+    assert values["median_error"] == pytest.approx(0.03)
+    assert values["error_p25"] == pytest.approx(0.02)
+    assert values["error_p75"] == pytest.approx(0.05)
+    assert values["max_error"] == pytest.approx(0.06)
+    assert values["mean_error_true"] == pytest.approx(0.034)
+    assert values["error_near"] == pytest.approx(0.01)
+    assert values["error_far"] == pytest.approx(0.05)
+    assert values["path_distance"] == pytest.approx(0.034, rel=0.3)
+    assert values["path_time"] == pytest.approx(0.1)
+    assert "estimate_error" not in values
+    assert all(m.unit == ("s" if name == "path_time" else "m") for name, m in metrics.items())
+
+
+def test_a_completed_path_within_the_tolerance_succeeds():
+    watch = follow(PathWatch(Parameters(tolerance=0.04), hybrid=False), *path(0.03, 0.04))
+    assert watch.over
+    outcome = watch.outcome()
+    assert outcome.success
+    assert "mean error of the tip 35.0 mm, within the tolerance of 40.0 mm" in outcome.reason
+
+
+def test_a_completed_path_with_a_mean_error_above_the_tolerance_fails():
+    outcome = follow(PathWatch(HybridParameters(), hybrid=True), *path(0.004, 0.008)).outcome()
+    assert not outcome.success
+    assert "mean error of the tip 6.0 mm, above the tolerance of 5.0 mm" in outcome.reason
+
+
+def test_a_path_that_was_cut_short_fails_and_says_how_far_it_came():
+    watch = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.01, 0.01)[:-1])
+    assert not watch.over
+    outcome = watch.outcome()
+    assert not outcome.success
+    assert "stopped in segment 1 at 0.1 s, 2 points passed" in outcome.reason
+    assert "path_time" not in outcome.metrics
+
+
+def test_a_path_that_never_began_fails_without_errors():
+    outcome = follow(PathWatch(Parameters(), hybrid=False), signals(0.3, segment=0)).outcome()
+    assert not outcome.success
+    assert "stopped before it began" in outcome.reason
+    assert not outcome.metrics
+
+
+def test_the_hybrid_tells_of_its_forward_model_and_of_extrapolation():
+    watch = follow(PathWatch(HybridParameters(), hybrid=True), *path(0.003, 0.003, outside=True))
+    metrics = watch.outcome().metrics
+    assert metrics["estimate_error"].value == pytest.approx(0.002)
+    assert metrics["model_error"].value == pytest.approx(0.002)  # 3 mm below the point, taken to be 1 mm below it
+    assert metrics["servo_error"].value == pytest.approx(0.001)
+    assert metrics["outside"].value == 0.5
+
+
+def test_distance_to_a_path_is_to_its_nearest_leg_or_corner():
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    assert distance_to_path(np.array([0.4, 0.3, 0.0]), corners) == pytest.approx(0.3)
+    assert distance_to_path(np.array([1.3, 0.0, -0.4]), corners) == pytest.approx(0.5)
+    assert distance_to_path(np.array([0.9, 0.0, 0.6]), corners) == pytest.approx(0.1)
