@@ -1,0 +1,106 @@
+"""Infrared distance sensors on fingertips: what their converters read, after [Luberto] sec. III, V-B."""
+
+import math
+from bisect import bisect_left
+
+_TOP = 4095  # of a 12-bit converter
+
+
+class UnusableSensor(ValueError):
+    """A characteristic that cannot be inverted over the range of the sensor; `faults` lists all that is wrong."""
+
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("InfraredSensor: " + "; ".join(faults))
+        self.faults = faults
+
+
+class InfraredSensor:
+    """Ticks of a 12-bit converter by what the beam meets, from the characteristic y = a e^(bx) + c e^(dx), eq. (11).
+
+    The characteristic maps ticks x to the distance y of a reference surface that is met squarely. The voltage is
+    proportional to the returned intensity (sec. V-B), so another surface, met at an angle theta from its normal,
+    reads rho cos(theta)^n x, where x is the inverted characteristic and rho its reflectivity. Nothing comes back from
+    beyond `farthest`. Nearer than `nearest` the emitter's light misses the receiver more and more: x falls linearly
+    from its value at `nearest` to the share `contact` of it at distance 0 (assumed; the sensor's data sheet
+    shows the fall).
+
+    Args:
+        a: in m.
+        b: in 1/tick.
+        c: in m.
+        d: in 1/tick.
+        nearest: of the operating range, in m.
+        farthest: of the operating range, in m.
+        contact: share of the largest reading that is left at contact.
+        exponent: n of the law of incidence; 1 is Lambert's.
+
+    Raises:
+        UnusableSensor: the characteristic does not fall strictly or does not cover the operating range.
+    """
+
+    def __init__(
+        self,
+        a: float,
+        b: float,
+        c: float,
+        d: float,
+        nearest: float,
+        farthest: float,
+        contact: float,
+        exponent: float,
+    ) -> None:
+        self._a, self._b, self._c, self._d = a, b, c, d
+        self._nearest, self._farthest = nearest, farthest
+        self._contact, self._exponent = contact, exponent
+        self._nearness = [-self.distance(float(x)) for x in range(_TOP + 1)]  # rises with the ticks, for bisection
+        self._check()
+        self._brightest = self._inverse(nearest)
+
+    def distance(self, ticks: float) -> float:
+        """Return the distance in m that the characteristic gives for ticks, eq. (11)."""
+        return self._a * math.exp(self._b * ticks) + self._c * math.exp(self._d * ticks)
+
+    def ticks(self, distance: float, cosine: float, reflectivity: float) -> float:
+        """Return the noise-free, unrounded ticks for a ray that meets a surface.
+
+        Args:
+            distance: of the surface from the sensor's window along the ray, in m.
+            cosine: of the angle between ray and surface normal.
+            reflectivity: of the surface, over the reference's.
+        """
+        if distance > self._farthest or cosine <= 0.0:
+            return 0.0
+        if distance < self._nearest:
+            share = self._contact + (1.0 - self._contact) * max(distance, 0.0) / self._nearest
+            x = share * self._brightest
+        else:
+            x = self._inverse(distance)
+        return reflectivity * cosine**self._exponent * x
+
+    def reading(self, ticks: float) -> float:
+        """Return what the converter makes of noisy ticks: a whole number from 0 to 4095."""
+        return float(min(max(round(ticks), 0), _TOP))
+
+    def _inverse(self, distance: float) -> float:
+        """Return x of y(x) = distance, by linear interpolation between whole ticks, which is good to 0.001 tick."""
+        i = bisect_left(self._nearness, -distance)
+        if i == 0:
+            return 0.0
+        below, above = self._nearness[i - 1], self._nearness[i]
+        return i - 1 + (-distance - below) / (above - below)
+
+    def _check(self) -> None:
+        faults: list[str] = []
+        if not 0.0 < self._nearest < self._farthest:
+            faults.append(f"nearest {self._nearest:g} m must be positive and less than farthest {self._farthest:g} m")
+        rising = next((x for x in range(_TOP) if not self._nearness[x] < self._nearness[x + 1]), None)
+        if rising is not None:
+            faults.append(f"the characteristic must fall from 0 to {_TOP} ticks; it does not at {rising} ticks")
+        first, last = -self._nearness[0], -self._nearness[-1]
+        if not (last <= self._nearest and self._farthest <= first):
+            faults.append(
+                f"the characteristic goes from {first:.4g} m at 0 ticks to {last:.4g} m at {_TOP} ticks and must cover "
+                f"{self._nearest:g} m to {self._farthest:g} m"
+            )
+        if faults:
+            raise UnusableSensor(faults)

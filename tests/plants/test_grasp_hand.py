@@ -1,0 +1,81 @@
+import math
+
+import numpy as np
+import pytest
+
+from cosim.ports import Floats
+from plants.grasp_hand import FINGERS, JOINTS, PALM, SENSOR_PLACE, finger_points, palm_outline, sensor_rays
+from plants.grasp_tendon import GEARS, PULLEYS, STIFFNESS, resting_posture, taken_up
+
+BENT = np.array([0.3, 0.5, 0.2, 0.4, 0.1, 0.6, 0.2, 0.3])
+ORIGIN = np.zeros(2)
+
+
+def turned(p: Floats, yaw: float) -> Floats:
+    c, s = math.cos(yaw), math.sin(yaw)
+    return p @ np.array([[c, s], [-s, c]])
+
+
+def test_phalanges_have_their_lengths_and_begin_at_the_palm():
+    for f, points in zip(FINGERS, finger_points(ORIGIN, 0.0, BENT), strict=True):
+        np.testing.assert_allclose(np.linalg.norm(np.diff(points, axis=0), axis=1), f.lengths)
+        np.testing.assert_allclose(points[0], f.base)
+
+
+def test_thumb_is_on_the_right_and_bending_closes_the_hand():
+    wide, closer = (np.array([p[-1] for p in finger_points(ORIGIN, 0.0, q)]) for q in (np.zeros(JOINTS), BENT))
+    assert wide[0, 1] < -0.07
+    assert min(wide[1:, 1]) > 0.07
+    assert closer[0, 1] > wide[0, 1]
+    assert all(closer[1:, 1] < wide[1:, 1])
+
+
+def test_hand_moves_rigidly_with_the_wrist():
+    p_WH, yaw = np.array([0.3, -0.2]), 0.7
+    for here, there in zip(finger_points(ORIGIN, 0.0, BENT), finger_points(p_WH, yaw, BENT), strict=True):
+        np.testing.assert_allclose(p_WH + turned(here, yaw), there)
+    np.testing.assert_allclose(p_WH + turned(np.array(PALM), yaw), palm_outline(p_WH, yaw))
+    origins, directions = sensor_rays(ORIGIN, 0.0, BENT)
+    there, looking = sensor_rays(p_WH, yaw, BENT)
+    np.testing.assert_allclose(p_WH + turned(origins, yaw), there)
+    np.testing.assert_allclose(turned(directions, yaw), looking, atol=1e-15)
+
+
+def test_sensors_lie_on_the_pads_and_look_square_to_them_inwards():
+    origins, directions = sensor_rays(ORIGIN, 0.0, BENT)
+    for f, points, o, d in zip(FINGERS, finger_points(ORIGIN, 0.0, BENT), origins, directions, strict=True):
+        along = points[-1] - points[-2]
+        assert np.linalg.norm(d) == pytest.approx(1.0)
+        assert d @ along == pytest.approx(0.0, abs=1e-15)
+        assert (o - points[-2]) @ d == pytest.approx(f.radii[-1])
+        assert (o - points[-2]) @ along / f.lengths[-1] == pytest.approx(SENSOR_PLACE * f.lengths[-1])
+    assert directions[0, 1] > 0.0
+    assert max(directions[1:, 1]) < 0.0
+
+
+def test_pads_come_together_with_the_closure_and_the_index_lags():
+    pads = np.array([sensor_rays(ORIGIN, 0.0, resting_posture(s, 400.0, 0.094))[0] for s in np.linspace(0.0, 0.4, 9)])
+    assert np.all(np.diff(pads[:, 0, 1]) > 0.0)
+    assert np.all(np.diff(pads[:, 1:, 1], axis=0) < 0.0)
+    assert np.all(pads[:, 1, 1] > pads[:, 2, 1] + 0.01)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.2, 0.5, 0.9])
+def test_free_posture_balances_tendon_and_springs(sigma: float):
+    q = resting_posture(sigma, 400.0, 0.094)
+    T = sigma * 0.094 / (1.0 / 400.0 + float(np.sum(PULLEYS**2 / STIFFNESS)))
+    np.testing.assert_allclose(q, PULLEYS * T / STIFFNESS, atol=1e-12)
+
+
+def test_free_posture_stops_at_the_joints_limits():
+    q = resting_posture(1.0, 2000.0, 0.3)
+    assert np.max(q) == 1.6
+
+
+def test_tendon_taken_up_is_the_sum_over_the_joints():
+    yaw, angles = 0.4, list[float]()
+    for f, first in zip(FINGERS, (0, 2, 5), strict=True):
+        q = BENT[first : first + len(f.lengths)]
+        angles.extend(yaw + f.spread + f.flexion * np.cumsum(q, dtype=np.float64))
+    assert taken_up(angles, yaw) == pytest.approx(float(PULLEYS @ BENT), abs=1e-15)
+    assert len(GEARS) == JOINTS

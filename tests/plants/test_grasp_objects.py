@@ -1,0 +1,100 @@
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.ports import Floats
+from plants.grasp_objects import SOLIDS, Disc, Slab, Solid, Thing, outlines
+
+
+def met_of_polygons(thing: Thing, start: tuple[float, float], heading: float) -> float | None:
+    """Distance at which a ray crosses an edge of the outlines first."""
+    d = np.array([math.cos(heading), math.sin(heading)])
+    found: list[float] = []
+    for outline in outlines(thing, points=20000):
+        a, b = outline - start, np.roll(outline, -1, axis=0) - start
+        edge = b - a
+        with np.errstate(divide="ignore", invalid="ignore"):
+            det = d[0] * edge[:, 1] - d[1] * edge[:, 0]
+            along = (a[:, 0] * edge[:, 1] - a[:, 1] * edge[:, 0]) / det
+            across = (a[:, 0] * d[1] - a[:, 1] * d[0]) / det
+        found.extend(along[(along > 0.0) & (across >= 0.0) & (across <= 1.0)])
+    return min(found, default=None)
+
+
+@given(st.sampled_from(list(Thing)), st.floats(0.0, 2.0 * math.pi), st.floats(0.07, 0.2), st.floats(-0.08, 0.08))
+def test_a_ray_meets_the_outline(thing: Thing, bearing: float, distance: float, aside: float):
+    start = (distance * math.cos(bearing), distance * math.sin(bearing))
+    heading = bearing + math.pi + math.atan2(aside, distance)
+    met, wanted = met_of(thing, *start, heading), met_of_polygons(thing, start, heading)
+    if met is None or wanted is None:
+        beside = [met_of(thing, *start, heading + turn) for turn in (-1e-3, 1e-3)]
+        assert (met is None and wanted is None) or None in beside  # the ray grazes a silhouette
+    else:
+        assert met[0] == pytest.approx(wanted, abs=1e-6 / max(met[1], 1e-3))
+        assert 0.0 < met[1] <= 1.0 + 1e-12
+
+
+def met_of(thing: Thing, x: float, y: float, heading: float) -> tuple[float, float] | None:
+    return SOLIDS[thing].met(x, y, math.cos(heading), math.sin(heading))
+
+
+def around(distance: float, cosine: float) -> Any:
+    return pytest.approx(np.array([distance, cosine]))
+
+
+def test_angle_of_incidence():
+    cylinder, box = Thing.CYLINDER, Thing.PAPER_BOX_A
+    r = 0.033
+    for share in (0.0, 0.5, -0.9):
+        distance, cosine = met_of(cylinder, 0.1, share * r, math.pi) or (0.0, 0.0)
+        assert cosine == pytest.approx(math.sqrt(1.0 - share**2))
+        assert distance == pytest.approx(0.1 - r * cosine)
+    assert met_of(box, 0.1, 0.0, math.pi) == around(0.1 - 0.0375, 1.0)
+    distance, cosine = met_of(box, 0.0, 0.075, -math.pi / 2.0 + 0.3) or (0.0, 0.0)
+    assert (distance, cosine) == around(0.05 / math.cos(0.3), math.cos(0.3))
+
+
+def test_the_nearer_part_hides_the_other():
+    cup = Thing.BABY_CUP_A
+    assert met_of(cup, 0.2, 0.0, math.pi) == around(0.2 - 0.054, 1.0)
+    assert met_of(cup, -0.2, 0.0, 0.0) == around(0.2 - 0.035, 1.0)
+    assert met_of(cup, 0.045, 0.1, -math.pi / 2.0) == around(0.1 - 0.006, 1.0)
+
+
+def test_a_ray_that_points_away_meets_nothing():
+    for thing in Thing:
+        assert met_of(thing, 0.1, 0.0, 0.0) is None
+        assert met_of(thing, 0.1, 0.07, math.pi) is None
+
+
+@pytest.mark.parametrize("thing", Thing)
+def test_the_outline_reaches_as_far_as_the_solid(thing: Thing):
+    assert np.max(np.linalg.norm(np.vstack(outlines(thing)), axis=1)) == pytest.approx(SOLIDS[thing].reach)
+
+
+def test_poses_differ_by_a_quarter_turn():
+    for a, b in ((Thing.BABY_CUP_A, Thing.BABY_CUP_B), (Thing.PAPER_BOX_B, Thing.PAPER_BOX_A)):
+        assert SOLIDS[a].yaw - SOLIDS[b].yaw == pytest.approx(math.pi / 2.0)
+        assert SOLIDS[a].parts == SOLIDS[b].parts
+
+
+def mean(x: Floats) -> float:
+    return float(np.mean(x, dtype=np.float64))
+
+
+def test_gyration_and_friction_arm_are_the_integrals_over_the_shape():
+    rng = np.random.default_rng(0)
+    p = rng.uniform(-0.05, 0.05, (400000, 2))
+    distance: Floats = np.linalg.norm(p, axis=1)
+    disc = Solid(parts=(Disc(radius=0.04),), yaw=0.0, mass=1.0, reflectivity=1.0)
+    inside = distance < 0.04
+    assert disc.gyration == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
+    assert disc.friction_arm == pytest.approx(mean(distance[inside]), rel=0.01)
+    box = Solid(parts=(Slab(low=(-0.04, -0.025), high=(0.04, 0.025)),), yaw=0.0, mass=1.0, reflectivity=1.0)
+    inside = (np.abs(p[:, 0]) < 0.04) & (np.abs(p[:, 1]) < 0.025)
+    assert box.gyration == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
+    assert box.friction_arm == pytest.approx(mean(distance[inside]), rel=0.08)  # of a disc as large
