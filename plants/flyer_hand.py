@@ -1,0 +1,143 @@
+"""A person's hand at the end of a compliant arm: on its course, on the object that it holds, or against a palm."""
+
+import pickle
+
+import numpy as np
+
+from plants.floating_attachment import Attachment, Frame, Stiffness
+from plants.floating_rotation import (
+    IDENTITY,
+    ZERO,
+    Quadruple,
+    Triple,
+    along,
+    between,
+    cross,
+    inverse,
+    length,
+    matrix_of,
+    minus,
+    plus,
+    product,
+    triple,
+    turned,
+    turned_back,
+)
+from plants.flyer_hand_parameters import Params
+from plants.hand_tremor import HandTremor
+from plants.rigid_body import RigidBody
+
+_SPARE = 0.1
+"""Metres beyond its reach at which an arm loses what the hand holds."""
+
+
+class FlyerHand:
+    """The hand H. Its course, where the arm wants it, is the person's plus tremor.
+
+    What the hand holds, it holds fast: the compliance is the arm's, between course and object (`Attachment`), and gives
+    in at arm_force_max; what it gave in, it takes back with the time constant recovery_time. A fist on the palm of a
+    gripper is kept off it, by the depth that its course has in the palm, and presses with the arm's stiffness and
+    damping times depth and speed, at most arm_force_max.
+    """
+
+    def __init__(self, params: Params, p: Triple, q: Quadruple) -> None:
+        self._p = params
+        self._arm = Stiffness(
+            params.arm_stiffness,
+            params.arm_damping,
+            params.arm_force_max,
+            params.wrist_stiffness,
+            params.wrist_damping,
+            params.wrist_torque_max,
+        )
+        self._tremor = HandTremor(
+            params.tremor_rms,
+            params.tremor_frequency,
+            params.tremor_bandwidth,
+            params.drift_rms,
+            params.drift_time,
+            params.seed,
+        )
+        self._shake, self._rest, self._led = ZERO, p, p
+        self.p, self.q = p, q
+        self.p_OH, self.q_OH = triple(np.asarray(params.p_OH).tolist()), IDENTITY
+        self.course = Frame(p, q)
+        self.hold: Attachment | None = None
+
+    @property
+    def calm(self) -> Triple:
+        """Where the hand is, without its tremor."""
+        return minus(self.p, self._shake)
+
+    def move(self, dt: float, p: Triple, q: Quadruple) -> Frame:
+        """Return the course at the end of a step that leads to a pose, without tremor, where nothing is in the way."""
+        self._recover(dt)
+        self._tremor.advance(dt)
+        self._shake = triple(self._tremor.displacement.tolist())
+        led, self._led = self._led, plus(p, self._shake)
+        return _led(dt, led, self._led, q)
+
+    def press(self, dt: float, course: Frame, G: Frame) -> tuple[Frame, Triple, Triple]:
+        """Return the course of a fist as the palm lets it, its force on the gripper, and where it acts, seen from G."""
+        p = self._p
+        arm = minus(course.p, G.p)
+        x, y, z = turned_back(G.R, arm)
+        depth, aside = x + p.fist_radius - p.palm_depth, max(abs(y), abs(z))
+        if not 0.0 < depth < 2.0 * p.fist_radius + _SPARE or aside > p.palm_width + p.fist_radius:
+            return course, ZERO, ZERO
+        n = (G.R[0], G.R[3], G.R[6])
+        v = minus(course.v, plus(G.v, cross(G.w, arm)))
+        push = p.arm_stiffness * depth + p.arm_damping * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2])
+        push = min(max(push, 0.0), p.arm_force_max)
+        kept_off = _led(dt, self.course.p, along(course.p, -depth, n), course.q)
+        return kept_off, along(ZERO, push, n), along(arm, p.fist_radius - depth, n)
+
+    def take_or_leave(self, wants: bool, body: RigidBody) -> None:
+        """Take hold of an object where the hand is, or let it go; an arm that is stretched too far loses it."""
+        if wants and self.hold is None:
+            R = matrix_of(body.q)
+            self.p_OH = turned_back(R, minus(self.p, body.p))
+            self.q_OH = product(inverse(body.q), self.q)
+            F = self.course
+            place, turn = turned_back(F.R, minus(self.p, F.p)), product(inverse(F.q), body.q)
+            self.hold = Attachment(self._arm, self.p_OH, place, turn)
+        elif self.hold is not None:
+            stretched = length(minus(self.p, self._rest)) > self._p.arm_reach + _SPARE
+            if not wants or stretched:
+                self.hold = None
+
+    def _recover(self, dt: float) -> None:
+        """Draw what the hand holds back to its course, from where the arm gave in."""
+        hold = self.hold
+        if hold is not None:
+            left = max(0.0, 1.0 - dt / self._p.recovery_time)
+            hold.place = along(ZERO, left, hold.place)
+            hold.turn = between(inverse(self.q_OH), hold.turn, left)
+
+    def arrive(self, course: Frame, body: RigidBody) -> None:
+        """Be where the object is that the hand holds, or on the course."""
+        self.course = course
+        if self.hold is None:
+            self.p, self.q = course.p, course.q
+        else:
+            self.p = plus(body.p, turned(matrix_of(body.q), self.p_OH))
+            self.q = product(body.q, self.q_OH)
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        h, c = self.hold, self.course
+        hold = None if h is None else (h.r, h.place, h.turn)
+        places = (self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH)
+        return pickle.dumps((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this hand or of one with equal parameters."""
+        tremor, hold, course, places = pickle.loads(state)
+        self._tremor.set_state(tremor)
+        self.hold = None if hold is None else Attachment(self._arm, *hold)
+        self.course = Frame(*course)
+        self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH = places
+
+
+def _led(dt: float, before: Triple, p: Triple, q: Quadruple) -> Frame:
+    return Frame(p, q, ((p[0] - before[0]) / dt, (p[1] - before[1]) / dt, (p[2] - before[2]) / dt))

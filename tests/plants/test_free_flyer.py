@@ -1,0 +1,232 @@
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cosim.block import describe
+from cosim.ports import Floats
+from plants.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
+from plants.rigid_body import TurnsTooFast
+
+KNOWING = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
+SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])
+TUMBLING = replace(
+    KNOWING, I_B=SKEWED, v_WB_0=np.array([0.1, -0.2, 0.05]), w_WB_0=np.array([0.5, -0.3, 0.8]), substep=0.008
+)
+
+
+def flat(y: Outputs) -> Floats:
+    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(FreeFlyer).outputs])
+
+
+def from_quaternion(q: Floats) -> Rotation:
+    return Rotation.from_quat(q, scalar_first=True)
+
+
+def matrix(q: Floats) -> Floats:
+    return from_quaternion(q).as_matrix()
+
+
+def spin(I_B: Floats, q: Floats, w: Floats) -> Floats:
+    """Return the angular momentum in the world, about the centre of mass."""
+    R = matrix(q)
+    return np.asarray(R @ (I_B @ (np.transpose(R) @ w)), dtype=np.float64)
+
+
+def walk(robot: FreeFlyer, u: Inputs, steps: int, dt: float = 0.016) -> Outputs:
+    y = robot.outputs(0.0, u)
+    for i in range(steps):
+        y = robot.step(i * dt, dt, u)
+    return y
+
+
+def moved(p: Params, u: Inputs, seconds: float, dt: float = 0.016) -> Outputs:
+    return walk(FreeFlyer(p), u, round(seconds / dt), dt)
+
+
+def wrench(seed: int = 0) -> Inputs:
+    rng = np.random.default_rng(seed)
+    f_B, tau_B, f_G, tau_G = rng.uniform(-1.0, 1.0, (4, 3)) * [[0.5], [0.02], [0.5], [0.05]]
+    return Inputs(f_B=f_B, tau_B=tau_B, f_G=f_G, tau_G=tau_G)
+
+
+def test_starts_where_it_was_put():
+    q = Rotation.from_euler("z", 0.5 * np.pi).as_quat(scalar_first=True)
+    y = FreeFlyer(replace(KNOWING, q_WB_0=q, w_WB_0=np.array([0.0, 0.0, 2.0]))).outputs(0.0, Inputs())
+    np.testing.assert_allclose(y.p_WG, [0.30, -0.37, 0.0], atol=1e-15)
+    np.testing.assert_allclose(y.v_WG, [0.6, 0.0, 0.0], atol=1e-15)  # w x R p_BG
+    np.testing.assert_array_equal(y.q_WG, y.q_WB)
+
+
+def test_momenta_and_energy_stay_over_a_hundred_seconds_of_tumbling():
+    p = TUMBLING
+    assert np.min(np.abs(np.linalg.eigvalsh(SKEWED) - 0.15)) > 1e-3  # no principal axis is the rotation's
+    robot, w, v = FreeFlyer(p), p.w_WB_0, p.v_WB_0
+    y = robot.outputs(0.0, Inputs())
+    L, energy = SKEWED @ w, 0.5 * (p.mass * v @ v + w @ SKEWED @ w)
+    for i in range(6250):
+        y = robot.step(0.016 * i, 0.016, Inputs())
+        if i % 250 == 249:
+            L_now = spin(SKEWED, y.q_WB, y.w_WB)
+            energy_now = 0.5 * (p.mass * y.v_WB @ y.v_WB + y.w_WB @ L_now)
+            np.testing.assert_allclose(L_now, L, rtol=0.0, atol=1e-9 * float(np.linalg.norm(L)))
+            np.testing.assert_allclose(p.mass * y.v_WB, p.mass * v, rtol=1e-12)
+            assert energy_now == pytest.approx(energy, rel=1e-9)
+            assert np.linalg.norm(y.q_WB) == pytest.approx(1.0, abs=1e-14)
+    np.testing.assert_allclose(y.p_WB, p.p_WB_0 + 100.0 * v, rtol=1e-9)
+
+
+def test_a_force_at_the_gripper_gives_momentum_and_its_moment():
+    p, f, seconds = replace(KNOWING, p_WB_0=np.array([0.3, 0.1, -0.2])), np.array([0.2, -0.1, 0.3]), 0.8
+    u, robot, moment = Inputs(f_G=f, tau_G=np.array([0.01, 0.0, -0.02])), FreeFlyer(p), np.zeros(3)
+    y = before = robot.outputs(0.0, u)
+    for i in range(800):
+        y = robot.step(0.001 * i, 0.001, u)
+        moment += 0.0005 * (np.cross(before.p_WG, f) + np.cross(y.p_WG, f)) + 0.001 * u.tau_G
+        before = y
+    L = spin(p.I_B, y.q_WB, y.w_WB) + p.mass * np.cross(y.p_WB, y.v_WB)
+    np.testing.assert_allclose(p.mass * y.v_WB, seconds * f, rtol=1e-12)
+    np.testing.assert_allclose(L, moment, atol=1e-6)  # about the world's origin; the trapezium rule's error
+    assert np.linalg.norm(moment) > 0.04
+
+
+def test_propulsion_turns_with_the_robot():
+    turned = replace(KNOWING, q_WB_0=Rotation.from_euler("z", 0.5 * np.pi).as_quat(scalar_first=True))
+    y = moved(turned, Inputs(f_B=np.array([9.584, 0.0, 0.0])), 0.8)
+    np.testing.assert_allclose(y.v_WB, [0.0, 0.8, 0.0], atol=1e-12)
+    np.testing.assert_allclose(y.p_WB, [0.30, -0.07 + 0.32, 0.0], atol=1e-12)
+
+
+def test_turns_about_a_principal_axis_as_in_closed_form():
+    y = moved(KNOWING, Inputs(tau_B=np.array([0.0, 0.0, 0.1623])), 1.6)
+    assert y.w_WB[2] == pytest.approx(1.6, rel=1e-12)
+    assert Rotation.from_matrix(matrix(y.q_WB)).magnitude() == pytest.approx(0.5 * 1.6**2, rel=1e-9)
+
+
+def test_error_falls_with_the_fourth_power_of_the_step():
+    rate = replace(TUMBLING, w_WB_0=np.array([3.0, -2.0, 4.0]))
+    exact = flat(moved(replace(rate, substep=0.0005), wrench(), 1.6))
+    wide, narrow = (
+        float(np.max(np.abs(flat(moved(replace(rate, substep=h), wrench(), 1.6)) - exact))) for h in (0.016, 0.008)
+    )
+    assert 10.0 < wide / narrow < 25.0
+    assert narrow < 1e-6
+
+
+def test_steps_of_the_master_do_not_matter_where_substeps_are_the_same():
+    u = wrench()
+    np.testing.assert_allclose(flat(moved(TUMBLING, u, 0.8, 0.016)), flat(moved(TUMBLING, u, 0.8, 0.008)), atol=1e-14)
+
+
+def mujoco_path(mujoco: Any, p: Params, u: Inputs, steps: int, per_step: int = 4) -> list[Floats]:
+    """Return p_WG every 16 ms as MuJoCo has it, the wrench turned from frame to frame at all its evaluations."""
+    inertia = p.I_B[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{0.016 / per_step}" gravity="0 0 0" integrator="RK4"/><worldbody><body>
+        <freejoint/><inertial pos="0 0 0" mass="{p.mass}" fullinertia="{" ".join(map(str, inertia))}"/>
+        </body></worldbody></mujoco>"""
+    )
+
+    def push(_: Any, data: Any) -> None:
+        R = matrix(data.qpos[3:])
+        torque = R @ u.tau_B + np.cross(R @ p.p_BG, u.f_G) + u.tau_G
+        data.xfrc_applied[1] = [*(R @ u.f_B + u.f_G), *torque]
+
+    data, path = mujoco.MjData(model), list[Floats]()
+    data.qpos[:] = [*p.p_WB_0, *p.q_WB_0]
+    data.qvel[:] = [*p.v_WB_0, *(matrix(p.q_WB_0).T @ p.w_WB_0)]  # turning, in the body's frame
+    mujoco.set_mjcb_control(push)
+    try:
+        for _ in range(steps):
+            mujoco.mj_step(model, data, nstep=per_step)
+            path.append(data.qpos[:3] + matrix(data.qpos[3:]) @ p.p_BG)
+    finally:
+        mujoco.set_mjcb_control(None)
+    return path
+
+
+def test_agrees_with_mujoco_on_the_same_wrench():
+    mujoco = pytest.importorskip("mujoco")
+    u, p = wrench(3), replace(TUMBLING, p_BG=np.array([-0.3, 0.02, 0.05]))
+    robot, path = FreeFlyer(p), mujoco_path(mujoco, p, u, 375)
+    ours = [robot.step(0.016 * i, 0.016, u).p_WG for i in range(375)]
+    worst = max(float(np.linalg.norm(a - b)) for a, b in zip(ours, path, strict=True))
+    print(f"\nlargest distance to MuJoCo {mujoco.__version__} in 6 s: {1e3 * worst:.2g} mm")
+    assert np.linalg.norm(path[-1] - p.p_WB_0) > 0.5
+    assert worst < 5e-5
+
+
+def test_sign_of_the_quaternion_never_jumps():
+    robot, u = FreeFlyer(replace(KNOWING, w_WB_0=np.array([0.0, 3.0, 0.0]))), Inputs()
+    before = robot.outputs(0.0, u).q_WB
+    for i in range(400):
+        q = robot.step(0.016 * i, 0.016, u).q_WB
+        assert q @ before > 0.99
+        before = q
+    assert before[0] < 0.0 or np.any(before < -0.5)
+
+
+def test_estimate_is_as_far_off_as_declared():
+    robot = FreeFlyer(replace(Params(seed=5), w_WB_0=np.array([0.3, 0.1, 0.0])))
+    offs: list[Floats] = []
+    for i in range(3000):
+        y = robot.step(0.016 * i, 0.016, Inputs())
+        turn = np.asarray((from_quaternion(y.q_WB).inv() * from_quaternion(y.q_WB_meas)).as_rotvec(), dtype=np.float64)
+        offs.append(np.concatenate([y.p_WB_meas - y.p_WB, turn, y.v_WB_meas - y.v_WB, y.w_WB_meas - y.w_WB]))
+        assert y.q_WB_meas @ y.q_WB > 0.99
+        assert np.linalg.norm(y.q_WB_meas) == pytest.approx(1.0, abs=1e-14)
+    deviation = np.std(offs, axis=0)
+    np.testing.assert_allclose(deviation, np.repeat([0.001, 0.002, 0.001, 0.002], 3), rtol=0.06)
+    correlation = np.corrcoef(np.transpose(offs)) - np.eye(12)
+    assert np.max(np.abs(correlation)) < 0.1
+
+
+def test_truth_does_not_depend_on_the_estimate():
+    a, b = moved(Params(seed=1), wrench(), 1.6), moved(Params(seed=2), wrench(), 1.6)
+    np.testing.assert_array_equal(a.p_WG, b.p_WG)
+    assert not np.array_equal(a.p_WB_meas, b.p_WB_meas)
+
+
+def test_asking_for_outputs_changes_nothing():
+    a, b = FreeFlyer(Params()), FreeFlyer(Params())
+    np.testing.assert_array_equal(flat(a.outputs(0.0, Inputs())), flat(a.outputs(0.0, Inputs())))
+    np.testing.assert_array_equal(flat(walk(a, wrench(), 5)), flat(walk(b, wrench(), 5)))
+
+
+def test_goes_on_bit_for_bit_after_a_state_is_restored():
+    u, a, b = wrench(), FreeFlyer(Params(seed=3)), FreeFlyer(Params(seed=3))
+    walk(a, u, 20)
+    state = a.get_state()
+    expected = flat(walk(a, u, 20))
+    for robot in (a, b):
+        robot.set_state(state)
+        np.testing.assert_array_equal(flat(walk(robot, u, 20)), expected)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"I_B": np.diag([0.1, 0.1, -0.1])}, "positive definite"),
+        ({"I_B": np.diag([0.1, 0.1, 0.3])}, "largest may not exceed"),
+        ({"I_B": np.array([[0.15, 0.01, 0.0], [0.0, 0.15, 0.0], [0.0, 0.0, 0.15]])}, "symmetric"),
+        ({"q_WB_0": np.array([1.0, 0.0, 0.2, 0.0])}, "norm is 1.0198"),
+        ({"q_WB_0": np.zeros(4)}, "norm is 0"),
+        ({"mass": -1.0}, "mass -1 kg must be positive"),
+    ],
+)
+def test_what_no_body_has_is_refused(changes: dict[str, Any], told: str):
+    with pytest.raises(UnusableFlyer, match=told):
+        FreeFlyer(replace(Params(), **changes))
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(UnusableFlyer) as caught:
+        FreeFlyer(Params(mass=0.0, I_B=-np.eye(3), q_WB_0=np.zeros(4)))
+    assert len(caught.value.faults) == 3
+
+
+def test_a_turn_that_cannot_be_followed_is_an_error():
+    with pytest.raises(TurnsTooFast, match="rad/s"):
+        moved(replace(KNOWING, w_WB_0=np.array([0.0, 0.0, 400.0]), substep=0.016), Inputs(), 1.6)
