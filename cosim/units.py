@@ -63,6 +63,7 @@ NewtonSecondPerMetre = Annotated[float, Unit("N.s/m", BaseExponents(kg=1, s=-1))
 RadianPerSecond2 = Annotated[float, Unit("rad/s2", BaseExponents(rad=1, s=-2))]
 PerMetre = Annotated[float, Unit("1/m", BaseExponents(m=-1))]
 PerSecond2 = Annotated[float, Unit("1/s2", BaseExponents(s=-2))]
+PerSecond3 = Annotated[float, Unit("1/s3", BaseExponents(s=-3))]
 NewtonSecond = Annotated[float, Unit("N.s", BaseExponents(kg=1, m=1, s=-1))]
 NewtonMetrePerRadian = Annotated[float, Unit("N.m/rad", BaseExponents(kg=1, m=2, s=-2, rad=-1))]
 NewtonMetreSecondPerRadian = Annotated[float, Unit("N.m.s/rad", BaseExponents(kg=1, m=2, s=-1, rad=-1))]

@@ -1,0 +1,83 @@
+"""A free-flyer's own model of its body: one rigid body with a gripper on a fixed arm. [Fernandes2020] sec. 4.1.2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.sampled_loop import LinearPlant
+from cosim.ports import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlyerBody:
+    """Mass in kg, inertia I_B (3, 3) about the centre of mass B in kg m2, gripper p_BG (3,) in m; G has the axes of B.
+
+    The manipulator's joints are fixed, eq. (4.1), so the generalised velocity is the base's twist.
+    """
+
+    mass: float
+    I_B: Floats
+    p_BG: Floats
+
+    def faults(self) -> list[str]:
+        """Return what no rigid body can have."""
+        faults: list[str] = []
+        if not self.mass > 0.0:
+            faults.append(f"mass = {self.mass:g} kg must be positive")
+        if not np.all(np.isfinite(self.p_BG)):
+            faults.append(f"p_BG = {self.p_BG.tolist()} must be finite")
+        if not positive_definite(self.I_B):
+            faults.append(f"I_B = {self.I_B.tolist()} must be symmetric and positive definite")
+        else:
+            small, middle, large = np.linalg.eigvalsh(self.I_B)
+            if large > (small + middle) * (1.0 + 1e-9):
+                faults.append(
+                    f"I_B's principal moments {small:g}, {middle:g}, {large:g} kg m2: none may exceed the others' sum"
+                )
+        return faults
+
+    def jacobian(self) -> Floats:
+        """Return J (6, 6), eqs. (3.10) and (3.11) without arm joints: the twist of B to that of G, in the axes of B.
+
+        Errata: block 12 is -[R p]x N; with angular velocities in place of rates of Euler angles N drops out.
+        """
+        x, y, z = self.p_BG
+        J = np.eye(6)
+        J[:3, 3:] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return J
+
+    def mass_matrix(self) -> Floats:
+        """Return the mass matrix (6, 6) of the twist of B, in the axes of B."""
+        M = np.zeros((6, 6))
+        M[:3, :3], M[3:, 3:] = self.mass * np.eye(3), self.I_B
+        return M
+
+    def linear_plant(self, lag: float) -> LinearPlant:
+        """Return the body near rest, behind a propulsion of first order.
+
+        States: displacement of B (m, rad), twist of B, thrust (6, if lag > 0). Inputs: commanded wrench on B, external
+        wrench on G. Outputs: displacement of G, twist of G. All in the axes of B.
+
+        Args:
+            lag: time constant of the propulsion, s; 0 if it follows at once.
+        """
+        O, I, J = np.zeros((6, 6)), np.eye(6), self.jacobian()
+        inverse: Floats = np.linalg.inv(self.mass_matrix()).astype(np.float64)
+        A, C = np.block([[O, I], [O, O]]), np.block([[J, O], [O, J]])
+        B, E = np.vstack([O, inverse]), np.vstack([O, inverse @ np.transpose(J)])
+        if lag == 0.0:
+            return LinearPlant(A=A, B=B, E=E, C=C)
+        no_rows, no_columns = np.zeros((6, 12)), np.zeros((12, 6))
+        return LinearPlant(
+            A=np.block([[A, B], [no_rows, -I / lag]]),
+            B=np.vstack([no_columns, I / lag]),
+            E=np.vstack([E, O]),
+            C=np.hstack([C, no_columns]),
+        )
+
+
+def positive_definite(M: Floats) -> bool:
+    """Tell whether a matrix is finite, symmetric (to rounding) and positive definite."""
+    if not np.all(np.isfinite(M)) or np.max(np.abs(M - np.transpose(M))) > 1e-9 * np.max(np.abs(M)):
+        return False
+    return bool(np.all(np.linalg.eigvalsh(M) > 0.0))

@@ -1,0 +1,49 @@
+"""Tells from a gripper's velocity that a person pulls or pushes. [Fernandes2020] sec. 3.1.2."""
+
+import math
+
+from controllers.flyer_rotation import Triple, norm
+
+
+class VelocityMonitor:
+    """Speed of the low-passed velocity, and a threshold that counts only once the gripper was slower than it.
+
+    The components are filtered, not their norm: that would make a speed of the noise.
+
+    Args:
+        time: time constant of the filter, s; 0 for none.
+        period: time between two measurements, s.
+    """
+
+    def __init__(self, time: float, period: float) -> None:
+        self._gain = 1.0 - math.exp(-period / time) if time > 0.0 else 1.0
+        self._v: Triple | None = None
+        self._armed = False
+        self.speed = 0.0
+
+    def measure(self, v: Triple) -> None:
+        """Take in a measured velocity; the first one is where the filter begins."""
+        if self._v is not None:
+            g, (x, y, z), (a, b, c) = self._gain, self._v, v
+            v = (x + g * (a - x), y + g * (b - y), z + g * (c - z))
+        self._v = v
+        self.speed = norm(v)
+
+    def disarm(self) -> None:
+        """Do not let a threshold count until the gripper is slow again."""
+        self._armed = False
+
+    def exceeds(self, threshold: float) -> bool:
+        """Tell whether the speed has risen above the threshold; to be asked at each measurement since `disarm`."""
+        if self.speed <= threshold:
+            self._armed = True
+            return False
+        return self._armed
+
+    def get_state(self) -> tuple[Triple | None, bool, float]:
+        """Return the filter, whether the threshold counts, and the speed."""
+        return self._v, self._armed, self.speed
+
+    def set_state(self, state: tuple[Triple | None, bool, float]) -> None:
+        """Go back to a state that `get_state` gave."""
+        self._v, self._armed, self.speed = state

@@ -1,0 +1,140 @@
+"""A linear plant under a sampled linear controller, with delay, by python-control: poles and response."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import control as untyped_control
+import numpy as np
+
+from cosim.ports import Floats
+
+control: Any = untyped_control
+
+_LASTING = math.exp(-1.0)  # a pole nearer to zero, as those of a delay are, is all but gone within a sample
+_WHOLE = 1e-9  # of a period: what a delay of whole periods may be off by rounding
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearPlant:
+    """dx/dt = A x + B u + E d, y = C x: u is commanded, d comes from outside."""
+
+    A: Floats
+    B: Floats
+    E: Floats
+    C: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearController:
+    """z[n+1] = A z[n] + B y[n], u[n] = -(C z[n] + D y[n])."""
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+
+def without_memory(D: Floats) -> LinearController:
+    """Return the controller u[n] = -D y[n]."""
+    inputs, measured = D.shape
+    return LinearController(A=np.zeros((0, 0)), B=np.zeros((0, measured)), C=np.zeros((inputs, 0)), D=D)
+
+
+class SampledLoop:
+    """Plant, hold, delay and controller, closed: what linear theory says of them at the sampling instants.
+
+    The controller measures y at multiples of the period. A command reaches the plant after the delay and is held until
+    the next one does; d is held over each period.
+
+    Args:
+        plant: what is controlled.
+        controller: its law.
+        period: time between two samples, s.
+        delay: time from a measurement to its command's effect, s; not negative, parts of a period count.
+    """
+
+    def __init__(self, plant: LinearPlant, controller: LinearController, period: float, delay: float = 0.0) -> None:
+        self._plant, self._controller = plant, controller
+        self.period, self.delay = period, delay
+
+    @cached_property
+    def system(self) -> Any:
+        """The closed loop from d to y, a discrete `control.StateSpace`."""
+        commands, disturbances = self._plant.B.shape[1], self._plant.E.shape[1]
+        whole = math.floor(self.delay / self.period + _WHOLE)
+        line = _delay_line(commands, whole, self.period)
+        past = max(self.delay - whole * self.period, 0.0)
+        straight = control.ss([], [], [], np.eye(disturbances), self.period)
+        forward = _sampled(self._plant, past, self.period) * control.append(line, straight)
+        c = self._controller
+        idle = np.zeros((disturbances, c.D.shape[1]))
+        law = control.ss(c.A, c.B, np.vstack([c.C, idle[:, : c.A.shape[0]]]), np.vstack([c.D, idle]), self.period)
+        return control.feedback(forward, law)[:, commands:]
+
+    @cached_property
+    def poles(self) -> Any:
+        """The closed loop's poles z."""
+        return self.system.poles()
+
+    @property
+    def pole_radius(self) -> float:
+        """Largest |z|; the loop is stable if it is less than one."""
+        return float(np.max(np.abs(self.poles)))
+
+    @property
+    def least_damped(self) -> tuple[float, float]:
+        """Damping ratio and frequency (rad/s) of the pole s = log(z) / period with the least ratio.
+
+        Poles that decay with a time constant shorter than the period are left out, unless there are no others.
+        """
+        lasting = np.abs(self.poles) > min(_LASTING, 0.999 * self.pole_radius)
+        z = self.poles[lasting]
+        s = np.log(z.astype(complex)) / self.period
+        frequency = np.abs(s)
+        ratio = -s.real / np.maximum(frequency, 1e-300)
+        least = int(np.argmin(ratio))
+        return float(ratio[least]), float(frequency[least])
+
+    def response(self, d: Floats) -> Floats:
+        """Return y, shape (n, outputs), at the beginnings of n periods from rest, with d of shape (n, disturbances)."""
+        T = self.period * np.arange(len(d))
+        y: Floats = control.forced_response(self.system, T, np.transpose(d), squeeze=False).outputs
+        return np.transpose(y)
+
+
+def largest_stable(radius: Callable[[float], float], upper: float, steps: int = 14) -> float:
+    """Return about the largest x in [0, upper] with radius(x) < 1, by bisection; 0 if none is found."""
+    low, high = 0.0, upper
+    for _ in range(steps):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if radius(middle) < 1.0 else (low, middle)
+    return low
+
+
+def _delay_line(channels: int, periods: int, period: float) -> Any:
+    """From u[n] to the command of `periods` ago, and the one before that."""
+    n = channels * (periods + 1)
+    A, B = np.eye(n, k=-channels), np.eye(n, channels)
+    C, D = np.eye(n + channels, n, k=-channels), np.eye(n + channels, channels)  # u[n], then the states, newest first
+    wanted = slice(channels * periods, None)
+    return control.ss(A, B, C[wanted], D[wanted], period)
+
+
+def _sampled(plant: LinearPlant, past: float, period: float) -> Any:
+    """The plant at samples, from [u, u before it, d]: the older command still acts for the time `past`."""
+    newer = _discrete(plant, period - past)
+    older = _discrete(plant, past) if past > 0.0 else None
+    whole = _discrete(plant, period)
+    commands = plant.B.shape[1]
+    before = np.zeros_like(plant.B) if older is None else newer.A @ older.B[:, :commands]
+    B = np.hstack([newer.B[:, :commands], before, whole.B[:, commands:]])
+    return control.ss(whole.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])), period)
+
+
+def _discrete(plant: LinearPlant, time: float) -> Any:
+    B = np.hstack([plant.B, plant.E])
+    continuous = control.ss(plant.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])))
+    return control.sample_system(continuous, time, method="zoh")

@@ -1,0 +1,387 @@
+"""The sequences of figures 3.2 and 3.3, with a robot that goes to its goal at once unless a person moves it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controllers.flyer_behaviour import Behaviour
+from controllers.flyer_velocity_monitor import VelocityMonitor
+from controllers.handover_state_machine import (
+    HandoverPhase,
+    HandoverStateMachine,
+    HandoverTask,
+    Inputs,
+    Outputs,
+    Params,
+    UnusableHandover,
+)
+from cosim.block import describe
+from cosim.ports import Floats
+
+P = HandoverPhase
+T = 0.016
+ARM = np.array([-0.30, 0.0, 0.0])
+OPEN, HOLDING, EMPTY = 1.2, 0.79, 0.60
+
+
+@dataclass
+class World:
+    """Where the robot is and what its gripper does; a hook may change it before each step."""
+
+    machine: HandoverStateMachine
+    before: Callable[["World"], None] = lambda _: None
+    p_WG: Floats = field(default_factory=lambda: np.array([0.0, -0.07, 0.0]))
+    v_WB: Floats = field(default_factory=lambda: np.zeros(3))
+    angle_closed: float = HOLDING
+    follows: bool = True
+    rng: np.random.Generator | None = None
+    y: Outputs | None = None
+    t: float = 0.0
+    ys: list[Outputs] = field(default_factory=list[Outputs])
+
+    def step(self) -> Outputs:
+        self.before(self)
+        y = self.y
+        if y and self.follows:
+            self.p_WG = np.array(y.p_WG_goal)
+        angle = self.angle_closed if y and y.closure > 0.5 else OPEN
+        noise = 0.001 * self.rng.standard_normal((2, 3)) if self.rng else np.zeros((2, 3))
+        u = Inputs(p_WB_meas=self.p_WG - ARM + noise[0], v_WB_meas=self.v_WB + noise[1], gripper_angle=angle)
+        self.y = self.machine.step(self.t, T, u)
+        self.t += T
+        self.ys.append(self.y)
+        return self.y
+
+    def run(self, seconds: float) -> list[Outputs]:
+        return [self.step() for _ in range(round(seconds / T))]
+
+    def phases(self) -> list[HandoverPhase]:
+        found = [y.phase for y in self.ys]
+        return [p for i, p in enumerate(found) if i == 0 or p is not found[i - 1]]
+
+
+def world(task: HandoverTask, before: Callable[[World], None] = lambda _: None, **params: Any) -> World:
+    return World(HandoverStateMachine(Params(task=task, **params)), before)
+
+
+def tug(speed: float, after: float = 0.5) -> Callable[[World], None]:
+    """A person who moves the gripper for 0.3 s, a while after each time that the robot began to check."""
+    waited = [0.0]
+
+    def act(w: World) -> None:
+        checking = w.y is not None and w.y.phase is P.CHECK_VELOCITY
+        waited[0] = waited[0] + T if checking else 0.0
+        w.v_WB = np.array([0.0, 0.0, speed if checking and waited[0] > after else 0.0])
+
+    return act
+
+
+def first(ys: list[Outputs], phase: HandoverPhase) -> Outputs:
+    return next(y for y in ys if y.phase is phase)
+
+
+FETCH = [P.OPEN_GRIPPER, P.MOVE_TO_OBJECT, P.GRASP_OBJECT, P.MOVE_TO_HANDOVER]
+TO_HUMAN = [*FETCH, P.ACTIVATE_IMPEDANCE, P.SIGNAL, P.CHECK_VELOCITY, P.RELEASE_OBJECT]
+END = [P.DEACTIVATE_IMPEDANCE, P.RETREAT, P.DONE]
+RECEIVE = [P.CHECK_VELOCITY, P.CLOSE_GRIPPER, P.CHECK_ANGLE]
+
+
+def test_robot_to_human_goes_through_figure_3_2():
+    w = world(HandoverTask.ROBOT_TO_HUMAN, tug(0.2))
+    ys = w.run(20.0)
+    assert w.phases() == TO_HUMAN + END
+    closed = {P.GRASP_OBJECT, P.MOVE_TO_HANDOVER, P.ACTIVATE_IMPEDANCE, P.SIGNAL, P.CHECK_VELOCITY}
+    yielding = {P.ACTIVATE_IMPEDANCE, P.SIGNAL, P.CHECK_VELOCITY, P.RELEASE_OBJECT}
+    for y in ys:
+        assert y.closure == (1.0 if y.phase in closed else 0.0)
+        assert y.impedance == (y.phase in yielding)
+        assert y.pose is not y.impedance
+        assert y.light == (y.phase is P.SIGNAL)
+        assert y.failed_receptions == 0
+    np.testing.assert_allclose(first(ys, P.GRASP_OBJECT).p_WG_goal, [-0.10, -0.64, 0.0])
+    np.testing.assert_array_equal(first(ys, P.CHECK_VELOCITY).p_WG_goal, [0.0, -0.07, 0.0])
+    np.testing.assert_array_equal(ys[-1].p_WG_goal, Params().p_WG_retreat)
+
+
+def test_human_to_robot_goes_through_figure_3_3():
+    w = world(HandoverTask.HUMAN_TO_ROBOT, tug(0.05))
+    ys = w.run(15.0)
+    approach = [P.OPEN_GRIPPER, P.MOVE_TO_HANDOVER, P.ACTIVATE_IMPEDANCE, P.SIGNAL]
+    assert w.phases() == approach + RECEIVE + END
+    assert ys[-1].closure == 1.0
+    assert ys[-1].failed_receptions == 0
+
+
+def test_failed_reception_opens_and_signals_again():
+    def person(w: World) -> None:
+        pull(w)
+        w.angle_closed = HOLDING if w.y and w.y.failed_receptions == 2 else EMPTY
+
+    pull = tug(0.05)
+    w = world(HandoverTask.HUMAN_TO_ROBOT, person)
+    ys = w.run(25.0)
+    again = [P.OPEN_GRIPPER, P.SIGNAL]
+    approach = [P.OPEN_GRIPPER, P.MOVE_TO_HANDOVER, P.ACTIVATE_IMPEDANCE, P.SIGNAL]
+    assert w.phases() == approach + RECEIVE + again + RECEIVE + again + RECEIVE + END
+    assert ys[-1].failed_receptions == 2
+    light = np.array([y.light for y in ys])
+    assert np.sum(light[1:] & ~light[:-1]) == 3  # a person reacts to its beginning
+    assert all(y.impedance for y in ys if y.phase is P.OPEN_GRIPPER and y.failed_receptions)
+
+
+def test_after_a_failure_it_waits_until_the_gripper_is_calm():
+    rings = [0.0]
+
+    def person(w: World) -> None:
+        pull(w)
+        if w.y and w.y.phase is P.OPEN_GRIPPER and w.y.failed_receptions and rings[0] < 6.0:
+            rings[0] += T
+            w.v_WB = np.array([0.0, 0.05, 0.0])
+
+    pull = tug(0.05)
+    w = world(HandoverTask.HUMAN_TO_ROBOT, person)
+    w.angle_closed = EMPTY
+    ys = w.run(14.0)
+    opening = sum(y.phase is P.OPEN_GRIPPER and y.failed_receptions == 1 for y in ys) * T
+    assert opening > 6.0 + 0.5
+
+
+def test_collaborative_gives_waits_there_and_receives():
+    w = world(HandoverTask.COLLABORATIVE, tug(0.2), pause=4.0)
+    ys = w.run(35.0)
+    assert w.phases() == [*TO_HUMAN, P.ACTIVATE_IMPEDANCE, P.SIGNAL, *RECEIVE, *END]
+    released = next(i for i, y in enumerate(ys) if y.phase is P.RELEASE_OBJECT)
+    end = next(i for i, y in enumerate(ys) if y.phase is P.DEACTIVATE_IMPEDANCE)
+    assert all(y.impedance and y.p_WG_goal[0] == 0.0 for y in ys[released:end])
+    waits = sum(y.phase is P.ACTIVATE_IMPEDANCE for y in ys[released:])
+    assert waits * T == pytest.approx(4.0, abs=0.05)
+    assert ys[-1].closure == 1.0
+
+
+def test_hold_yields_at_the_handover_pose_from_the_start_for_good():
+    w = world(HandoverTask.HOLD, lambda w: setattr(w, "v_WB", np.array([0.3, 0.0, 0.0])), patience=1.0)
+    for y in [w.machine.outputs(0.0, Inputs()), *w.run(5.0)]:
+        assert y.phase is P.ACTIVATE_IMPEDANCE
+        assert (y.impedance, y.pose, y.light) == (True, False, False)
+        np.testing.assert_array_equal(y.p_WG_goal, [0.0, -0.07, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("task", "behaviour", "threshold"),
+    [
+        (HandoverTask.ROBOT_TO_HUMAN, Behaviour.RIGID, 0.059),
+        (HandoverTask.ROBOT_TO_HUMAN, Behaviour.COMPLIANT, 0.08),
+        (HandoverTask.HUMAN_TO_ROBOT, Behaviour.RIGID, 0.021),
+        (HandoverTask.HUMAN_TO_ROBOT, Behaviour.COMPLIANT, 0.037),
+    ],
+)
+def test_published_velocities_decide(task: HandoverTask, behaviour: Behaviour, threshold: float):
+    """Just below the threshold nothing happens, just above it does."""
+    for factor, moves in ((0.99, False), (1.01, True)):
+        w = world(task, tug(factor * threshold), behaviour=behaviour)
+        w.run(12.0)
+        assert (w.phases()[-1] is not P.CHECK_VELOCITY) is moves
+
+
+def test_given_velocities_replace_the_published_ones():
+    w = world(
+        HandoverTask.HUMAN_TO_ROBOT, tug(0.05), behaviour=Behaviour.CUSTOM, release_velocity=0.1, receive_velocity=0.06
+    )
+    w.run(10.0)
+    assert w.phases()[-1] is P.CHECK_VELOCITY
+
+
+def test_gripper_velocity_has_the_share_of_the_turning():
+    """v + w x R p, eq. (3.10): turned by 90 degrees about z the arm lies along -y, and w_x moves it along -z."""
+    q = Rotation.from_euler("z", 90, degrees=True).as_quat(scalar_first=True)
+    machine = HandoverStateMachine(Params())
+    u = Inputs(q_WB_meas=q, v_WB_meas=np.array([0.0, 0.0, 0.1]), w_WB_meas=np.array([0.5, 0.0, 0.0]))
+    assert machine.step(0.0, T, u).speed_G == pytest.approx(abs(0.1 - 0.5 * 0.30))
+
+
+def test_impedance_begins_only_near_the_place_and_at_rest():
+    def drift(w: World) -> None:
+        w.follows = False
+        w.p_WG = np.array([0.06 if w.t < 5.0 else 0.04, -0.07, 0.0])
+        w.v_WB = np.array([0.02 if w.t < 8.0 else 0.0, 0.0, 0.0])
+
+    w = world(HandoverTask.HUMAN_TO_ROBOT, drift)
+    w.run(12.0)
+    begun = next(i for i, y in enumerate(w.ys) if y.impedance) * T
+    assert begun == pytest.approx(8.0 + 0.5, abs=0.3)
+
+
+def test_signal_waits_for_the_transient_of_the_switch():
+    """Within the gate but off by more than the tolerance the spring still swings: no light yet."""
+
+    def settle(w: World) -> None:
+        w.follows = False
+        w.p_WG = np.array([0.03 if w.t < 6.0 else 0.0, -0.07, 0.0])
+
+    w = world(HandoverTask.HUMAN_TO_ROBOT, settle)
+    w.run(8.0)
+    assert next(i for i, y in enumerate(w.ys) if y.impedance) * T < 3.0
+    assert next(i for i, y in enumerate(w.ys) if y.light) * T == pytest.approx(6.5, abs=0.1)
+
+
+def test_threshold_counts_only_after_the_gripper_was_slower():
+    monitor = VelocityMonitor(0.0, T)
+    seen: list[bool] = []
+    for v in (0.1, 0.1, 0.01, 0.1):
+        monitor.measure((v, 0.0, 0.0))
+        seen.append(monitor.exceeds(0.05))
+    assert seen == [False, False, False, True]
+    monitor.disarm()
+    assert not monitor.exceeds(0.05)
+
+
+def test_motion_since_before_the_second_light_is_no_answer_to_it():
+    def act(w: World) -> None:
+        pull(w)
+        if w.y and w.y.failed_receptions:
+            moves = w.y.phase in (P.SIGNAL, P.CHECK_VELOCITY)
+            w.v_WB = np.array([0.0, 0.05 if moves else 0.0, 0.0])
+
+    pull = tug(0.05)
+    w = world(HandoverTask.HUMAN_TO_ROBOT, act, filter_time=0.0)
+    w.angle_closed = EMPTY
+    w.run(12.0)
+    assert w.phases()[-3:] == [P.OPEN_GRIPPER, P.SIGNAL, P.CHECK_VELOCITY]
+
+
+def test_low_pass_has_its_time_constant():
+    monitor = VelocityMonitor(0.08, T)
+    monitor.measure((0.0, 0.0, 0.0))
+    for n in range(1, 20):
+        monitor.measure((0.0, 0.3, 0.4))
+        assert monitor.speed == pytest.approx(0.5 * (1.0 - np.exp(-n * T / 0.08)))
+
+
+def test_noise_of_the_estimate_trips_nothing():
+    w = world(HandoverTask.HUMAN_TO_ROBOT, patience=1e4)
+    w.rng = np.random.default_rng(3)
+    w.run(120.0)
+    assert w.phases()[-1] is P.CHECK_VELOCITY
+
+
+def test_patience_ends_and_the_robot_holds_what_it_has():
+    w = world(HandoverTask.ROBOT_TO_HUMAN, patience=5.0)
+    y = w.run(20.0)[-1]
+    assert w.phases() == [*TO_HUMAN[:-1], P.GIVEN_UP]
+    assert (y.impedance, y.pose, y.light, y.closure) == (False, True, False, 1.0)
+    np.testing.assert_array_equal(y.p_WG_goal, w.p_WG)
+    checked = sum(x.phase is P.CHECK_VELOCITY for x in w.ys) * T
+    assert checked == pytest.approx(5.0, abs=0.05)
+
+
+def test_object_that_is_not_there_is_noticed():
+    w = world(HandoverTask.ROBOT_TO_HUMAN)
+    w.angle_closed = EMPTY
+    y = w.run(10.0)[-1]
+    assert w.phases() == [P.OPEN_GRIPPER, P.MOVE_TO_OBJECT, P.GRASP_OBJECT, P.GIVEN_UP]
+    assert y.failed_receptions == 0
+
+
+def test_object_lost_on_the_way_is_noticed():
+    def lose(w: World) -> None:
+        if w.y and w.y.phase is P.MOVE_TO_HANDOVER:
+            w.angle_closed, w.follows = EMPTY, False
+
+    w = world(HandoverTask.ROBOT_TO_HUMAN, lose)
+    w.run(10.0)
+    assert w.phases()[-2:] == [P.MOVE_TO_HANDOVER, P.GIVEN_UP]
+
+
+def test_too_many_failures_end_it():
+    w = world(HandoverTask.HUMAN_TO_ROBOT, tug(0.05), attempts=2)
+    w.angle_closed = EMPTY
+    y = w.run(30.0)[-1]
+    assert y.phase is P.GIVEN_UP
+    assert y.failed_receptions == 2
+
+
+def test_object_is_approached_straight_ahead():
+    """From the standoff on the gripper's own -x, turned with it."""
+    q = Rotation.from_euler("z", 90, degrees=True).as_quat(scalar_first=True)
+    p = Params(task=HandoverTask.ROBOT_TO_HUMAN, q_WG_object=q, approach=0.2)
+    np.testing.assert_allclose(p.standoff() - p.object_goal(), [0.0, 0.2, 0.0], atol=1e-12)
+    w = world(HandoverTask.ROBOT_TO_HUMAN, approach=0.2)
+    goals = [y.p_WG_goal for y in w.run(6.0) if y.phase is P.MOVE_TO_OBJECT]
+    np.testing.assert_allclose(goals[0], [0.1, -0.64, 0.0])
+    np.testing.assert_allclose(goals[-1], [-0.1, -0.64, 0.0])
+
+
+def test_places_out_of_the_workspace_are_refused_all_at_once():
+    with pytest.raises(UnusableHandover) as caught:
+        HandoverStateMachine(
+            Params(
+                task=HandoverTask.HUMAN_TO_ROBOT,
+                p_WG_handover=np.array([-0.5, 0.0, 0.0]),
+                p_WG_retreat=np.array([1.9, 0.0, 0.0]),
+                behaviour=Behaviour.CUSTOM,
+                receive_velocity=0.005,
+            )
+        )
+    text = str(caught.value)
+    assert len(caught.value.faults) == 4
+    assert "p_WG_handover takes the gripper to [-0.5, 0.0, 0.0] m, out of the workspace" in text
+    assert "p_WG_retreat takes the robot's centre of mass to [2.2, 0.0, 0.0] m" in text
+    assert "release_velocity must be given" in text
+    assert "receive_velocity = 0.005 m/s must exceed gate_speed = 0.01 m/s" in text
+
+
+def test_orientation_that_is_none_is_refused():
+    with pytest.raises(UnusableHandover, match="q_WG_handover"):
+        HandoverStateMachine(Params(q_WG_handover=np.zeros(4)))
+
+
+def flat(y: Outputs) -> Floats:
+    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(HandoverStateMachine).outputs])
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1.5, 4.0, 6.7, 8.5])
+def test_restored_state_continues_bit_for_bit(seconds: float):
+    rng = np.random.default_rng(1)
+    noise = 0.001 * rng.standard_normal((2000, 2, 3))
+    pull = [np.array([0.0, 0.0, 0.2 if 7.0 < n * T % 9.0 < 7.6 else 0.0]) for n in range(2000)]
+
+    def course(machine: HandoverStateMachine, begin: int, steps: int, y: Outputs) -> tuple[list[Floats], Outputs]:
+        rows: list[Floats] = []
+        for n in range(begin, begin + steps):
+            p = y.p_WG_goal - ARM + noise[n][0]
+            u = Inputs(p_WB_meas=p, v_WB_meas=pull[n] + noise[n][1], gripper_angle=HOLDING if y.closure else OPEN)
+            y = machine.step(n * T, T, u)
+            rows.append(flat(y))
+        return rows, y
+
+    machine, other = (HandoverStateMachine(Params(task=HandoverTask.COLLABORATIVE)) for _ in range(2))
+    begin = round(seconds / T)
+    _, y = course(machine, 0, begin, machine.outputs(0.0, Inputs(p_WB_meas=np.array([0.3, -0.07, 0.0]))))
+    state = machine.get_state()
+    wanted, _ = course(machine, begin, 700, y)
+    for m in (other, machine):
+        m.set_state(state)
+        np.testing.assert_array_equal(course(m, begin, 700, y)[0], wanted)
+
+
+def test_outputs_at_the_start_are_those_of_the_step_and_decide_nothing():
+    machine = HandoverStateMachine(Params(task=HandoverTask.ROBOT_TO_HUMAN))
+    u = Inputs(p_WB_meas=np.array([0.2, 0.1, 0.0]))
+    before = machine.get_state()
+    y = machine.outputs(0.0, u)
+    assert machine.get_state() == before
+    np.testing.assert_array_equal(flat(y), flat(machine.step(0.0, T, u)))
+    np.testing.assert_allclose(y.p_WG_goal, [-0.1, 0.1, 0.0])
+
+
+def test_inputs_are_not_kept():
+    machine = HandoverStateMachine(Params(task=HandoverTask.ROBOT_TO_HUMAN))
+    u = Inputs(p_WB_meas=np.array([0.2, 0.1, 0.0]))
+    y = machine.step(0.0, T, u)
+    u.p_WB_meas[:] = 9.0
+    y.p_WG_goal[:] = 9.0
+    np.testing.assert_allclose(machine.step(T, T, u).p_WG_goal, [-0.1, 0.1, 0.0])

@@ -1,0 +1,277 @@
+"""The law against its closed form, and a rigid body in the loop against python-control's linear prediction."""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import control as untyped_control
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controllers.flyer_behaviour import Behaviour
+from controllers.flyer_rotation import UnusableOrientation
+from controllers.flyer_stability import UnusableController
+from controllers.impedance_controller import ImpedanceController, Inputs, Outputs, Params
+from cosim.block import describe
+from cosim.geometry import quaternion_of, rotation_of
+from cosim.ports import Floats
+
+control: Any = untyped_control
+T = 0.016
+MASS, INERTIA, ARM = 9.584, np.diag([0.1534, 0.1427, 0.1623]), np.array([-0.30, 0.0, 0.0])
+GOAL = np.array([0.0, -0.07, 0.0])
+NO_LAG = Params(lag=0.0)
+GAINS = {
+    Behaviour.RIGID: (7.0 * MASS, 15.0, 70.0 * INERTIA, 5.0),
+    Behaviour.COMPLIANT: (0.7 * MASS, 5.0, 7.0 * INERTIA, 1.0),
+}
+
+
+def cross_matrix(v: Floats) -> Floats:
+    x, y, z = v
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_vector(R: Floats) -> Floats:
+    return Rotation.from_matrix(R).as_rotvec()
+
+
+@dataclass
+class Body:
+    """A rigid body in fine steps, apart from the library's own; `turn` is R_WB, w in B."""
+
+    p: Floats = field(default_factory=lambda: GOAL - ARM)
+    turn: Floats = field(default_factory=lambda: np.eye(3))
+    v: Floats = field(default_factory=lambda: np.zeros(3))
+    w: Floats = field(default_factory=lambda: np.zeros(3))
+
+    def push(self, f_B: Floats, tau_B: Floats, f_G: Floats, tau_G: Floats, dt: float, parts: int = 2) -> None:
+        h = dt / parts
+        for _ in range(parts):
+            torque = tau_B + np.transpose(self.turn) @ tau_G + cross_matrix(ARM) @ (np.transpose(self.turn) @ f_G)
+            a = (self.turn @ f_B + f_G) / MASS
+            dw = (torque - np.cross(self.w, INERTIA @ self.w)) / INERTIA.diagonal()
+            self.p = self.p + h * self.v + h * h / 2.0 * a
+            self.v = self.v + h * a
+            self.turn = self.turn @ Rotation.from_rotvec(h * self.w + h * h / 2.0 * dw).as_matrix()
+            self.w = self.w + h * dw
+
+    def measured(self) -> Inputs:
+        return Inputs(
+            p_WB_meas=self.p,
+            q_WB_meas=quaternion_of(self.turn),
+            v_WB_meas=self.v,
+            w_WB_meas=self.turn @ self.w,
+            p_WG_goal=GOAL,
+            active=True,
+        )
+
+    def displacement(self) -> Floats:
+        return np.concatenate([self.p + self.turn @ ARM - GOAL, rotation_vector(self.turn)])
+
+
+def pushed(controller: ImpedanceController, wrench: Floats, delay: int = 0) -> Floats:
+    """Displacement of the gripper, position and rotation vector, at the beginning of each step of a wrench on it."""
+    body, queue, path = Body(), [(np.zeros(3), np.zeros(3))] * delay, list[Floats]()
+    for n, d in enumerate(wrench):
+        path.append(body.displacement())
+        y = controller.step(n * T, T, body.measured())
+        queue.append((y.f_cmd, y.tau_cmd))
+        f, tau = queue.pop(0)
+        body.push(f, tau, d[:3], d[3:], T)
+    return np.array(path)
+
+
+def pulse(axis: int, size: float, seconds: float = 0.5, total: float = 3.0) -> Floats:
+    d = np.zeros((round(total / T), 6))
+    d[: round(seconds / T), axis] = size
+    return d
+
+
+def law(p: Params, u: Inputs) -> tuple[Floats, Floats]:
+    """Eq. (3.25) for gains that are multiples of unity in translation, with matrices."""
+    k, b, k_R, b_R = GAINS[p.behaviour]
+    R, R_D = rotation_of(u.q_WB_meas), rotation_of(u.q_WG_goal)
+    r = R @ p.p_BG
+    lever = cross_matrix(r)
+    f_W = k * (u.p_WG_goal - u.p_WB_meas - r) - b * (u.v_WB_meas - lever @ u.w_WB_meas)
+    tau_W = R_D @ (-k_R @ rotation_vector(np.transpose(R_D) @ R) - b_R * np.transpose(R_D) @ u.w_WB_meas)
+    J_T = np.block([[np.eye(3), np.zeros((3, 3))], [lever, np.eye(3)]])
+    wrench = J_T @ np.concatenate([f_W, tau_W])
+    return np.transpose(R) @ wrench[:3], np.transpose(R) @ wrench[3:]
+
+
+def anywhere(seed: int) -> Inputs:
+    rng = np.random.default_rng(seed)
+    q, q_goal = Rotation.random(2, rng=rng).as_quat(scalar_first=True)
+    p, v, w, goal = rng.normal(size=(4, 3))
+    return Inputs(p_WB_meas=p, q_WB_meas=q, v_WB_meas=v, w_WB_meas=w, p_WG_goal=goal, q_WG_goal=q_goal, active=True)
+
+
+@pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
+@pytest.mark.parametrize("seed", range(4))
+def test_command_is_eq_3_25(behaviour: Behaviour, seed: int):
+    p, u = Params(behaviour=behaviour, p_BG=np.array([-0.25, 0.06, -0.1])), anywhere(seed)
+    f, tau = law(p, u)
+    y = ImpedanceController(p).step(0.0, T, u)
+    np.testing.assert_allclose(y.f_cmd, f, atol=1e-9)
+    np.testing.assert_allclose(y.tau_cmd, tau, atol=1e-9)
+    p_WG = u.p_WB_meas + rotation_of(u.q_WB_meas) @ p.p_BG
+    assert y.error_p == pytest.approx(np.linalg.norm(u.p_WG_goal - p_WG))
+    assert y.error_R <= math.pi
+
+
+def test_opposite_quaternions_are_the_same_orientation():
+    controller, u = ImpedanceController(Params()), anywhere(5)
+    a, b = controller.step(0.0, T, u), controller.step(0.0, T, replace(u, q_WB_meas=-u.q_WB_meas))
+    np.testing.assert_allclose(a.tau_cmd, b.tau_cmd, atol=1e-12)
+    assert a.error_R == pytest.approx(b.error_R)
+
+
+def test_turning_world_goal_and_robot_together_changes_nothing():
+    """Also with gains that differ by axis: they are in the goal's axes, so the stability found holds for any goal."""
+    custom = Params(
+        behaviour=Behaviour.CUSTOM,
+        stiffness_translation=np.diag([20.0, 40.0, 60.0]),
+        damping_translation=np.diag([10.0, 15.0, 20.0]),
+    )
+    controller, u, turn = ImpedanceController(custom), anywhere(6), Rotation.from_rotvec([0.4, -1.0, 2.0])
+    q, q_goal = (
+        (turn * Rotation.from_quat(x, scalar_first=True)).as_quat(scalar_first=True) for x in (u.q_WB_meas, u.q_WG_goal)
+    )
+    p, v, w, goal = (turn.apply(x) for x in (u.p_WB_meas, u.v_WB_meas, u.w_WB_meas, u.p_WG_goal))
+    turned = Inputs(p_WB_meas=p, q_WB_meas=q, v_WB_meas=v, w_WB_meas=w, p_WG_goal=goal, q_WG_goal=q_goal, active=True)
+    a, b = controller.step(0.0, T, u), controller.step(0.0, T, turned)
+    np.testing.assert_allclose(a.f_cmd, b.f_cmd, atol=1e-9)
+    np.testing.assert_allclose(a.tau_cmd, b.tau_cmd, atol=1e-9)
+
+
+def test_commands_nothing_when_off_but_tells_the_error():
+    y = ImpedanceController(Params()).step(0.0, T, replace(anywhere(1), active=False))
+    assert not np.any(y.f_cmd)
+    assert not np.any(y.tau_cmd)
+    assert y.error_p > 0.0
+
+
+@pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
+@pytest.mark.parametrize("axis", range(6))
+def test_small_pushes_move_the_gripper_as_linear_theory_says(behaviour: Behaviour, axis: int):
+    controller = ImpedanceController(replace(NO_LAG, behaviour=behaviour))
+    wrench = pulse(axis, 0.05 if axis < 3 else 0.01)
+    real, predicted = pushed(controller, wrench), controller.loop.response(wrench)[:, :6]
+    assert np.max(np.abs(real - predicted)) < 0.01 * np.max(np.abs(predicted[:, axis]))
+
+
+def test_prediction_holds_with_delay_and_differs_without():
+    controller = ImpedanceController(replace(NO_LAG, delay=T))
+    wrench = pulse(2, 0.05)
+    real = pushed(controller, wrench, delay=1)
+    size = np.max(np.abs(real[:, 2]))
+    assert np.max(np.abs(real - controller.loop.response(wrench)[:, :6])) < 0.01 * size
+    prompt = ImpedanceController(NO_LAG).loop.response(wrench)[:, :6]
+    assert np.max(np.abs(real - prompt)) > 0.02 * size
+
+
+@pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
+def test_step_along_the_arm_is_that_of_mass_spring_and_damper(behaviour: Behaviour):
+    """Along x nothing turns, so 1 / (m s^2 + k_B s + k_D) is the whole loop but for its sampling."""
+    k, b, _, _ = GAINS[behaviour]
+    f, n = 0.05, round(8.0 / T)
+    wrench = np.zeros((n, 6))
+    wrench[:, 0] = f
+    real = pushed(ImpedanceController(replace(NO_LAG, behaviour=behaviour)), wrench)[:, 0]
+    held = control.feedback(
+        control.c2d(control.ss([[0, 1], [0, 0]], [[0], [1 / MASS]], np.eye(2), np.zeros((2, 1))), T),
+        control.ss([], [], [], [[k, b]], T),
+    )
+    sampled = control.step_response(held, T * np.arange(n)).outputs[0, 0]
+    assert np.max(np.abs(real / f - sampled)) < 0.01 * np.max(sampled)
+    continuous = control.step_response(control.tf([1.0], [MASS, b, k]), T * np.arange(n)).outputs
+    assert np.max(np.abs(real / f - continuous)) < 0.03 * np.max(continuous)
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_steady_force_deflects_by_force_over_stiffness(axis: int):
+    wrench = np.zeros((round(7.0 / T), 6))
+    wrench[:, axis] = 0.05
+    y = pushed(ImpedanceController(NO_LAG), wrench)
+    np.testing.assert_allclose(y[-1, axis], 0.05 / (7.0 * MASS), rtol=0.01)
+    assert np.max(np.abs(y[-1, 3:])) < 1e-4  # the force acts at the gripper: nothing is left to turn it
+
+
+def test_published_behaviours_have_their_damping():
+    rigid, compliant = (
+        ImpedanceController(replace(NO_LAG, behaviour=b)).outputs(0.0, Inputs())
+        for b in (Behaviour.RIGID, Behaviour.COMPLIANT)
+    )
+    assert rigid.pole_radius < 1.0
+    assert rigid.damping_ratio == pytest.approx(15.0 / (2.0 * math.sqrt(7.0) * MASS), rel=0.05)
+    assert rigid.pole_frequency == pytest.approx(math.sqrt(7.0), rel=0.02)
+    assert compliant.damping_ratio == pytest.approx(5.0 / (2.0 * math.sqrt(0.7) * MASS), rel=0.25)  # the lever couples
+    assert compliant.damping_ratio == pytest.approx(0.3, abs=0.05)
+
+
+def test_delay_that_destabilises_is_refused_with_what_would_be_right():
+    with pytest.raises(UnusableController, match=r"62\.5 Hz with a delay of 0\.032 s") as caught:
+        ImpedanceController(replace(NO_LAG, delay=0.032))
+    assert "|z| = 1.0571" in str(caught.value)
+    assert "a delay of at most about 0.027 s" in str(caught.value)
+    ImpedanceController(replace(NO_LAG, delay=0.026))
+    ImpedanceController(replace(NO_LAG, delay=0.032, behaviour=Behaviour.COMPLIANT))
+
+
+def test_refused_delay_does_swing_up_and_the_allowed_one_calms_down():
+    """The nonlinear body agrees with the verdict."""
+    controller = ImpedanceController(NO_LAG)  # the law is the same for any delay that it is told
+    bad, good = (pushed(controller, pulse(2, 0.001, 0.1, 3.0), delay=d) for d in (2, 1))
+    assert np.max(np.abs(bad[-20:, 4])) > 10.0 * np.max(np.abs(good[:, 4]))
+    assert np.max(np.abs(good[-20:])) < 0.3 * np.max(np.abs(good))
+
+
+def test_cure_named_for_the_gains_is_stable():
+    with pytest.raises(UnusableController) as caught:
+        ImpedanceController(Params(delay=0.032))
+    factor = float(str(caught.value).split("at most about ")[2].split(" times")[0]) * 0.99
+    I = np.eye(3)
+    ImpedanceController(
+        Params(
+            delay=0.032,
+            behaviour=Behaviour.CUSTOM,
+            stiffness_translation=factor * 7.0 * MASS * I,
+            damping_translation=factor * 15.0 * I,
+            stiffness_rotation=factor * 70.0 * INERTIA,
+            damping_rotation=factor * 5.0 * I,
+        )
+    )
+
+
+def test_matrices_that_are_not_positive_definite_are_refused_all_at_once():
+    skew = np.array([[20.0, 5.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 20.0]])
+    with pytest.raises(UnusableController) as caught:
+        ImpedanceController(
+            Params(
+                behaviour=Behaviour.CUSTOM,
+                stiffness_translation=skew,
+                damping_rotation=np.diag([1.0, 1.0, 0.0]),
+                I_B=np.diag([0.1, 0.1, 0.3]),
+            )
+        )
+    assert len(caught.value.faults) == 3
+    assert "none may exceed the others' sum" in str(caught.value)
+
+
+@pytest.mark.parametrize("q", [np.zeros(4), np.array([np.nan, 0.0, 0.0, 1.0])])
+def test_orientation_that_is_none_is_refused(q: Floats):
+    with pytest.raises(UnusableOrientation, match="q_WB_meas"):
+        ImpedanceController(Params()).step(0.0, T, Inputs(q_WB_meas=q))
+
+
+def test_outputs_at_the_start_are_those_of_the_step():
+    controller, u = ImpedanceController(Params()), anywhere(3)
+    flat = [
+        np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(ImpedanceController).outputs])
+        for y in (controller.outputs(0.0, u), controller.step(0.0, T, u))
+    ]
+    np.testing.assert_array_equal(flat[0], flat[1])
+    assert isinstance(controller.outputs(0.0, u), Outputs)

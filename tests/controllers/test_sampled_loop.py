@@ -1,0 +1,93 @@
+"""Against closed forms of a mass under sampled control."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controllers.sampled_loop import LinearController, LinearPlant, SampledLoop, largest_stable, without_memory
+from cosim.ports import Floats
+
+T = 0.016
+ROLLER = LinearPlant(A=np.zeros((1, 1)), B=np.eye(1), E=np.eye(1), C=np.eye(1))  # x' = u + d
+
+
+def spring(m: float = 2.0, k: float = 18.0, c: float = 3.0) -> tuple[LinearPlant, LinearController]:
+    plant = LinearPlant(
+        A=np.array([[0.0, 1.0], [0.0, 0.0]]), B=np.array([[0.0], [1 / m]]), E=np.array([[0.0], [1 / m]]), C=np.eye(2)
+    )
+    return plant, without_memory(np.array([[k, c]]))
+
+
+@pytest.mark.parametrize("gain", [1.0, 30.0, 120.0, 130.0])
+def test_integrator_has_the_pole_of_its_closed_form(gain: float):
+    loop = SampledLoop(ROLLER, without_memory(np.array([[gain]])), T)
+    assert loop.pole_radius == pytest.approx(abs(1.0 - gain * T))
+    assert (loop.pole_radius < 1.0) == (gain < 2.0 / T)
+
+
+@pytest.mark.parametrize("periods", [0.0, 0.3, 1.0, 1.7, 2.0, 3.25])
+def test_poles_with_delay_solve_the_difference_equation(periods: float):
+    """x[n+1] = x[n] - g ((T - p) x[n-k] + p x[n-k-1]) for a delay of k T + p."""
+    g, k = 20.0, int(periods)
+    p = (periods - k) * T
+    polynomial = np.zeros(k + 3)
+    polynomial[0], polynomial[1] = 1.0, -1.0
+    polynomial[k + 1] += g * (T - p)
+    polynomial[k + 2] += g * p
+    loop = SampledLoop(ROLLER, without_memory(np.array([[g]])), T, periods * T)
+    wanted = np.roots(polynomial)
+    for z in wanted[np.abs(wanted) > 1e-6]:
+        assert np.min(np.abs(loop.poles - z)) < 1e-6
+
+
+def test_delay_of_whole_periods_lost_to_rounding_counts_as_whole():
+    g = without_memory(np.array([[20.0]]))
+    radius = [SampledLoop(ROLLER, g, T, d).pole_radius for d in (3 * T - 1e-15, 3 * T, 3 * T + 1e-15)]
+    np.testing.assert_allclose(radius, radius[1], rtol=1e-9)
+
+
+def test_fast_sampling_gives_the_continuous_damping_ratio():
+    m, k, c = 2.0, 18.0, 3.0
+    ratio, frequency = SampledLoop(*spring(m, k, c), 1e-4).least_damped
+    assert ratio == pytest.approx(c / (2.0 * math.sqrt(k * m)), rel=1e-3)
+    assert frequency == pytest.approx(math.sqrt(k / m), rel=1e-3)
+
+
+def test_response_is_the_recursion_of_held_forces_and_settles_at_force_over_stiffness():
+    m, k, c, f = 2.0, 18.0, 3.0, 0.5
+    d = np.full((800, 1), f)
+    y = SampledLoop(*spring(m, k, c), T, 2 * T).response(d)
+    x, v, commands = 0.0, 0.0, [0.0, 0.0]
+    for n in range(len(d)):
+        np.testing.assert_allclose(y[n], [x, v], atol=1e-12)
+        commands.append(-k * x - c * v)
+        a = (commands[n] + f) / m
+        x, v = x + v * T + a * T * T / 2.0, v + a * T
+    assert y[-1, 0] == pytest.approx(f / k, rel=1e-3)
+
+
+def test_part_of_a_period_of_delay_lets_the_older_command_act_so_long():
+    m, k, c, f = 2.0, 18.0, 3.0, 0.5
+    past, d = 0.3 * T, np.full((300, 1), f)
+    y = SampledLoop(*spring(m, k, c), T, T + past).response(d)
+    x, v, commands = 0.0, 0.0, [0.0, 0.0]
+    for n in range(len(d)):
+        np.testing.assert_allclose(y[n], [x, v], atol=1e-12)
+        commands.append(-k * x - c * v)
+        for h, command in ((past, commands[n]), (T - past, commands[n + 1])):
+            a = (command + f) / m
+            x, v = x + v * h + a * h * h / 2.0, v + a * h
+
+
+def test_memory_of_the_controller_takes_the_offset_away():
+    plant, law = spring()
+    integral = LinearController(A=np.eye(1), B=np.array([[T, 0.0]]), C=np.array([[12.0]]), D=law.D)
+    y: Floats = SampledLoop(plant, integral, T).response(np.full((4000, 1), 0.5))
+    assert abs(y[-1, 0]) < 1e-6
+    assert np.max(y[:, 0]) > 0.01
+
+
+def test_bisection_finds_the_limit():
+    assert largest_stable(lambda x: x / 0.7, 1.0) == pytest.approx(0.7, abs=1e-3)
+    assert largest_stable(lambda _: 2.0, 1.0) == 0.0
