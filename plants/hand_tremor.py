@@ -2,10 +2,21 @@
 
 import math
 import pickle
+from typing import NamedTuple
 
 import numpy as np
 
 from cosim.ports import Floats
+
+
+class _Step(NamedTuple):
+    """What an advance by dt takes: the transition F, the root L of the gathered covariance, the drift's share kept."""
+
+    dt: float
+    F: tuple[float, float, float, float]
+    L: tuple[float, float, float]
+    kept: float
+    fresh: float
 
 
 class HandTremor:
@@ -34,22 +45,26 @@ class HandTremor:
         self._drift_sigma = drift_rms / math.sqrt(3.0)
         self._drift_time = drift_time
         self._rng = np.random.default_rng(seed)
-        self._tremor: Floats = np.zeros((2, 3))
-        self._drift: Floats = np.zeros(3)
+        self._tremor = [(0.0, 0.0)] * 3  # displacement and velocity of each axis
+        self._drift = [0.0] * 3
+        self._step = _Step(0.0, (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 1.0, 0.0)
 
     @property
     def displacement(self) -> Floats:
         """Where the hand is, seen from where it wants to be, (3,), in m."""
-        return self._tremor[0] + self._drift
+        return np.array([x + d for (x, _), d in zip(self._tremor, self._drift, strict=True)])
 
     def advance(self, dt: float) -> None:
         """Advance by dt; the noise gathered in it has the covariance P - F P F^T, P the stationary one."""
-        F = self._transition(dt)
-        gathered = self._covariance - F @ self._covariance @ np.transpose(F)
-        self._tremor = F @ self._tremor + _root(gathered) @ self._rng.standard_normal((2, 3))
-        a = math.exp(-dt / self._drift_time)
-        fresh = self._drift_sigma * math.sqrt(1.0 - a * a)
-        self._drift = a * self._drift + fresh * self._rng.standard_normal(3)
+        if dt != self._step.dt:
+            self._step = self._step_of(dt)
+        _, (F_xx, F_xv, F_vx, F_vv), (L_xx, L_vx, L_vv), a, fresh = self._step
+        n = self._rng.standard_normal(9).tolist()
+        self._tremor = [
+            (F_xx * x + F_xv * v + L_xx * n_x, F_vx * x + F_vv * v + L_vx * n_x + L_vv * n_v)
+            for (x, v), n_x, n_v in zip(self._tremor, n[:3], n[3:6], strict=True)
+        ]
+        self._drift = [a * d + fresh * n_d for d, n_d in zip(self._drift, n[6:], strict=True)]
 
     def get_state(self) -> bytes:
         """Return the complete state."""
@@ -58,6 +73,13 @@ class HandTremor:
     def set_state(self, state: bytes) -> None:
         """Go back to a state of this process or of one with equal arguments."""
         self._tremor, self._drift, self._rng.bit_generator.state = pickle.loads(state)
+
+    def _step_of(self, dt: float) -> "_Step":
+        F = self._transition(dt)
+        L = _root(self._covariance - F @ self._covariance @ np.transpose(F))
+        a = math.exp(-dt / self._drift_time)
+        fresh = self._drift_sigma * math.sqrt(1.0 - a * a)
+        return _Step(dt, tuple(F.reshape(-1).tolist()), tuple(L[np.tril_indices(2)].tolist()), a, fresh)
 
     def _transition(self, dt: float) -> Floats:
         """Return the matrix that takes displacement and velocity, undisturbed, from t to t + dt."""
