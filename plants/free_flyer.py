@@ -23,7 +23,9 @@ from cosim.units import (
     Second,
 )
 from plants.floating_rotation import Triple, matrix_of, quadruple, triple, turned
-from plants.rigid_body import RigidBody, inertia_faults, unit_faults
+from plants.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
+
+_HALF_A_TURN = math.pi
 
 
 class UnusableFlyer(ValueError):
@@ -54,7 +56,8 @@ class Params:
     w_WB_0: Vector3[RadianPerSecond] = parameter(
         np.zeros(3), "angular velocity at the start, in the world", minimum=-100.0, maximum=100.0
     )
-    substep: Second = parameter(0.008, "longest step of the integration", minimum=1e-5, maximum=0.1)
+    substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
+    turn: Radian = parameter(0.004, "largest turn in a step of the integration", minimum=1e-4, maximum=1.0)
     position_noise: Metre = parameter(0.001, "deviation of the estimated position, an axis", minimum=0.0, maximum=1.0)
     attitude_noise: Radian = parameter(0.002, "deviation of the estimated attitude, an axis", minimum=0.0, maximum=0.5)
     velocity_noise: MetrePerSecond = parameter(
@@ -104,13 +107,15 @@ class FreeFlyer:
 
     [Fernandes2020] eqs. (3.18)-(3.24) with the arm's joints fixed, eq. (4.1), in place of its Euler angles a unit
     quaternion whose sign is continuous. During a step the propulsion is held in the robot's frame and the wrench on the
-    gripper in the world; steps are cut into equal parts of at most `substep`.
+    gripper in the world; steps are cut into equal parts of at most `substep`, in which the robot turns by at most
+    `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
 
     The navigation's estimate is the truth plus white Gaussian noise, drawn once a step; the attitude's is a small turn
     in the robot's frame.
 
     Raises:
         UnusableFlyer: by the constructor, for an inertia that no rigid body has or a quaternion that is not unit.
+        TurnsTooFast: by `step`, where the robot turns by more than half a turn in it.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
@@ -118,7 +123,7 @@ class FreeFlyer:
 
     def __init__(self, params: Params) -> None:
         params.check()
-        self._substep = params.substep
+        self._substep, self._turn = params.substep, params.turn
         q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
         places = [triple(np.asarray(a).tolist()) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
         p_BG, p_WB, v_WB, w_WB = places
@@ -136,8 +141,7 @@ class FreeFlyer:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
         wrench = triple(u.f_B.tolist()), triple(u.tau_B.tolist()), triple(u.f_G.tolist()), triple(u.tau_G.tolist())
-        count = max(1, math.ceil(dt / self._substep - 1e-6))
-        h = dt / count
+        h = dt / (count := self._substeps(dt))
         advance = self._body.advance
         for _ in range(count):
             advance(h, *wrench)
@@ -153,6 +157,12 @@ class FreeFlyer:
         """Go back to a state of this robot or of one with equal parameters."""
         b = self._body
         b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state = pickle.loads(state)
+
+    def _substeps(self, dt: float) -> int:
+        rate = math.hypot(*self._body.w)
+        if not rate * dt < _HALF_A_TURN:
+            raise TurnsTooFast(rate, dt)
+        return max(1, math.ceil(dt / self._substep - 1e-6), math.ceil(rate * dt / self._turn))
 
     def _draw(self) -> None:
         self._noise = (self._deviations * self._rng.standard_normal(12)).tolist()
