@@ -1,0 +1,114 @@
+"""The descent of the cost step by step: Jacobian, steps, best pose, progress. [Luberto] algorithm 1, steps 7 to 10."""
+
+import enum
+import math
+
+import numpy as np
+
+from controllers.reflex_gauss_newton import bounded_step, broyden_update, cost
+from controllers.reflex_move import X
+from controllers.reflex_parameters import Params
+from cosim.ports import Floats
+
+
+class Verdict(enum.Enum):
+    """What follows a step: closing, for three reasons; going back to the best pose; probing anew; the next step."""
+
+    REACHED = 0
+    STALLED = 1
+    USED_UP = 2
+    BACK = 3
+    PROBE = 4
+    STEP = 5
+
+
+class Descent:
+    """Follows residuals r(x), measured at rest, down to the threshold of the cost f = 1/2 r^T r.
+
+    A step that does not take off the part `progress` of the least cost so far is counted, and `stalled_steps` of them
+    in a row end the descent. One that raises the cost is taken back, and alpha halved until a step lowers it.
+
+    Attributes:
+        steps: Gauss-Newton steps made.
+        best: command of the pose of least cost; empty before the first measurement.
+    """
+
+    def __init__(self, params: Params) -> None:
+        self._params = p = params
+        pregrasp = np.array([*p.p_WH_pregrasp, p.yaw_pregrasp, p.sigma_pregrasp])
+        self._low = np.array([*(pregrasp[:3] - p.reach), 0.0])
+        self._high = np.array([*(pregrasp[:3] + p.reach), p.sigma_limit])
+        self.steps = 0
+        self.best: X = ()
+        self._least = math.inf
+        self._jacobian: Floats = np.zeros((0, 4))
+        self._x: Floats = np.zeros(4)
+        self._r: Floats = np.zeros(0)
+        self._stalled, self._since_probing, self._trust = 0, 0, 1.0
+
+    @property
+    def reached(self) -> bool:
+        """Whether the cost measured last is at most the threshold."""
+        p = self._params
+        return cost(self._r) <= (p.threshold_literal if p.literal else p.threshold)
+
+    def within_reach(self, x: X) -> X:
+        """Return the inputs cut to the reach about the pre-grasp pose and to the largest closure."""
+        return tuple(np.clip(x, self._low, self._high).tolist())
+
+    def measure(self, x: X, r: Floats, command: X) -> None:
+        """Take residuals r measured at inputs x under a command."""
+        self._x, self._r = np.array(x), r
+        if cost(r) < self._least:
+            self._least, self.best = cost(r), command
+
+    def probed(self, jacobian: Floats) -> None:
+        """Take a Jacobian that was probed where the last measurement is."""
+        self._jacobian, self._since_probing = jacobian, 0
+
+    def next_command(self, command: X) -> X:
+        """Return command + alpha dx, eqs. (9) and (10), within max_step and the reach."""
+        p = self._params
+        goal = bounded_step(
+            self._jacobian,
+            self._r,
+            np.array(command),
+            scale=None if p.literal else p.scale,
+            damping=p.damping,
+            alpha=p.alpha * self._trust,
+            max_step=p.max_step,
+            limits=(self._low, self._high),
+        )
+        return tuple(goal.tolist())
+
+    def judge(self, x: X, r: Floats, command: X) -> Verdict:
+        """Count a step that led to residuals r at inputs x, update the Jacobian by it, and say what follows."""
+        p, f, before = self._params, cost(r), self._least
+        if not p.literal:
+            self._jacobian = broyden_update(self._jacobian, np.array(x) - self._x, r - self._r, p.scale)
+        self.measure(x, r, command)
+        self.steps += 1
+        self._since_probing += 1
+        self._stalled = 0 if f < (1.0 - p.progress) * before else self._stalled + 1
+        self._trust = min(1.0, 2.0 * self._trust) if f < before else 0.5 * self._trust
+        if self.reached:
+            return Verdict.REACHED
+        if self._stalled >= p.stalled_steps:
+            return Verdict.STALLED
+        if self.steps >= p.max_steps:
+            return Verdict.USED_UP
+        if f > before:
+            return Verdict.BACK
+        return Verdict.PROBE if p.literal or self._since_probing >= p.probe_every else Verdict.STEP
+
+    def get_state(self) -> tuple[tuple[int, int, int], tuple[float, float, X], tuple[Floats, Floats, Floats]]:
+        """Return counters, alpha's factor, the best pose, and the linear approximation."""
+        counters = (self.steps, self._stalled, self._since_probing)
+        return counters, (self._trust, self._least, self.best), (self._jacobian, self._x, self._r)
+
+    def set_state(
+        self, state: tuple[tuple[int, int, int], tuple[float, float, X], tuple[Floats, Floats, Floats]]
+    ) -> None:
+        """Go back to a state that `get_state` gave."""
+        counters, (self._trust, self._least, self.best), (self._jacobian, self._x, self._r) = state
+        self.steps, self._stalled, self._since_probing = counters

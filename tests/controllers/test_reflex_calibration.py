@@ -1,0 +1,33 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controllers.reflex_calibration import Calibration
+
+CURVE = Calibration(0.062, -0.0030, 0.022, -0.00043)
+
+
+def test_the_distance_is_equation_11():
+    assert CURVE.distance(0.0) == pytest.approx(0.084)
+    assert CURVE.distance(1000.0) == pytest.approx(0.062 * math.exp(-3.0) + 0.022 * math.exp(-0.43))
+    assert CURVE.distance(4095.0) < 0.004 < 0.065 < CURVE.distance(0.0)
+
+
+@given(st.floats(0.0, 4095.0))
+def test_ticks_are_the_inverse_of_the_distance(x: float):
+    assert CURVE.ticks(CURVE.distance(x)) == pytest.approx(x, abs=1e-6)
+
+
+def test_distances_beyond_the_curve_are_at_its_ends():
+    assert CURVE.ticks(1.0) == pytest.approx(0.0, abs=1e-9)
+    assert CURVE.ticks(0.0) == pytest.approx(4095.0)
+
+
+def test_a_curve_that_does_not_fall_is_refused():
+    assert CURVE.faults() == []
+    faults = Calibration(-0.062, 0.003, 0.022, -0.00043).faults()
+    assert len(faults) == 2
+    assert "a = -0.062 m must be above 0" in faults[0]
+    assert "b = 0.003 1/tick must be below 0" in faults[1]

@@ -1,0 +1,71 @@
+from typing import Any
+
+import numpy as np
+
+from controllers.reflex_descent import Descent, Verdict
+from controllers.reflex_parameters import Params
+
+X = (-0.2, 0.0, 0.0, 0.0)
+J = np.array([[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+
+
+def descent(**params: Any) -> Descent:
+    d = Descent(Params(**params))
+    d.measure(X, np.array([0.02, 0.02]), X)
+    d.probed(J)
+    return d
+
+
+def test_a_linear_scene_is_solved_in_few_steps():
+    d, x = descent(alpha=1.0), X
+    verdict, steps = Verdict.STEP, 0
+    while verdict is Verdict.STEP:
+        x = d.next_command(x)
+        r = np.array([0.02, 0.02]) + J @ (np.array(x) - X)
+        verdict, steps = d.judge(x, r, x), steps + 1
+    assert verdict is Verdict.REACHED
+    assert steps == d.steps <= 3
+
+
+def test_a_step_that_raises_the_cost_leads_back_and_halves_alpha():
+    d = descent(max_step=np.ones(4))
+    first = np.array(d.next_command(X)) - X
+    worse = np.array([0.021, 0.02])
+    assert d.judge(X, worse, (0.0,) * 4) is Verdict.BACK
+    assert d.best == X
+    d.measure(X, np.array([0.02, 0.02]), X)
+    d.probed(J)
+    assert np.allclose(np.array(d.next_command(X)) - X, 0.5 * first)
+
+
+def test_steps_without_progress_end_the_descent():
+    d, r = descent(stalled_steps=3), np.array([0.02, 0.02])
+    verdicts = [d.judge(X, r * (1.0 - 0.001 * k), X) for k in (1, 2, 3)]
+    assert verdicts[:2] == [Verdict.STEP] * 2
+    assert verdicts[2] is Verdict.STALLED
+
+
+def test_steps_are_limited():
+    d = descent(max_steps=2)
+    assert d.judge(X, np.array([0.018, 0.018]), X) is Verdict.STEP
+    assert d.judge(X, np.array([0.015, 0.015]), X) is Verdict.USED_UP
+
+
+def test_the_jacobian_is_probed_anew_after_some_steps():
+    d = descent(probe_every=2)
+    assert d.judge(X, np.array([0.018, 0.018]), X) is Verdict.STEP
+    assert d.judge(X, np.array([0.015, 0.015]), X) is Verdict.PROBE
+
+
+def test_as_printed_every_step_is_probed():
+    d = Descent(Params(literal=True))
+    d.measure(X, np.array([0.04, 0.04]), X)
+    d.probed(J)
+    assert d.judge(X, np.array([0.035, 0.035]), X) is Verdict.PROBE
+    assert d.judge(X, np.array([0.012, 0.012]), X) is Verdict.REACHED
+
+
+def test_commands_stay_within_reach():
+    low = Descent(Params()).within_reach((-9.0, -9.0, -9.0, -9.0))
+    assert np.allclose(low, [-0.3, -0.1, -0.6, 0.0])
+    assert Descent(Params()).within_reach((9.0, 9.0, 9.0, 9.0))[3] == Params().sigma_limit
