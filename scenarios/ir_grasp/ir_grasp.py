@@ -1,0 +1,92 @@
+"""A soft hand corrects its grasp by infrared reflexes, closes, pulls and shakes. [Luberto] sec. V."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.system import System
+from scenarios.experiment import Experiment, Figure, FmuOf
+from scenarios.ir_grasp.figures import draw_grasp
+from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.situation import Situation
+from scenarios.ir_grasp.watch import GraspWatch
+from scenarios.parameters import BadParameter
+from scenarios.record import Record
+
+
+class IrGrasp(Experiment[GraspWatch]):
+    """One trial of the paper's table I: one object, one pose, one strategy."""
+
+    name: ClassVar[str] = "ir_grasp"
+    title: ClassVar[str] = "a soft hand grasps an object whose place is known roughly, by infrared reflexes"
+    parameters_type: ClassVar[type[Parameters]] = Parameters
+    units: ClassVar[Mapping[str, str]] = {"scene": "GraspScene", "reflex": "IrReflex"}
+    headline: ClassVar[tuple[str, ...]] = (
+        "final_distance_thumb",
+        "final_distance_index",
+        "final_distance_ring",
+        "final_cost",
+        "steps",
+        "refinement_time",
+        "displacement",
+        "left_behind",
+        "cpu_per_cycle",
+        "pace_scene",
+    )
+
+    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+        """Wire scene and controller.
+
+        Raises:
+            BadParameter: the shortest shift of a perturbed object is longer than the longest.
+        """
+        if parameters.shift_least > parameters.shift_most:
+            least, most = parameters.shift_least, parameters.shift_most
+            raise BadParameter([f"shift_least {least:g} m must be at most shift_most {most:g} m"])
+        p, drawn = parameters, Situation.draw(parameters, seed)
+        s = System()
+        scene = s.add(
+            "scene",
+            fmu("scene"),
+            thing=p.thing,
+            p_WO_0=drawn.p_WO,
+            yaw_O_0=drawn.turn,
+            p_WH_0=drawn.p_WH_start,
+            yaw_H_0=drawn.yaw,
+            seed=int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1),
+            p_WH_cmd=drawn.p_WH_start,
+            yaw_cmd=drawn.yaw,
+        )
+        reflex = s.add(
+            "reflex",
+            fmu("reflex"),
+            strategy=p.strategy,
+            forward_distance=p.forward,
+            literal=p.literal,
+            p_WH_pregrasp=drawn.p_WH_pregrasp,
+            yaw_pregrasp=drawn.yaw,
+        )
+        for name in ("ticks", "p_WH", "yaw", "sigma"):
+            s.connect(getattr(scene.y, name), getattr(reflex.u, name))
+        for name in ("p_WH_cmd", "yaw_cmd", "sigma_cmd"):
+            s.connect(getattr(reflex.y, name), getattr(scene.u, name))
+        return s
+
+    def stop_time(self, parameters: Parameters) -> Fraction:  # noqa: ARG002
+        """Return a time that the controller's limits on steps and recoveries keep any run below."""
+        return Fraction(90)
+
+    def watch(self, parameters: Parameters) -> GraspWatch:
+        """Return the judge of one grasp."""
+        return GraspWatch(parameters)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the robot's own computing."""
+        return ("reflex",)
+
+    def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
+        """Draw the scene at three moments, distances and cost, and the commands."""
+        return draw_grasp(parameters, watch.moments, record, folder)

@@ -1,0 +1,152 @@
+"""Judges an infrared grasp by ground truth, which the hand's controller does not see."""
+
+import math
+
+import numpy as np
+
+from cosim.ports import Floats
+from cosim.signals import Signals
+from scenarios.experiment import Metric, Outcome, Watch
+from scenarios.ir_grasp.parameters import Parameters
+
+_SETTLING = 0.3
+"""How long the hand rests after the shake, s (assumed)."""
+
+_BODIES = 2
+"""How many of palm and phalanges must touch an object that is held (assumed): one alone can only push."""
+
+_LEFT_BEHIND = 0.04
+"""How far an object that is held may have stayed behind the hand since the pull began, m (assumed): less than the
+object's and the fingers' width, so that it is still where they closed."""
+
+_AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
+_REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
+
+
+class GraspWatch(Watch):
+    """Follows one grasp and tells how it ended.
+
+    Attributes:
+        moments: times of `start`, `before closing`, `end`, in s; those that came.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.moments: dict[str, float] = {}
+        self._t = 0.0
+        self._entered: dict[str, float] = {}
+        self._phase = ""
+        self._moves = {"RECOVER": 0, "APPROACH": 0, "PROBE": 0}
+        self._command: tuple[float, ...] = ()
+        self._p_WO_start: Floats = np.zeros(2)
+        self._p_HO: Floats = np.zeros(2)
+        self._p_HO_closed: Floats | None = None  # in H, when the pull began
+        self._touching = 0
+        self._touching_closed = 0
+        self._lost_in = ""
+        self._at_closing: dict[str, Metric] = {}
+        self._stop = ""
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Follow phases, hand and object."""
+        self._t, phase = t, signals.text("reflex.phase")
+        if not self.moments:
+            self.moments["start"], self._p_WO_start = t, signals["scene.p_WO"]
+        if phase != self._phase:
+            self._enter(phase, signals)
+        if phase in self._moves:
+            self._count(phase, signals)
+        elif phase in _AFTER_CLOSING:
+            self._look(signals)
+            self._lost_in = "" if self._held else self._lost_in or phase
+
+    def _enter(self, phase: str, signals: Signals) -> None:
+        self._phase = phase
+        self._entered.setdefault(phase, self._t)
+        if phase == "CLOSE":
+            self._close(self._t, signals)
+        elif phase == "PULL":
+            self._look(signals)
+            self._p_HO_closed, self._touching_closed = self._p_HO, self._touching
+
+    def _look(self, signals: Signals) -> None:
+        self._touching = int(signals["scene.touching"])
+        d_x, d_y = (signals["scene.p_WO"] - signals["scene.p_WH"]).tolist()
+        yaw = float(signals["scene.yaw"])
+        c, s = math.cos(yaw), math.sin(yaw)
+        self._p_HO = np.array([c * d_x + s * d_y, c * d_y - s * d_x])
+
+    def _close(self, t: float, signals: Signals) -> None:
+        self.moments["before closing"] = t
+        self._stop = signals.text("reflex.stop").lower().replace("_", " ")
+        began = min((self._entered[p] for p in _REFINING if p in self._entered), default=t)
+        seen, true = signals["reflex.distance"], signals["scene.range"]
+        displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
+        told = {
+            "final_cost": Metric(float(signals["reflex.cost"]), "m2", "f as the hand began to close"),
+            "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
+            "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
+            "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
+            "stop": Metric(int(signals["reflex.stop"]), "1", f"why the refinement ended: {self._stop}"),
+        }
+        for i, finger in enumerate(("thumb", "index", "ring")):
+            whole = f"{finger} to object as the hand began to close"
+            told[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by eq. (11)")
+            told[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam")
+        self._at_closing = told
+
+    def _count(self, phase: str, signals: Signals) -> None:
+        command = (
+            *signals["reflex.p_WH_cmd"].tolist(),
+            float(signals["reflex.yaw_cmd"]),
+            float(signals["reflex.sigma_cmd"]),
+        )
+        if command != self._command:
+            self._moves[phase] += 1
+        self._command = command
+
+    def finish(self, signals: Signals) -> None:  # noqa: ARG002
+        """Note the time."""
+        self.moments["end"] = self._t
+
+    @property
+    def over(self) -> bool:
+        """Whether the shake is over and the hand has rested."""
+        return "DONE" in self._entered and self._t >= self._entered["DONE"] + _SETTLING
+
+    @property
+    def _left_behind(self) -> float:
+        """How far the object has come out of the hand since the pull began, m."""
+        return math.inf if self._p_HO_closed is None else float(np.linalg.norm(self._p_HO - self._p_HO_closed))
+
+    @property
+    def _held(self) -> bool:
+        return self._touching >= _BODIES and self._left_behind <= _LEFT_BEHIND
+
+    def outcome(self) -> Outcome:
+        """Return whether the object came along and is still in the hand, why, and the figures."""
+        metrics = dict(self._at_closing)
+        for phase, what in (("PROBE", "probing"), ("RECOVER", "recovering"), ("APPROACH", "approaching")):
+            metrics[f"{what}_moves"] = Metric(self._moves[phase], "1", f"{what} moves")
+        if self._p_HO_closed is not None:
+            metrics["left_behind"] = Metric(
+                self._left_behind, "m", "how far the object moved in the hand since the pull began"
+            )
+        success = self.over and self._held
+        return Outcome(success=success, reason=self._reason(success), metrics=metrics)
+
+    def _reason(self, success: bool) -> str:
+        if not self.over:
+            return f"stopped at {self._t:.1f} s in phase {self._phase}, before the grasp was tried"
+        refined = f"closed at {self.moments['before closing']:.1f} s ({self._stop})"
+        if success:
+            return f"{refined}; the object came along with the hand and stayed in it"
+        closed = self._p_HO_closed
+        if closed is None:
+            return f"{refined}; the hand was not pulled back"
+        where = f"{1000 * closed[0]:.0f} mm ahead of the wrist and {1000 * closed[1]:+.0f} mm beside it"
+        if self._touching_closed < _BODIES:
+            how = "without touching the object" if not self._touching_closed else "with the object outside the fingers"
+            return f"{refined}; the hand closed {how}, {where}"
+        during = {"PULL": "during the pull", "SHAKE": "during the shake"}.get(self._lost_in, "at the end")
+        return f"{refined}; the object, {where}, slipped out of the closed hand {during}"

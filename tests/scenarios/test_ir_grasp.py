@@ -1,0 +1,134 @@
+"""The grasp itself, on the built FMUs."""
+
+import json
+from math import comb
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from controllers.ir_reflex import Phase, Stop
+from controllers.reflex_parameters import Strategy
+from cosim.master import Master
+from cosim.schedule import Schedule
+from fmus.build import cached
+from plants.grasp_objects import Thing
+from scenarios.experiment import Outcome
+from scenarios.interruption import Interruption
+from scenarios.ir_grasp.ir_grasp import IrGrasp
+from scenarios.ir_grasp.parameters import Parameters
+from scenarios.record import Record
+from scenarios.run_folder import RunFolder
+from scenarios.runner import Task, carry_out
+
+
+def fmu(unit: str) -> Path:
+    return cached(IrGrasp.units[unit], 3)
+
+
+def grasp(seed: int, **parameters: Any) -> Outcome:
+    """Run one grasp without leaving a folder."""
+    p, experiment = Parameters(**parameters), IrGrasp()
+    watch = experiment.watch(p)
+    with Master(experiment.build(p, seed, fmu)) as master:
+        master.run(experiment.stop_time(p), [watch], until=lambda: watch.over)
+    return watch.outcome()
+
+
+def test_a_command_acts_in_the_step_that_follows_its_scan():
+    schedule = Schedule(IrGrasp().build(Parameters(), 0, fmu))
+    assert [s.unit for s in schedule.sampled] == ["reflex"]
+    assert [s.unit for s in schedule.continuous] == ["scene"]
+    assert float(schedule.tick) == 0.015
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    folder = RunFolder(tmp_path_factory.mktemp("runs") / "r")
+    fmus = {unit: fmu(unit) for unit in IrGrasp.units}
+    with Interruption() as interruption:
+        carry_out(
+            Task(experiment=IrGrasp(), parameters=Parameters(), seed=0, fmus=fmus, folder=folder),
+            lambda _t, _stop: None,
+            interruption,
+        )
+    return folder.path, json.loads((folder.path / "summary.json").read_text())
+
+
+def test_a_moved_cylinder_is_grasped(run: tuple[Path, dict[str, Any]]):
+    folder, summary = run
+    assert summary["success"] is True, summary["reason"]
+    record = Record(folder / "signals.parquet")
+    phase = record["reflex.phase"]
+    assert phase[-1] == Phase.DONE
+    closing = int(np.argmax(phase == Phase.CLOSE))
+    came = np.linalg.norm(record["scene.p_WO"][-1] - record["scene.p_WO"][closing])
+    assert came == pytest.approx(0.15, abs=0.04)
+    assert record["scene.touching"][-1] >= 2
+
+
+def test_the_summary_tells_what_the_record_shows(run: tuple[Path, dict[str, Any]]):
+    folder, summary = run
+    record, metrics = Record(folder / "signals.parquet"), summary["metrics"]
+    phase = record["reflex.phase"]
+    closing = int(np.argmax(phase == Phase.CLOSE))
+    for i, finger in enumerate(("thumb", "index", "ring")):
+        assert metrics[f"final_distance_{finger}"]["value"] == record["reflex.distance"][closing, i]
+    assert metrics["final_cost"]["value"] == record["reflex.cost"][closing]
+    assert metrics["steps"]["value"] == record["reflex.steps"][-1]
+    began = record.time[int(np.argmax(phase == Phase.CHECK))]
+    assert metrics["refinement_time"]["value"] == pytest.approx(record.time[closing] - began)
+    pushed = np.linalg.norm(record["scene.p_WO"][closing] - record["scene.p_WO"][0])
+    assert metrics["displacement"]["value"] == pytest.approx(pushed)
+    stop = Stop(int(record["reflex.stop"][-1]))
+    assert metrics["stop"]["value"] == stop
+    assert stop.name.lower() in summary["reason"]
+
+
+def test_a_run_leaves_its_figures(run: tuple[Path, dict[str, Any]]):
+    names = {p.name for p in (run[0] / "figures").iterdir()}
+    assert names == {f"{n}.{s}" for n in ("scene", "distances", "commands") for s in ("png", "svg")}
+    assert (run[0] / "report.html").read_text().count("data:image/png;base64,") == 3
+
+
+def test_the_same_seed_gives_the_same_course_whatever_runs_beside_it():
+    first, again = grasp(3), grasp(3)
+    assert first == again
+    assert grasp(4).metrics["refinement_time"] != first.metrics["refinement_time"]
+
+
+def test_a_blind_hand_misses_the_moved_cylinder_and_says_so():
+    outcome = grasp(0, strategy=Strategy.BLIND)
+    assert not outcome.success
+    assert "(blind)" in outcome.reason
+    assert outcome.metrics["steps"].value == 0
+
+
+@pytest.mark.slow
+def test_the_reflex_beats_closing_blind_on_the_moved_cylinder():
+    seeds = range(20)
+    reflex = [grasp(seed).success for seed in seeds]
+    blind = [grasp(seed, strategy=Strategy.BLIND).success for seed in seeds]
+    better = sum(r and not b for r, b in zip(reflex, blind, strict=True))
+    worse = sum(b and not r for r, b in zip(reflex, blind, strict=True))
+    differ = better + worse
+    p = 2.0 * sum(comb(differ, k) for k in range(min(better, worse) + 1)) / 2.0**differ  # McNemar, exact
+    assert better > worse
+    assert p < 0.05, f"reflex {sum(reflex)}, blind {sum(blind)} of {len(seeds)}"
+    assert sum(reflex) >= 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("thing", Thing)
+@pytest.mark.parametrize("perturbed", [False, True])
+def test_every_thing_can_be_grasped(thing: Thing, perturbed: bool):
+    held = [grasp(seed, thing=thing, perturbed=perturbed).success for seed in range(3)]
+    assert sum(held) >= 2
+
+
+@pytest.mark.slow
+def test_as_printed_the_refinement_runs_to_its_end():
+    outcome = grasp(0, literal=True)
+    assert "stop" in outcome.metrics
+    assert outcome.metrics["steps"].value >= 1

@@ -1,0 +1,36 @@
+"""What the grasp's code has as defaults is what its `paper.toml` tells the origin of."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli
+
+import scenarios.ir_grasp
+from controllers.reflex_parameters import Params as ReflexParams
+from cosim.block import Causality, declared_variables
+from plants.grasp_parameters import Params as SceneParams
+from scenarios.ir_grasp.parameters import Parameters
+
+Paper = dict[str, dict[str, dict[str, Any]]]
+
+CODE = {"scene": SceneParams, "reflex": ReflexParams, "scenario": Parameters}
+
+
+@pytest.fixture(scope="module")
+def paper() -> Paper:
+    file = Path(scenarios.ir_grasp.__file__).parent / "paper.toml"
+    return tomli.loads(file.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("group", CODE)
+def test_every_default_has_its_origin(paper: Paper, group: str):
+    told = paper[group]
+    declared = {v.name: v for v in declared_variables(CODE[group], Causality.PARAMETER)}
+    assert set(told) == set(declared) - {"seed"}
+    for name, entry in told.items():
+        default: Any = getattr(CODE[group](), name)
+        value = default.name.lower() if declared[name].items else default
+        assert np.array_equal(value, entry["value"]), name
+        assert entry["unit"] == declared[name].unit.symbol, name

@@ -1,0 +1,94 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from controllers.ir_reflex import Phase, Stop
+from cosim.block import Causality, Kind
+from cosim.fmu_description import FmuPort
+from cosim.signals import Signals
+from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.watch import GraspWatch
+
+HELD = (0.1, 0.0)
+"""Where a held object is, in H."""
+
+
+def signals(phase: Phase, p_HO: tuple[float, float] = HELD, touching: int = 3, p_WH: float = -0.1) -> Signals:
+    """Return what a hand along x, and an object at a place in its frame, would show."""
+    units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {"scene": {}, "reflex": {}}
+    ports: dict[str, dict[str, FmuPort]] = {"scene": {}, "reflex": {}}
+
+    def show(unit: str, name: str, kind: Kind, value: Any, **more: Any) -> None:
+        array = np.array(value).reshape(-1)
+        units[unit][name] = (array,)
+        shape = array.shape if array.size > 1 else ()
+        ports[unit][name] = FmuPort(
+            name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), shape=shape, **more
+        )
+
+    for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0)):
+        show("scene", name, Kind.REAL, value)
+    show("scene", "range", Kind.REAL, [0.01, 0.05, 0.01])
+    show("scene", "touching", Kind.INTEGER, touching)
+    for name, value in (("distance", [0.01, 0.05, 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
+        show("reflex", name, Kind.REAL, value)
+    show("reflex", "p_WH_cmd", Kind.REAL, [p_WH, 0.0])
+    show("reflex", "steps", Kind.INTEGER, 4)
+    for name, item in (("phase", phase), ("stop", Stop.THRESHOLD)):
+        show("reflex", name, Kind.ENUMERATION, int(item), items=tuple((i.name, int(i)) for i in type(item)))
+    return Signals(units, ports, None)
+
+
+def follow(*moments: tuple[float, Signals]) -> GraspWatch:
+    watch = GraspWatch(Parameters())
+    for t, seen in moments:
+        watch(t, seen)
+    watch.finish(moments[-1][1])
+    return watch
+
+
+def grasp(*after: tuple[float, Signals], at_closing: Signals | None = None) -> GraspWatch:
+    begin = ((0.0, signals(Phase.REACH)), (0.5, signals(Phase.CHECK)), (1.0, signals(Phase.PROBE)))
+    return follow(*begin, (3.0, signals(Phase.CLOSE)), (4.0, at_closing or signals(Phase.PULL)), *after)
+
+
+def test_an_object_that_comes_along_and_stays_is_held():
+    watch = grasp((5.0, signals(Phase.SHAKE, p_WH=-0.25)), (7.0, signals(Phase.DONE)), (7.4, signals(Phase.DONE)))
+    assert watch.over
+    outcome = watch.outcome()
+    assert outcome.success
+    assert "threshold" in outcome.reason
+    assert outcome.metrics["refinement_time"].value == pytest.approx(2.5)
+    assert outcome.metrics["probing_moves"].value == 1
+    assert watch.moments == {"start": 0.0, "before closing": 3.0, "end": 7.4}
+
+
+@pytest.mark.parametrize(("phase", "told"), [(Phase.PULL, "during the pull"), (Phase.SHAKE, "during the shake")])
+def test_an_object_that_slipped_out_is_not_held_and_it_is_told_when(phase: Phase, told: str):
+    lost: dict[str, Any] = {"p_HO": (0.2, 0.0), "touching": 0}
+    between = [(5.0, signals(Phase.SHAKE))] if phase is Phase.SHAKE else []
+    watch = grasp(*between, (5.5, signals(phase, **lost)), *((t, signals(Phase.DONE, **lost)) for t in (7.0, 7.4)))
+    assert watch.over
+    assert not watch.outcome().success
+    assert f"slipped out of the closed hand {told}" in watch.outcome().reason
+
+
+def test_a_hand_that_closed_beside_the_object_says_where_it_is():
+    beside: dict[str, Any] = {"p_HO": (0.17, 0.03), "touching": 0}
+    done = ((t, signals(Phase.DONE, **beside)) for t in (7.0, 7.4))
+    outcome = grasp(*done, at_closing=signals(Phase.PULL, **beside)).outcome()
+    assert not outcome.success
+    assert "without touching the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
+
+
+def test_an_object_that_one_finger_pushes_along_is_not_held():
+    pushed = [(t, signals(Phase.DONE, touching=1)) for t in (7.0, 7.4)]
+    assert not grasp(*pushed).outcome().success
+
+
+def test_a_run_that_ends_early_says_in_which_phase():
+    watch = follow((0.0, signals(Phase.REACH)), (0.5, signals(Phase.PROBE)))
+    assert not watch.over
+    assert "stopped at 0.5 s in phase PROBE" in watch.outcome().reason
