@@ -13,7 +13,7 @@ from scenarios.experiment import Figure
 from scenarios.helix_handover.parameters import Parameters
 from scenarios.helix_handover.rig import camera_of
 from scenarios.helix_handover.snapshot import Snapshot
-from scenarios.plotting import COLOURS, figure
+from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 
 _SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
@@ -31,7 +31,7 @@ def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t = record.time
     true = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
     with figure(folder / "error", 1, size=(8.0, 3.6)) as (axes,):
-        _shade_phases(axes, t, record["servo.phase"], record.items("servo.phase"))
+        shade_phases(axes, t, record["servo.phase"], record.items("servo.phase"))
         seen = record["servo.phase"] > 0
         axes.plot(
             t[seen],
@@ -107,15 +107,3 @@ def _show(axis: Axes, shot: Snapshot, side: str) -> None:
 def _pixel(camera: Pinhole, p_WP: NDArray[np.float64]) -> tuple[float, float]:
     u, v = camera.project(p_WP)
     return float(u), float(v)
-
-
-def _shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64], names: Mapping[int, str]) -> None:
-    edges = np.flatnonzero(np.diff(phase)) + 1
-    starts = [0, *edges.tolist()]
-    ends = [*edges.tolist(), len(t) - 1]
-    for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
-        if k % 2:
-            axes.axvspan(t[a], t[b], color="#eef2f7", lw=0, zorder=0)
-        if t[b] - t[a] > 0.06 * (t[-1] - t[0]):
-            name = names.get(int(phase[a]), str(phase[a])).replace("_", " ").lower()
-            axes.text((t[a] + t[b]) / 2, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color="#4d5866")

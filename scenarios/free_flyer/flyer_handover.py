@@ -1,0 +1,120 @@
+"""A free-flyer and a person pass an object to each other: what the four handovers have in common."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cosim.ports import Floats
+from cosim.system import System
+from scenarios.experiment import Experiment, Figure, FmuOf
+from scenarios.free_flyer.handover_figures import draw_handover
+from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.handover_watch import HandoverWatch
+from scenarios.free_flyer.rig import arm, expected_lag, wire_handover
+from scenarios.paper import paper_values
+from scenarios.parameters import BadParameter
+from scenarios.record import Record
+
+_FLIGHT = 120
+"""Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""
+
+
+class FlyerHandover(Experiment[HandoverWatch]):
+    """Subclasses say what the robot is to do, what the person does, and who is to have the object in turn."""
+
+    parameters_type: ClassVar[type[Parameters]] = Parameters
+    units: ClassVar[Mapping[str, str]] = {
+        "decision": "HandoverStateMachine",
+        "impedance": "ImpedanceController",
+        "pose": "PoseController",
+        "thrusters": "Thrusters",
+        "person": "HandAndObject",
+        "robot": "FreeFlyer",
+    }
+    headline: ClassVar[tuple[str, ...]] = (
+        "transfer_time",
+        "transfer_speed",
+        "transfer_displacement",
+        "return_time",
+        "return_speed",
+        "return_displacement",
+        "failed_receptions",
+        "arrival_error",
+        "saturated_share",
+        "pole_radius_impedance",
+        "damping_ratio_impedance",
+        "slowest_decay_pose",
+        "damping_ratio_pose",
+        "cpu_per_cycle",
+    )
+    task: ClassVar[str]
+    """The robot's task, an item of the decision unit's parameter."""
+    person: ClassVar[Mapping[str, Any]]
+    """What the person does and holds, by the parameters of the person's unit."""
+    receivers: ClassVar[tuple[str, ...]]
+    """Who is to have the object after each transfer, `HAND` or `GRIPPER`."""
+    failures: ClassVar[int] = 0
+    """How many receptions the person is to feign."""
+
+    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+        """Wire robot, thrusters, controllers and person.
+
+        Raises:
+            BadParameter: the handover place is out of the person's reach.
+        """
+        p = parameters
+        _check_reach(p.p_WG_handover)
+        robot_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
+        at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
+        p_WO_0, behaviour = at["p_WO_0"], p.behaviour.item
+        p_BG, lag = arm(), expected_lag(p.ideal)
+        s = System()
+        s.add(
+            "decision",
+            fmu("decision"),
+            task=self.task,
+            behaviour=behaviour,
+            p_BG=p_BG,
+            p_WG_handover=p.p_WG_handover,
+            p_WO_0=p_WO_0,
+            p_OG=at["p_OG"],
+            patience=p.patience,
+        )
+        s.add("impedance", fmu("impedance"), behaviour=behaviour, p_BG=p_BG, delay=p.delay, lag=lag)
+        s.add("pose", fmu("pose"), p_BG=p_BG, delay=p.delay, lag=lag)
+        s.add("thrusters", fmu("thrusters"), ideal=p.ideal, delay=p.delay)
+        s.add("robot", fmu("robot"), seed=robot_seed, p_BG=p_BG, p_WB_0=at["p_WG_0"] - p_BG)
+        s.add("person", fmu("person"), seed=person_seed, p_WO_0=p_WO_0, arm_force_max=p.strength, **self.person)
+        wire_handover(s)
+        return s
+
+    def stop_time(self, parameters: Parameters) -> Fraction:
+        """Return the robot's patience for each signal, and time for flying."""
+        waits = len(self.receivers) + self.failures
+        return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
+
+    def watch(self, parameters: Parameters) -> HandoverWatch:
+        """Return the judge of one handover."""
+        return HandoverWatch(parameters, self.receivers, self.failures)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the robot's own computing: deciding and controlling."""
+        return ("decision", "impedance", "pose")
+
+    def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
+        """Draw paths, gripper, thrust over time, and the scene at three moments."""
+        return draw_handover(parameters, watch, record, folder)
+
+
+def _check_reach(p_WG: Floats) -> None:
+    """Refuse a handover place from which the person's hand, at the object's other end, would be out of reach."""
+    person = {name: np.array(value) for name, value in paper_values("free_flyer", "person").items()}
+    p_WH = p_WG + person["p_OH"] - person["p_OG"]
+    away, reach = float(np.linalg.norm(p_WH - person["p_WH_0"])), float(person["arm_reach"])
+    if away > reach:
+        place = ", ".join(f"{x:g}" for x in p_WG)
+        told = f"the hand would be {away:.2f} m from where it rests, and can be {reach:g} m from it"
+        raise BadParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {told}"])

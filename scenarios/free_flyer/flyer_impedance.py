@@ -1,0 +1,90 @@
+"""A push against the gripper, and the robot's yielding to it. [Fernandes2020] sec. 4.1.3."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.system import System
+from scenarios.experiment import Experiment, Figure, FmuOf
+from scenarios.free_flyer.impedance_figures import draw_push
+from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
+from scenarios.paper import paper_values
+from scenarios.record import Record
+
+
+class FlyerImpedance(Experiment[ImpedanceWatch]):
+    """The thesis's validation of the impedance control: one pulse of force or torque, and the way back to rest."""
+
+    name: ClassVar[str] = "flyer_impedance"
+    title: ClassVar[str] = "a free-flyer yields to a push against its gripper and comes back"
+    parameters_type: ClassVar[type[Parameters]] = Parameters
+    units: ClassVar[Mapping[str, str]] = {
+        "impedance": "ImpedanceController",
+        "thrusters": "Thrusters",
+        "push": "Push",
+        "robot": "FreeFlyer",
+    }
+    headline: ClassVar[tuple[str, ...]] = (
+        "greatest_position_error",
+        "greatest_orientation_error",
+        "settling_time",
+        "disagreement_position",
+        "disagreement_orientation",
+        "saturated_share",
+        "pole_radius_impedance",
+        "damping_ratio_impedance",
+        "frequency_impedance",
+        "cpu_per_cycle",
+    )
+
+    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+        """Wire robot, thrusters, impedance controller and push; the gripper starts at its place of rest."""
+        p = parameters
+        p_WG, p_BG = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), arm()
+        s = System()
+        impedance = s.add(
+            "impedance",
+            fmu("impedance"),
+            behaviour=p.behaviour.item,
+            delay=p.delay if p.delay_known else 0.0,
+            lag=expected_lag(p.ideal),
+            p_BG=p_BG,
+            p_WG_goal=p_WG,
+            q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]),
+            active=True,
+        )
+        thrusters = s.add("thrusters", fmu("thrusters"), ideal=p.ideal, delay=p.delay)
+        push = s.add(
+            "push",
+            fmu("push"),
+            axis=p.axis.name.lower(),
+            force=p.force if p.kind is Wrench.FORCE else 0.0,
+            torque=p.torque if p.kind is Wrench.TORQUE else 0.0,
+            start=p.begin,
+            duration=p.duration,
+        )
+        robot = s.add("robot", fmu("robot"), seed=seed, p_BG=p_BG, p_WB_0=p_WG - p_BG)
+        wire_controller(s, impedance, robot, thrusters)
+        wire_forces(s, robot, thrusters, push)
+        return s
+
+    def stop_time(self, parameters: Parameters) -> Fraction:
+        """Return the end of the push and the patience for the way back."""
+        return parameters.stop
+
+    def watch(self, parameters: Parameters) -> ImpedanceWatch:
+        """Return the judge of one push."""
+        return ImpedanceWatch(parameters)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the robot's own computing."""
+        return ("impedance",)
+
+    def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
+        """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
+        return draw_push(parameters, watch, record, folder)

@@ -1,0 +1,106 @@
+"""Figures of a handover as in [Fernandes2020] figs. 4.29-4.38: paths, gripper, thrust, the scene at three moments."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cosim.ports import Floats
+from scenarios.experiment import Figure
+from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.handover_watch import HandoverWatch
+from scenarios.free_flyer.scene import draw_near, draw_scene, person_at, robot_at
+from scenarios.free_flyer.thrust_figure import draw_thrust
+from scenarios.paper import paper_values
+from scenarios.plotting import COLOURS, figure, shade_phases
+from scenarios.record import Record
+
+_FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("person.{}_WO", "object", {"color": COLOURS[2], "lw": 4.5, "alpha": 0.4}),
+    ("person.{}_WH", "hand", {"color": COLOURS[1], "lw": 1.4}),
+    ("robot.{}_WG", "gripper", {"color": COLOURS[0], "lw": 1.4}),
+)
+"""Signals, labels and lines; the object's is wide, since it goes with the gripper or the hand."""
+
+
+def draw_handover(parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    if len(record.time) < 2:
+        return []
+    return [
+        *_scenes(watch, record, folder),
+        _paths(record, "p", lambda p: 1000 * p, "{} (mm)", ("x", "y", "z"), folder / "positions"),
+        _paths(record, "q", _angles, "{} (rad)", ("roll", "pitch", "yaw"), folder / "orientations"),
+        _gripper(parameters, watch, record, folder),
+        draw_thrust(record, ("impedance", "pose"), folder),
+    ]
+
+
+def _paths(
+    record: Record, quantity: str, of: Callable[[Floats], Floats], axis_told: str, names: tuple[str, ...], path: Path
+) -> Figure:
+    with figure(path, 3, size=(9.0, 6.0)) as axes:
+        for i, (axis, name) in enumerate(zip(axes, names, strict=True)):
+            shade_phases(axis, record.time, record["decision.phase"], _phase_names(record) if i == 0 else {})
+            for signal, label, style in _FOLLOWED:
+                axis.plot(record.time, of(record[signal.format(quantity)])[:, i], label=label, **style)
+            axis.set(ylabel=axis_told.format(name), xlim=(record.time[0], record.time[-1]))
+        axes[-1].set_xlabel("time (s)")
+        axes[-1].legend(ncols=3, loc="upper right", bbox_to_anchor=(1.0, -0.25))
+    what = "Positions" if quantity == "p" else "Orientations"
+    return Figure(path.name, f"{what} of gripper, hand and object in W; shaded by the robot's phases.")
+
+
+def _angles(q: Floats) -> Floats:
+    """Return roll, pitch and yaw, rad, without jumps by a whole turn."""
+    yaw_pitch_roll = Rotation.from_quat(q, scalar_first=True).as_euler("ZYX")
+    return np.unwrap(yaw_pitch_roll[:, ::-1], axis=0)
+
+
+def _phase_names(record: Record) -> dict[int, str]:
+    return record.items("decision.phase")
+
+
+def _gripper(parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> Figure:
+    published = paper_values("free_flyer", "published")
+    t = record.time
+    with figure(folder / "gripper", 2, size=(9.0, 5.2)) as (angle, speed):
+        for axis, names in ((angle, _phase_names(record)), (speed, {})):
+            shade_phases(axis, t, record["decision.phase"], names)
+            axis.set(xlim=(t[0], t[-1]))
+        angle.plot(t, record["person.gripper_angle"], color=COLOURS[0])
+        angle.axhline(published["angle_threshold"], color="#4d5866", lw=0.8, ls="--")
+        angle.set(ylabel="gripper angle (rad)", ylim=(0, None))
+        speed.plot(t, record["decision.speed_G"], color=COLOURS[0])
+        for transfer in watch.transfers:
+            threshold = published[f"velocity_{transfer.receiver.lower()}"][parameters.behaviour]
+            until = t[-1] if transfer.felt is None else transfer.felt
+            speed.hlines(threshold, transfer.signalled, until, color=COLOURS[1], lw=1.4)
+        speed.set(ylabel="gripper speed (m/s)", xlabel="time (s)", ylim=(0, None))
+    caption = "Angle of the gripper, dashed: above it it counts as full; its speed, orange: at which the robot acts."
+    return Figure("gripper", caption)
+
+
+def _moments(watch: HandoverWatch, record: Record) -> dict[str, int]:
+    """Return the rows of the start, of when the robot felt the person, and of the end, by their titles."""
+    felt = [transfer.felt for transfer in watch.transfers if transfer.felt is not None]
+    names = ("transfer", "return")
+    times = {"start": 0.0, **dict(zip(names, felt, strict=False)), "end": float(record.time[-1])}
+    return {f"{t:.1f} s, {title}": int(np.searchsorted(record.time, t)) for title, t in times.items()}
+
+
+def _scenes(watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
+    """Draw the scene, and the transfers from near."""
+    g = paper_values("free_flyer", "person")
+    gap = g["aperture"] * (record["person.gripper_angle"] - g["angle_empty"]) / (g["angle_open"] - g["angle_empty"])
+    rows = _moments(watch, record)
+    seen = {title: robot_at(record, row, float(gap[row])) + person_at(record, row) for title, row in rows.items()}
+    scene = draw_scene(seen, "Blue: jaws; orange: object.", folder)
+    between = list(rows)[1:-1]
+    if not between:
+        return [scene]
+    middle = (record["robot.p_WG"] + record["person.p_WH"]) / 2
+    near = {title: middle[rows[title]] for title in between}
+    return [scene, draw_near({title: seen[title] for title in between}, near, folder)]

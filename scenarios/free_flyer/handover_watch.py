@@ -1,0 +1,178 @@
+"""Judges a handover in microgravity by ground truth, which the robot's computer does not see."""
+
+import math
+from collections.abc import Sequence
+
+from cosim.signals import Signals
+from scenarios.experiment import Metric, Outcome, Watch
+from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.stability import stability_metrics
+from scenarios.free_flyer.transfer import Transfer
+
+_SETTLING = 1.0
+"""How long the receiver must keep the object when the robot is done, s (assumed)."""
+
+_TOUCH = {"HAND": "pull", "GRIPPER": "push"}
+_NOT_YIELDING = ("DEACTIVATE_IMPEDANCE", "RETREAT", "DONE", "GIVEN_UP")
+_PEOPLE = {"HAND": "the person", "GRIPPER": "the robot"}
+
+
+class HandoverWatch(Watch):
+    """Follows one run and tells how it ended.
+
+    It is a success when the object reached each receiver in turn "without being supported anywhere else and always in
+    contact with at least one of the participants" once it was held at all, [Fernandes2020] sec. 3.1.2, and the robot
+    took an empty gripper for a failed reception as often as it had one.
+
+    Attributes:
+        phases: phases of the robot and when they began, s, in the order of time; a phase may come again.
+        holders: who held the object from when on, likewise.
+        transfers: those that were signalled.
+    """
+
+    def __init__(self, parameters: Parameters, receivers: Sequence[str], failures: int = 0) -> None:
+        self.parameters, self.receivers, self.failures = parameters, tuple(receivers), failures
+        self.phases: list[tuple[str, float]] = []
+        self.holders: list[tuple[str, float]] = []
+        self.transfers: list[Transfer] = []
+        x, y, z = parameters.p_WG_handover.tolist()
+        self._place = (x, y, z)
+        self._t = 0.0
+        self._steps = self._saturated = self._failed = 0
+        self._codes = (-1, -1)
+        self._arrival: tuple[float, float] | None = None
+        self._nearest = math.inf
+        self._lost: float | None = None
+        self._stability: dict[str, Metric] = {}
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Follow phases, holder and gripper."""
+        self._t = t
+        self._steps += 1
+        self._saturated += bool(signals["thrusters.saturated"])
+        codes = (int(signals["decision.phase"]), int(signals["person.holder"]))
+        x, y, z = signals["robot.p_WG"].tolist()
+        speed = float(signals["decision.speed_G"])
+        if codes != self._codes:
+            self._change(t, signals, (x, y, z), speed)
+            self._codes = codes
+        self._nearest = min(self._nearest, math.dist((x, y, z), self._place))
+        if self.transfers and self._phase not in _NOT_YIELDING:
+            self.transfers[-1].displaced((x, y, z), self._place)
+            if self._phase == "CHECK_VELOCITY":
+                self.transfers[-1].fastest = max(self.transfers[-1].fastest, speed)
+
+    def _change(self, t: float, signals: Signals, p_WG: tuple[float, float, float], speed: float) -> None:
+        """Take note of another phase or holder."""
+        if not self._stability:
+            self._stability = stability_metrics(signals, ("impedance", "pose"))
+        phase, holder = signals.text("decision.phase"), signals.text("person.holder")
+        self._failed = int(signals["decision.failed_receptions"])
+        if phase != self._phase:
+            left, _ = self.phases[-1] if self.phases else ("", 0.0)
+            self.phases.append((phase, t))
+            self._enter(phase, left, t, p_WG, speed)
+        if holder != self._holder:
+            self.holders.append((holder, t))
+            self._receive(holder, t)
+
+    def _enter(self, phase: str, left: str, t: float, p_WG: tuple[float, float, float], speed: float) -> None:
+        if phase == "ACTIVATE_IMPEDANCE" and self._arrival is None:
+            self._arrival = (math.dist(p_WG, self._place), speed)
+        if phase == "SIGNAL" and self._under_way is None and len(self.transfers) < len(self.receivers):
+            self.transfers.append(Transfer(self.receivers[len(self.transfers)], t))
+        if left == "CHECK_VELOCITY" and phase != "GIVEN_UP" and self._under_way is not None:
+            self._under_way.felt, self._under_way.speed = t, speed
+
+    def _receive(self, holder: str, t: float) -> None:
+        if holder == "FREE" and len(self.holders) > 1 and self._lost is None:
+            self._lost = t
+        if self._under_way is not None and holder == self._under_way.receiver:
+            self._under_way.done = t
+
+    @property
+    def _under_way(self) -> Transfer | None:
+        return self.transfers[-1] if self.transfers and self.transfers[-1].done is None else None
+
+    @property
+    def _phase(self) -> str:
+        return self.phases[-1][0] if self.phases else ""
+
+    @property
+    def _holder(self) -> str:
+        return self.holders[-1][0] if self.holders else ""
+
+    @property
+    def over(self) -> bool:
+        """Whether the robot is done or has given up, or the object is lost."""
+        if self._lost is not None and self._t >= self._lost + _SETTLING:
+            return True
+        return self._phase in ("DONE", "GIVEN_UP") and self._t >= self.phases[-1][1] + _SETTLING
+
+    def outcome(self) -> Outcome:
+        """Return whether the object changed hands as it should, why, and the figures."""
+        success = (
+            self._lost is None
+            and self._phase == "DONE"
+            and [t.receiver for t in self.transfers if t.done is not None] == list(self.receivers)
+            and self._holder == self.receivers[-1]
+            and self._failed == self.failures
+        )
+        return Outcome(success=success, reason=self._reason(success), metrics=self._metrics())
+
+    def _metrics(self) -> dict[str, Metric]:
+        told: dict[str, Metric] = {}
+        for prefix, transfer in zip(("transfer", "return"), self.transfers, strict=False):
+            told |= transfer.metrics(prefix)
+        told["failed_receptions"] = Metric(self._failed, "1", "receptions after which the gripper was found empty")
+        if self._arrival is not None:
+            told["arrival_error"] = Metric(self._arrival[0], "m", "gripper to its place when it began to yield")
+            told["arrival_speed"] = Metric(self._arrival[1], "m/s", "gripper's speed then")
+        share = self._saturated / max(self._steps, 1)
+        told["saturated_share"] = Metric(share, "1", "share of the time for which the thrusters were at their limits")
+        told |= self._stability
+        for phase, t in self.phases:
+            words = phase.replace("_", " ").lower()
+            told.setdefault(f"phase_{phase.lower()}", Metric(t, "s", f"when the robot's phase {words!r} first began"))
+        return told
+
+    def _reason(self, success: bool) -> str:
+        if success:
+            ways = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
+            again = f" after {self._failed} failed reception" if self._failed else ""
+            return " and ".join(ways) + again + ", and it was never out of both hands"
+        if self._lost is not None:
+            before = _PEOPLE.get(self.holders[-2][0], "both") if len(self.holders) > 1 else "nobody"
+            return f"the object was lost at {self._lost:.1f} s in phase {self._phase}; {before} had held it"
+        return self._stuck()
+
+    def _stuck(self) -> str:
+        """Tell why the robot did not get on, or ended otherwise than it should."""
+        transfer, before = self._under_way, self.phases[-2][0] if len(self.phases) > 1 else ""
+        if self._phase not in ("DONE", "GIVEN_UP"):
+            return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done; {self._where}"
+        if self._phase == "GIVEN_UP" and before == "CHECK_VELOCITY" and transfer is not None:
+            waited = self.phases[-1][1] - transfer.signalled
+            return (
+                f"the robot never felt a {_TOUCH[transfer.receiver]} within {waited:.0f} s of its signal: "
+                f"its gripper's speed stayed below {math.ceil(1000 * transfer.fastest) / 1000:.3f} m/s; {self._where}"
+            )
+        if self._phase == "GIVEN_UP" and before == "CHECK_ANGLE":
+            return f"the robot gave up after {self._failed} failed receptions; {self._where}"
+        if self._phase == "GIVEN_UP" and before == "GRASP_OBJECT":
+            return f"the robot closed its gripper and found nothing in it; {self._where}"
+        if self._phase == "GIVEN_UP" and self._arrival is None:
+            place = "(" + ", ".join(f"{x:.2f}" for x in self._place) + ")"
+            nearest = f"the gripper came no nearer than {self._nearest:.2f} m to its place at {place} m"
+            return f"out of reach, or not at rest in time: {nearest} in phase {before}; {self._where}"
+        if self._phase == "GIVEN_UP":
+            return f"the robot gave up in phase {before}; {self._where}"
+        if self._failed != self.failures:
+            return f"{self._failed} failed receptions where {self.failures} was staged; {self._where}"
+        return f"the robot was done, but the object did not go where it should; {self._where}"
+
+    @property
+    def _where(self) -> str:
+        return {"BOTH": "both hold it", "FREE": "nobody holds it"}.get(
+            self._holder, f"{_PEOPLE.get(self._holder, 'nobody')} holds it"
+        )

@@ -1,0 +1,16 @@
+"""A person puts an object into the robot's gripper, which closes when it is pushed. [Fernandes2020] sec. 4.3.2."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from scenarios.free_flyer.flyer_handover import FlyerHandover
+
+
+class HumanToRobot(FlyerHandover):
+    """The person gives, the robot takes."""
+
+    name: ClassVar[str] = "flyer_human_to_robot"
+    title: ClassVar[str] = "a person gives an object to a free-flyer"
+    task: ClassVar[str] = "human_to_robot"
+    person: ClassVar[Mapping[str, Any]] = {"motion": "give", "object_with": "hand"}
+    receivers: ClassVar[tuple[str, ...]] = ("GRIPPER",)

@@ -1,0 +1,65 @@
+"""Figures of a push: errors as in [Fernandes2020] figs. 4.5-4.16, thrust, and the scene at three moments."""
+
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.experiment import Figure
+from scenarios.free_flyer.impedance_model import Errors
+from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from scenarios.free_flyer.scene import draw_scene, robot_at
+from scenarios.free_flyer.thrust_figure import draw_thrust
+from scenarios.plotting import COLOURS, figure
+from scenarios.record import Record
+
+_PUSH_COLOUR = "#fbe3cf"
+
+
+def draw_push(parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    if len(record.time) < 2:
+        return []
+    errors = watch.errors()
+    return [
+        _errors(parameters, errors, folder),
+        _scene(errors, parameters, record, folder),
+        draw_thrust(record, ("impedance",), folder),
+    ]
+
+
+def _errors(parameters: Parameters, errors: Errors, folder: Path) -> Figure:
+    p = parameters
+    shown = errors.t <= max(p.end + 15.0, 1.5 * p.end)
+    t = errors.t[shown]
+    columns = (
+        ("error (mm)", 1000 * errors.p[shown], 1000 * errors.p_model[shown], "position"),
+        ("error (rad)", errors.R[shown], errors.R_model[shown], "orientation"),
+    )
+    with figure(folder / "errors", 3, 2, size=(10.0, 7.0)) as axes:
+        for column, (unit, actual, calculated, what) in enumerate(columns):
+            limit = 1.1 * max(float(np.abs(actual).max()), float(np.abs(calculated).max()), 1e-3)
+            for i, name in enumerate("xyz"):
+                axis = axes[2 * i + column]
+                axis.axvspan(p.begin, p.end, color=_PUSH_COLOUR, lw=0, zorder=0, label=_told(p))
+                axis.plot(t, calculated[:, i], color=COLOURS[1], lw=2.6, alpha=0.55, label="calculated, eq. (4.4)")
+                axis.plot(t, actual[:, i], color=COLOURS[0], lw=1.2, label="actual")
+                axis.set(xlim=(0, t[-1]), ylim=(-limit, limit), ylabel=f"{name}: {unit}")
+            axes[column].set_title(what)
+            axes[4 + column].set_xlabel("time (s)")
+        axes[0].figure.legend(*axes[0].get_legend_handles_labels(), ncols=3, loc="outside lower center")
+    return Figure("errors", f"Error of the gripper's pose, rest minus actual, around {_told(p)}.")
+
+
+def _told(p: Parameters) -> str:
+    what = f"{p.force:g} N along" if p.kind is Wrench.FORCE else f"{p.torque:g} N m about"
+    return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
+
+
+def _scene(errors: Errors, parameters: Parameters, record: Record, folder: Path) -> Figure:
+    """Draw the start, the greatest error (of position, or of orientation for a twist), and the end."""
+    size = np.linalg.norm(errors.p if parameters.kind is Wrench.FORCE else errors.R, axis=1)
+    rows = (0, int(np.argmax(size)), len(record.time) - 1)
+    titles = (f"{record.time[r]:.1f} s, {what}" for r, what in zip(rows, ("start", "farthest", "end"), strict=True))
+    moments = {title: robot_at(record, r, 0.0) for title, r in zip(titles, rows, strict=True)}
+    return draw_scene(moments, "Blue: jaws.", folder)

@@ -1,0 +1,119 @@
+"""Judges by ground truth how the robot yields to a push and comes back."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from cosim.signals import Signals
+from scenarios.experiment import Metric, Outcome, Watch
+from scenarios.free_flyer.impedance_model import Errors, Motion, errors_of
+from scenarios.free_flyer.impedance_parameters import Parameters
+from scenarios.free_flyer.stability import stability_metrics
+from scenarios.paper import paper_values
+
+_SEEN = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
+
+_REST_POSITION, _REST_ANGLE = 0.010, 0.030
+"""Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
+
+_RESTING = 5.0
+"""How long it must stay within them, s (assumed)."""
+
+_SPINNING = 60.0
+"""Rate at which control counts as lost, rad/s: more than the greatest push can bring about (assumed)."""
+
+
+class ImpedanceWatch(Watch):
+    """Follows one push and tells whether the robot came back to rest and moved as the impedance model says.
+
+    Raises:
+        KeyError: `paper.toml` lacks the place of rest.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self.p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
+        x, y, z = self.p_WG_goal.tolist()
+        self._goal = (x, y, z)
+        self._rows: list[list[Any]] = []
+        self._saturated = 0
+        self._t = 0.0
+        self._astray = 0.0
+        self._spins = False
+        self._greatest = [0.0, 0.0]
+        self._last = (0.0, 0.0)
+        self._stability: dict[str, Metric] = {}
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Keep the motion and follow the errors."""
+        if not self._rows:
+            self._stability = stability_metrics(signals, ("impedance",))
+        seen = [signals[name] for name in _SEEN]
+        self._rows.append([t, *seen])
+        self._saturated += bool(signals["thrusters.saturated"])
+        away = math.dist(seen[0].tolist(), self._goal)
+        turned = 2.0 * math.acos(min(1.0, abs(float(seen[2][0]))))
+        self._t, self._last = t, (away, turned)
+        self._spins = math.hypot(*seen[3].tolist()) > _SPINNING
+        self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
+        if away > _REST_POSITION or turned > _REST_ANGLE:
+            self._astray = t
+
+    @property
+    def over(self) -> bool:
+        """Whether the robot has come to rest after the push, or spins out of control."""
+        return self._spins or self._at_rest
+
+    @property
+    def _at_rest(self) -> bool:
+        return self._t - max(self._astray, self.parameters.end) >= _RESTING
+
+    @property
+    def _settled(self) -> float:
+        return max(0.0, self._astray - self.parameters.end)
+
+    def errors(self) -> Errors:
+        """Return the errors as they were and as the model calls for."""
+        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour)
+
+    def outcome(self) -> Outcome:
+        """Return whether the robot rests again and agreed with the model, why, and the figures."""
+        if len(self._rows) < 2:
+            return Outcome(success=False, reason="stopped before the first step")
+        by = self.errors().disagreement
+        published = paper_values("free_flyer", "published")["model_agreement"]
+        agrees = by[0] <= published[0] and by[1] <= published[1]
+        share = self._saturated / len(self._rows)
+        metrics = {
+            "greatest_position_error": Metric(self._greatest[0], "m", "gripper from its place of rest at most"),
+            "greatest_orientation_error": Metric(self._greatest[1], "rad", "gripper from its rest orientation at most"),
+            "disagreement_position": Metric(by[0], "m", "actual against calculated position error at most, eq. (4.4)"),
+            "disagreement_orientation": Metric(by[1], "rad", "actual against calculated orientation error at most"),
+            "saturated_share": Metric(share, "1", "share of the time for which the thrusters were at their limits"),
+            **self._stability,
+        }
+        if self._at_rest:
+            told = "from the end of the push until the gripper stays at rest"
+            metrics["settling_time"] = Metric(self._settled, "s", told)
+        return Outcome(success=self._at_rest and agrees, reason=self._reason(agrees, by, share), metrics=metrics)
+
+    def _reason(self, agrees: bool, by: tuple[float, float], share: float) -> str:
+        p = self.parameters
+        thrust = f"; thrusters at their limits for {100 * share:.0f} % of the time" if share else ""
+        model = (
+            f"{'agreed with' if agrees else 'departed from'} the impedance model "
+            f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
+        )
+        if self._at_rest:
+            back = f"the gripper was back at rest {self._settled:.1f} s after the push"
+        elif self._spins:
+            back = f"the robot was out of control at {self._t:.1f} s, turning by more than {_SPINNING:.0f} rad/s,"
+        elif self._t < float(p.stop) - 0.02:
+            back = f"stopped at {self._t:.1f} s, before the robot could come to rest"
+        else:
+            back = (
+                f"the robot did not come back to rest within {p.patience:.0f} s: {self._last[0]:.2f} m and "
+                f"{self._last[1]:.2f} rad away at the end"
+            )
+        return f"{back} and {model}{thrust}"

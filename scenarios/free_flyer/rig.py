@@ -1,0 +1,59 @@
+"""How the free-flyer's units are wired: the robot with its thrusters and one or two controllers that command them."""
+
+import numpy as np
+
+from cosim.ports import Floats
+from cosim.system import PlacedUnit, System
+from scenarios.paper import paper_values
+
+_MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
+_SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
+
+
+def arm() -> Floats:
+    """Return p_BG, m, which the robot and what its controllers know of it share."""
+    return np.array(paper_values("free_flyer", "robot")["p_BG"])
+
+
+def expected_lag(ideal: bool) -> float:
+    """Return the lag of the thrusters that the controllers reckon with, s."""
+    return 0.0 if ideal else float(paper_values("free_flyer", "thrusters")["lag"])
+
+
+def wire_controller(s: System, controller: PlacedUnit, robot: PlacedUnit, thrusters: PlacedUnit) -> None:
+    """Let a controller see where the robot takes itself to be, and command the thrusters."""
+    wire_estimate(s, robot, controller)
+    for what in ("f", "tau"):
+        s.connect(getattr(controller.y, f"{what}_cmd"), getattr(thrusters.u, f"{what}_{controller.name}"))
+
+
+def wire_estimate(s: System, robot: PlacedUnit, observer: PlacedUnit) -> None:
+    """Let a unit see where the robot takes itself to be."""
+    for name in _MEASURED:
+        s.connect(getattr(robot.y, name), getattr(observer.u, name))
+
+
+def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, outside: PlacedUnit) -> None:
+    """Let thrust act on the robot, and something outside on its gripper."""
+    for name in ("f_B", "tau_B"):
+        s.connect(getattr(thrusters.y, name), getattr(robot.u, name))
+    for name in ("f_G", "tau_G"):
+        s.connect(getattr(outside.y, name), getattr(robot.u, name))
+
+
+def wire_handover(s: System) -> None:
+    """Wire all units of a handover that were added under the names of `FlyerHandover.units`."""
+    robot, thrusters, person, decision = (s.units[n] for n in ("robot", "thrusters", "person", "decision"))
+    wire_forces(s, robot, thrusters, person)
+    wire_estimate(s, robot, decision)
+    s.connect(person.y.gripper_angle, decision.u.gripper_angle)
+    for name in ("impedance", "pose"):
+        controller = s.units[name]
+        wire_controller(s, controller, robot, thrusters)
+        s.connect(getattr(decision.y, name), controller.u.active)
+        for goal in ("p_WG_goal", "q_WG_goal"):
+            s.connect(getattr(decision.y, goal), getattr(controller.u, goal))
+    for name in _SEEN:
+        s.connect(getattr(robot.y, name), getattr(person.u, name))
+    for name in ("closure", "light"):
+        s.connect(getattr(decision.y, name), getattr(person.u, name))

@@ -1,0 +1,16 @@
+"""The robot fetches an object, brings it to a person and lets go when the person pulls. [Fernandes2020] sec. 4.3.1."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from scenarios.free_flyer.flyer_handover import FlyerHandover
+
+
+class RobotToHuman(FlyerHandover):
+    """The robot gives, the person takes."""
+
+    name: ClassVar[str] = "flyer_robot_to_human"
+    title: ClassVar[str] = "a free-flyer fetches an object and gives it to a person"
+    task: ClassVar[str] = "robot_to_human"
+    person: ClassVar[Mapping[str, Any]] = {"motion": "take", "object_with": "free"}
+    receivers: ClassVar[tuple[str, ...]] = ("HAND",)

@@ -1,0 +1,163 @@
+"""Pictures of cube, arm, gripper, hand and object, drawn to scale from the side and from above."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+
+from cosim.geometry import rotation_of
+from cosim.ports import Floats
+from scenarios.experiment import Figure
+from scenarios.plotting import figure
+from scenarios.record import Record
+
+_CUBE, _ARM, _JAW, _SKIN, _THING = "#c9d3df", "#8793a3", "#2f6db5", "#e3b591", "#d1602b"
+
+EDGE = 0.305
+"""Edge of the robot's cube, m."""
+OBJECT = (0.021, 0.195, 0.017)
+"""Sides of the object, m."""
+PALM_DEPTH = 0.03
+"""How far the gripper's palm lies behind G, m."""
+_ARM_WIDTH, _PALM_SIDES, _JAW_SIDES = 0.04, (0.012, 0.05, 0.075), (0.06, 0.04, 0.008)
+_HAND_SIDES, _FINGER_WIDTH, _PALM_OF_HAND = (0.085, 0.08, 0.022), 0.016, np.array([-0.03, 0.0, 0.02])
+
+_ROOTS = (
+    ((-0.01, 0.045, 0.0), (0.6, 0.8, 0.0), (0.035, 0.028)),
+    ((0.0425, 0.03, 0.0), (1.0, 0.0, 0.0), (0.038, 0.024, 0.018)),
+    ((0.0425, 0.01, 0.0), (1.0, 0.0, 0.0), (0.042, 0.027, 0.018)),
+    ((0.0425, -0.01, 0.0), (1.0, 0.0, 0.0), (0.039, 0.025, 0.018)),
+    ((0.0425, -0.03, 0.0), (1.0, 0.0, 0.0), (0.031, 0.019, 0.016)),
+)
+"""Thumb, index, middle, ring and little finger in H: root from the palm's middle, direction, lengths of segments, m."""
+
+_NEAR = np.array([0.20, 0.20, 0.20])
+"""Half the sides of a window for pictures from near, m."""
+
+_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_FACES = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
+
+
+@dataclass(frozen=True)
+class _View:
+    """The axes of W to the right and upwards, and the direction from the scene to the eye."""
+
+    told: str
+    axes: tuple[int, int]
+    to_eye: Floats
+
+
+_VIEWS = (
+    _View("from the side", (0, 2), np.array([0.0, -1.0, 0.0])),
+    _View("from above", (0, 1), np.array([0.0, 0.0, 1.0])),
+)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A box: its corners in W, shape (8, 3), m, and its colour."""
+
+    corners: Floats
+    colour: str
+
+
+def robot_at(record: Record, row: int, gap: float) -> list[Solid]:
+    """Return cube, arm, palm and jaws at one row of a record; `gap` is the room between the jaws, m."""
+    R_WB = rotation_of(_at(record, "robot.q_WB", row))
+    p_WB, p_WG = _at(record, "robot.p_WB", row), _at(record, "robot.p_WG", row)
+    p_BG: Floats = np.transpose(R_WB) @ (p_WG - p_WB)
+    face, palm = np.array([-EDGE / 2, 0.0, 0.0]), p_BG + np.array([PALM_DEPTH + _PALM_SIDES[0] / 2, 0.0, 0.0])
+    arm = (float(np.linalg.norm(palm - face)), _ARM_WIDTH, _ARM_WIDTH)
+    apart = np.array([0.0, 0.0, (gap + _JAW_SIDES[2]) / 2])
+    parts: tuple[tuple[Floats, tuple[float, float, float], str], ...] = (
+        (np.zeros(3), (EDGE, EDGE, EDGE), _CUBE),
+        ((face + palm) / 2, arm, _ARM),
+        (palm, _PALM_SIDES, _JAW),
+        (p_BG + apart, _JAW_SIDES, _JAW),
+        (p_BG - apart, _JAW_SIDES, _JAW),
+    )
+    return [_box(p_WB + R_WB @ p_BX, R_WB, sides, colour) for p_BX, sides, colour in parts]
+
+
+def _at(record: Record, signal: str, row: int) -> Floats:
+    return record[signal][row]
+
+
+def person_at(record: Record, row: int) -> list[Solid]:
+    """Return object, palm and fingers at one row of a record."""
+    thing = _box(_at(record, "person.p_WO", row), rotation_of(_at(record, "person.q_WO", row)), OBJECT, _THING)
+    p_WH, R_WH = _at(record, "person.p_WH", row), rotation_of(_at(record, "person.q_WH", row))
+    palm = p_WH + R_WH @ _PALM_OF_HAND
+    return [thing, _box(palm, R_WH, _HAND_SIDES, _SKIN), *_fingers(palm, R_WH, _at(record, "person.finger", row))]
+
+
+def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Path) -> Figure:
+    """Draw moments beside each other, by their titles, from the side and from above; the caption tells what is seen."""
+    corners = np.concatenate([s.corners for solids in moments.values() for s in solids])
+    low, high = corners.min(axis=0) - 0.05, corners.max(axis=0) + 0.05
+    heights = [float((high - low)[view.axes[1]]) for view in _VIEWS]
+    size = (3.6 * len(moments), 2.95 * sum(heights) / float(high[0] - low[0]) + 1.5)
+    with figure(folder / "scene", 2, len(moments), size=size, heights=heights) as canvas:
+        for column, (title, solids) in enumerate(moments.items()):
+            for row, view in enumerate(_VIEWS):
+                _draw(canvas[row * len(moments) + column], solids, view, low, high)
+            canvas[column].set_title(title)
+    return Figure("scene", f"The scene in W, from the side (above) and from above (below). {caption}")
+
+
+def draw_near(moments: Mapping[str, Sequence[Solid]], middles: Mapping[str, Floats], folder: Path) -> Figure:
+    """Draw moments below each other, by their titles, from near: around a middle each, in W, m."""
+    with figure(folder / "transfer", len(moments), 2, size=(8.0, 4.1 * len(moments))) as canvas:
+        for row, (title, solids) in enumerate(moments.items()):
+            for column, view in enumerate(_VIEWS):
+                axes = canvas[2 * row + column]
+                _draw(axes, solids, view, middles[title] - _NEAR, middles[title] + _NEAR)
+                axes.set_title(f"{title}, {view.told}")
+    return Figure("transfer", "The gripper at the moments at which the robot felt the person.")
+
+
+def _fingers(palm: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
+    """Return the segments of thumb (2 joints) and of the four fingers (3 each), bent towards the palm."""
+    made: list[Solid] = []
+    for (root, along, segments), angles in zip(_ROOTS, _split(finger), strict=True):
+        at, turned = np.array(root), 0.0
+        for length, angle in zip(segments, angles, strict=True):
+            turned += angle
+            ahead = np.cos(turned) * np.array(along) - np.sin(turned) * np.array([0.0, 0.0, 1.0])
+            side = np.cross([0.0, 0.0, 1.0], along)
+            R_HF = np.column_stack([ahead, side, np.cross(ahead, side)])
+            middle = palm + R_WH @ (at + 0.5 * length * ahead)
+            made.append(_box(middle, R_WH @ R_HF, (length, _FINGER_WIDTH, _FINGER_WIDTH), _SKIN))
+            at = at + length * ahead
+    return made
+
+
+def _split(finger: Floats) -> list[Floats]:
+    return np.split(finger, [2, 5, 8, 11])
+
+
+def _box(p_WX: Floats, R_WX: Floats, sides: tuple[float, float, float], colour: str) -> Solid:
+    return Solid(p_WX + (_CORNERS * np.array(sides)) @ np.transpose(R_WX), colour)
+
+
+def _draw(axes: Axes, solids: Sequence[Solid], view: _View, low: Floats, high: Floats) -> None:
+    """Draw the faces that look at the eye, the farthest first, the darker the more they turn away."""
+    i, j = view.axes
+    faces: list[tuple[Floats, Solid]] = [(np.take(s.corners, f, axis=0), s) for s in solids for f in _FACES]
+    drawn: list[tuple[float, Floats, tuple[float, ...]]] = []
+    for corners, solid in faces:
+        outwards = corners.mean(axis=0) - solid.corners.mean(axis=0)
+        facing = float(outwards @ view.to_eye) / float(np.linalg.norm(outwards))
+        if facing > 1e-3:
+            shade = 0.55 + 0.45 * facing
+            colour = tuple(shade * c for c in to_rgb(solid.colour))
+            drawn.append((float(corners.mean(axis=0) @ view.to_eye), corners[:, [i, j]], colour))
+    drawn.sort(key=lambda face: face[0])
+    polygons, colours = [corners for _, corners, _ in drawn], [colour for _, _, colour in drawn]
+    axes.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors="#3a4350", linewidths=0.5))
+    axes.set(xlim=(low[i], high[i]), ylim=(low[j], high[j]), aspect="equal")
+    axes.set(xlabel=f"{'xyz'[i]} (m)", ylabel=f"{'xyz'[j]} (m)")

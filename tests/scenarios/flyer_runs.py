@@ -1,0 +1,41 @@
+"""Runs the free-flyer's scenarios as the command does, on the built FMUs."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fmus.build import cached
+from scenarios.experiment import Experiment, Figure
+from scenarios.interruption import Interruption
+from scenarios.parameters import parse_parameters
+from scenarios.run_folder import RunFolder
+from scenarios.runner import Ended, Task, carry_out
+
+
+def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:
+    """Run a scenario with parameters as the command takes them; without figures unless `drawn`."""
+    experiment = scenario()
+    if not drawn:
+        vars(experiment)["draw"] = _draw_nothing
+    task = Task(
+        experiment=experiment,
+        parameters=parse_parameters(scenario, given),
+        seed=seed,
+        fmus={name: cached(unit, 3) for name, unit in scenario.units.items()},
+        folder=RunFolder(out),
+    )
+    return carry_out(task, _tell_nobody, Interruption())
+
+
+def metric(ended: Ended, name: str) -> float:
+    """Return a figure of a run."""
+    value: float = ended.summary["metrics"][name]["value"]
+    return value
+
+
+def _tell_nobody(*_: float) -> None:
+    pass
+
+
+def _draw_nothing(*_: Any) -> Sequence[Figure]:
+    return []

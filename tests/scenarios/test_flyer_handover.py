@@ -1,0 +1,123 @@
+"""The free-flyer's four handovers, on the built FMUs."""
+
+import itertools
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
+
+from flyer_runs import metric, run
+
+from cosim.schedule import Schedule
+from fmus.build import cached
+from scenarios.free_flyer.collaborative import Collaborative
+from scenarios.free_flyer.failed_reception import FailedReception
+from scenarios.free_flyer.flyer_handover import FlyerHandover
+from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.human_to_robot import HumanToRobot
+from scenarios.free_flyer.robot_to_human import RobotToHuman
+from scenarios.parameters import BadParameter
+from scenarios.record import Record
+
+HANDOVERS = (RobotToHuman, HumanToRobot, FailedReception, Collaborative)
+FREE, GRIPPER, HAND, BOTH = range(4)
+
+
+def holders(record: Record) -> list[int]:
+    """Return who held the object in turn."""
+    return [k for k, _ in itertools.groupby(record["person.holder"].tolist())]
+
+
+def test_a_command_acts_in_the_step_that_follows_its_measurement():
+    system = RobotToHuman().build(Parameters(), 0, lambda name: cached(RobotToHuman.units[name], 3))
+    schedule = Schedule(system)
+    assert [s.unit for s in schedule.sampled] == ["decision", "impedance", "pose"]
+    assert [s.unit for s in schedule.continuous] == ["thrusters", "robot", "person"]
+
+
+def test_the_robot_gives_an_object_to_a_person(tmp_path: Path):
+    ended = run(RobotToHuman, tmp_path / "r", drawn=True)
+    assert ended.outcome.success, ended.outcome.reason
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert holders(record) == [FREE, GRIPPER, BOTH, HAND]
+    assert metric(ended, "failed_receptions") == 0
+    assert metric(ended, "arrival_error") < 0.05
+    assert metric(ended, "transfer_speed") > 0.059
+    assert metric(ended, "transfer_displacement") >= metric(ended, "transfer_displacement_z") > 0.01
+    assert not np.any(record["decision.impedance"] & record["decision.pose"])
+    figures = {p.name for p in (tmp_path / "r" / "figures").iterdir()}
+    names = ("scene", "transfer", "positions", "orientations", "gripper", "thrust")
+    assert figures == {f"{n}.{s}" for n in names for s in ("png", "svg")}
+
+
+def test_a_compliant_robot_gives_way_further_where_the_thrusters_can_tell_it_from_a_rigid_one(tmp_path: Path):
+    rigid, compliant = (run(RobotToHuman, tmp_path / b, f"behaviour={b}", "ideal=true") for b in ("rigid", "compliant"))
+    assert rigid.outcome.success, rigid.outcome.reason
+    assert compliant.outcome.success, compliant.outcome.reason
+    assert metric(compliant, "transfer_displacement_z") > 1.3 * metric(rigid, "transfer_displacement_z")
+    assert metric(compliant, "transfer_speed") > 0.08
+
+
+def test_a_person_gives_an_object_to_the_robot(tmp_path: Path):
+    ended = run(HumanToRobot, tmp_path / "r", "behaviour=compliant")
+    assert ended.outcome.success, ended.outcome.reason
+    assert holders(Record(tmp_path / "r" / "signals.parquet")) == [HAND, BOTH, GRIPPER]
+    assert metric(ended, "transfer_speed") > 0.037
+
+
+def test_a_failed_reception_is_noticed_and_repeated(tmp_path: Path):
+    ended = run(FailedReception, tmp_path / "r")
+    assert ended.outcome.success, ended.outcome.reason
+    assert "after 1 failed reception" in ended.outcome.reason
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert holders(record) == [HAND, BOTH, GRIPPER]
+    assert record["decision.failed_receptions"][-1] == 1
+    closed_on_nothing = record["decision.failed_receptions"] == 0
+    assert record["person.gripper_angle"][closed_on_nothing].min() < 0.71
+    assert record["person.gripper_angle"][-1] > 0.71
+
+
+def test_the_robot_holds_an_object_for_a_person(tmp_path: Path):
+    ended = run(Collaborative, tmp_path / "r")
+    assert ended.outcome.success, ended.outcome.reason
+    assert holders(Record(tmp_path / "r" / "signals.parquet")) == [FREE, GRIPPER, BOTH, HAND, BOTH, GRIPPER]
+    assert {"transfer_time", "return_time", "transfer_speed", "return_speed"} <= set(ended.summary["metrics"])
+
+
+def test_a_pull_that_is_too_weak_is_not_felt_and_the_verdict_says_so(tmp_path: Path):
+    ended = run(RobotToHuman, tmp_path / "r", "strength=0.2", "patience=20")
+    assert not ended.outcome.success
+    assert "never felt a pull" in ended.outcome.reason
+
+
+@pytest.mark.parametrize(
+    ("place", "told"), [("50,-0.07,0", "from -1 to 1 m"), ("0.9,0.9,0.9", "out of the person's reach")]
+)
+def test_a_place_out_of_reach_is_refused_before_anything_is_written(tmp_path: Path, place: str, told: str):
+    with pytest.raises(BadParameter, match=told):
+        run(RobotToHuman, tmp_path / "r", f"p_WG_handover={place}")
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", HANDOVERS)
+@pytest.mark.parametrize("place", ["0.2,-0.2,0.15", "-0.2,0.1,-0.2"])
+def test_another_place_is_as_good(tmp_path: Path, scenario: type[FlyerHandover], place: str):
+    ended = run(scenario, tmp_path / "r", f"p_WG_handover={place}")
+    assert ended.outcome.success, ended.outcome.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", HANDOVERS)
+@pytest.mark.parametrize("behaviour", ["rigid", "compliant"])
+def test_ten_of_ten_handovers_succeed(tmp_path: Path, scenario: type[FlyerHandover], behaviour: str):
+    failed: dict[int, Any] = {}
+    for seed in range(10):
+        ended = run(scenario, tmp_path / str(seed), f"behaviour={behaviour}", seed=seed)
+        if not ended.outcome.success:
+            failed[seed] = ended.outcome.reason
+    assert not failed

@@ -1,0 +1,86 @@
+"""A push against the free-flyer's gripper, on the built FMUs."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
+
+from flyer_runs import metric, run
+
+from cosim.exceptions import UnitRefused
+from scenarios.free_flyer.flyer_impedance import FlyerImpedance
+from scenarios.parameters import BadParameter
+from scenarios.record import Record
+
+
+def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_path: Path):
+    ended = run(FlyerImpedance, tmp_path / "r", drawn=True)
+    assert ended.outcome.success, ended.outcome.reason
+    assert metric(ended, "disagreement_position") <= 0.007
+    assert metric(ended, "disagreement_orientation") <= 0.02
+    assert metric(ended, "pole_radius_impedance") < 1.0
+    record = Record(tmp_path / "r" / "signals.parquet")
+    away = np.linalg.norm(record["robot.p_WG"] - [0.0, -0.07, 0.0], axis=1)
+    assert metric(ended, "greatest_position_error") == pytest.approx(away.max())
+    assert np.all(away[record.time > 1.5 + metric(ended, "settling_time") + 0.016] < 0.010)
+    impulse = np.diff(record.time) @ record["push.f_G"][1:]
+    assert impulse == pytest.approx([2.5, 0.0, 0.0])
+    figures = {p.name for p in (tmp_path / "r" / "figures").iterdir()}
+    assert figures == {f"{n}.{s}" for n in ("errors", "scene", "thrust") for s in ("png", "svg")}
+
+
+@pytest.mark.parametrize(
+    ("push", "error"),
+    [
+        (("axis=x",), "greatest_position_error"),
+        (("axis=y", "kind=torque"), "greatest_orientation_error"),
+    ],
+)
+def test_the_compliant_robot_yields_more_than_twice_as_far(tmp_path: Path, push: tuple[str, ...], error: str):
+    rigid = run(FlyerImpedance, tmp_path / "rigid", "behaviour=rigid", *push)
+    compliant = run(FlyerImpedance, tmp_path / "compliant", "behaviour=compliant", *push)
+    assert rigid.outcome.success, rigid.outcome.reason
+    assert compliant.outcome.success, compliant.outcome.reason
+    assert metric(compliant, error) > 2.0 * metric(rigid, error)
+
+
+def test_with_real_limits_a_push_saturates_the_thrusters_and_the_verdict_says_so(tmp_path: Path):
+    ended = run(FlyerImpedance, tmp_path / "r", "ideal=false", "patience=5")
+    assert not ended.outcome.success
+    assert "departed from the impedance model" in ended.outcome.reason
+    assert "thrusters at their limits for" in ended.outcome.reason
+    assert metric(ended, "saturated_share") > 0.5
+    assert "settling_time" not in ended.summary["metrics"]
+
+
+def test_a_known_delay_that_makes_the_loop_unstable_is_refused_before_anything_is_written(tmp_path: Path):
+    with pytest.raises(UnitRefused, match="unstable"):
+        run(FlyerImpedance, tmp_path / "r", "delay=0.032")
+    assert not (tmp_path / "r").exists()
+
+
+def test_an_unknown_delay_makes_the_robot_lose_control_and_the_run_ends_in_time(tmp_path: Path):
+    ended = run(FlyerImpedance, tmp_path / "r", "delay=0.032", "delay_known=false")
+    assert ended.failure is None
+    assert not ended.outcome.success
+    assert "out of control" in ended.outcome.reason
+
+
+def test_bad_parameters_are_refused_with_their_ranges(tmp_path: Path):
+    with pytest.raises(BadParameter) as caught:
+        run(FlyerImpedance, tmp_path / "r", "force=1000", "axis=w", "duration=-1")
+    assert len(caught.value.faults) == 3
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("behaviour", ["rigid", "compliant"])
+def test_every_published_push_agrees_with_the_model(tmp_path: Path, behaviour: str):
+    for kind in ("force", "torque"):
+        for seed, axis in enumerate("xyz"):
+            given = f"behaviour={behaviour}", f"kind={kind}", f"axis={axis}"
+            ended = run(FlyerImpedance, tmp_path / f"{kind}-{axis}", *given, seed=seed)
+            assert ended.outcome.success, (given, ended.outcome.reason)

@@ -1,0 +1,85 @@
+"""What the free-flyer's code has as defaults is what its `paper.toml` tells the origin of."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli
+
+import scenarios.free_flyer
+from controllers.flyer_handover_parameters import Params as DecisionParams
+from controllers.impedance_controller import Behaviour
+from controllers.impedance_controller import Params as ImpedanceParams
+from controllers.pose_controller import Params as PoseParams
+from cosim.block import Causality, declared_variables
+from plants.flyer_hand_parameters import Params as PersonParams
+from plants.free_flyer import Params as RobotParams
+from plants.push import Params as PushParams
+from plants.thrusters import Params as ThrustersParams
+from scenarios.free_flyer import scene
+from scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
+from scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters
+
+Paper = dict[str, dict[str, dict[str, Any]]]
+
+CODE = {
+    "robot": RobotParams,
+    "thrusters": ThrustersParams,
+    "push": PushParams,
+    "person": PersonParams,
+    "impedance": ImpedanceParams,
+    "pose": PoseParams,
+    "decision": DecisionParams,
+    "push_scenario": PushScenarioParameters,
+    "handover_scenario": HandoverParameters,
+}
+
+
+@pytest.fixture(scope="module")
+def paper() -> Paper:
+    file = Path(scenarios.free_flyer.__file__).parent / "paper.toml"
+    return tomli.loads(file.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("group", CODE)
+def test_every_default_has_its_origin(paper: Paper, group: str):
+    told = paper[group]
+    declared = {v.name: v for v in declared_variables(CODE[group], Causality.PARAMETER)}
+    assert set(told) == set(declared) - {"seed"}
+    for name, entry in told.items():
+        default: Any = getattr(CODE[group](), name)
+        value = default.name.lower() if declared[name].items else default
+        assert np.array_equal(value, entry["value"]), name
+        assert entry["unit"] == declared[name].unit.symbol, name
+
+
+@pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
+def test_the_gains_are_those_of_table_4_1(paper: Paper, behaviour: Behaviour):
+    params = ImpedanceParams(behaviour=behaviour)
+    body, gains = params.body(), params.gains()
+    table = {name: entry["value"] for name, entry in paper[f"gains_{behaviour.name.lower()}"].items()}
+    assert np.allclose(gains.stiffness_translation, table["k_D_linear"] * body.mass * np.eye(3))
+    assert np.allclose(gains.damping_translation, table["k_B_linear"] * np.eye(3))
+    assert np.allclose(gains.stiffness_rotation, table["k_D_rotational"] * np.asarray(body.I_B))
+    assert np.allclose(gains.damping_rotation, table["k_B_rotational"] * np.eye(3))
+
+
+@pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
+def test_the_thresholds_are_the_published_ones(paper: Paper, behaviour: Behaviour):
+    published = paper["published"]
+    release, receive = DecisionParams(behaviour=behaviour).velocities()
+    assert release == published["velocity_hand"]["value"][behaviour]
+    assert receive == published["velocity_gripper"]["value"][behaviour]
+    assert DecisionParams().angle_threshold == published["angle_threshold"]["value"]
+
+
+def test_the_pictures_are_of_what_is_simulated(paper: Paper):
+    assert paper["scene"]["edge"]["value"] == scene.EDGE
+    assert paper["person"]["object_size"]["value"] == list(scene.OBJECT)
+    assert paper["person"]["palm_depth"]["value"] == scene.PALM_DEPTH
+
+
+def test_the_robot_reaches_for_the_object_where_it_is(paper: Paper):
+    assert paper["handover_place"]["p_WO_0"]["value"] == paper["person"]["p_WO_0"]["value"]
+    assert paper["handover_place"]["p_OG"]["value"] == paper["person"]["p_OG"]["value"]

@@ -1,0 +1,164 @@
+"""Verdicts on handovers in microgravity, from staged signals."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from controllers.handover_state_machine import HandoverPhase as Phase
+from cosim.block import Causality, Kind
+from cosim.fmu_description import FmuPort
+from cosim.signals import Signals
+from plants.hand_and_object import Holder
+from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.handover_watch import HandoverWatch
+
+PLACE = np.array([0.0, -0.07, 0.0])
+
+
+def signals(
+    phase: Phase, holder: Holder, *, speed: float = 0.0, away: float = 0.0, failed: int = 0, saturated: bool = False
+) -> Signals:
+    loop = {"pole_radius": [0.99], "damping_ratio": [0.3], "pole_frequency": [2.7]}
+    values: dict[str, dict[str, Any]] = {
+        "robot": {"p_WG": PLACE + np.array([0.0, 0.0, away])},
+        "thrusters": {"saturated": [saturated]},
+        "impedance": loop,
+        "pose": loop,
+        "decision": {"phase": [int(phase)], "speed_G": [speed], "failed_receptions": [failed]},
+        "person": {"holder": [int(holder)]},
+    }
+    items = {"phase": Phase, "holder": Holder}
+    units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
+        unit: {name: (np.array(value),) for name, value in ys.items()} for unit, ys in values.items()
+    }
+    ports = {
+        unit: {
+            name: FmuPort(
+                name=name,
+                kind=Kind.ENUMERATION if name in items else Kind.REAL,
+                causality=Causality.OUTPUT,
+                fmi_type="",
+                references=(),
+                shape=(3,) if name == "p_WG" else (),
+                items=tuple((i.name, int(i)) for i in items[name]) if name in items else (),
+            )
+            for name in ys
+        }
+        for unit, ys in values.items()
+    }
+    return Signals(units, ports, None)
+
+
+def follow(watch: HandoverWatch, *moments: tuple[float, Signals]) -> HandoverWatch:
+    for t, seen in moments:
+        watch(t, seen)
+    return watch
+
+
+def given() -> list[tuple[float, Signals]]:
+    """Return the moments of a handover from the robot to a person."""
+    return [
+        (0.0, signals(Phase.OPEN_GRIPPER, Holder.FREE, away=0.4)),
+        (8.0, signals(Phase.GRASP_OBJECT, Holder.FREE, away=0.4)),
+        (9.0, signals(Phase.GRASP_OBJECT, Holder.GRIPPER, away=0.4)),
+        (20.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.GRIPPER, away=0.02, speed=0.005)),
+        (21.0, signals(Phase.SIGNAL, Holder.GRIPPER)),
+        (22.0, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER)),
+        (23.0, signals(Phase.CHECK_VELOCITY, Holder.BOTH, speed=0.05, away=0.03)),
+        (23.5, signals(Phase.RELEASE_OBJECT, Holder.BOTH, speed=0.06, away=0.05, saturated=True)),
+        (24.0, signals(Phase.RELEASE_OBJECT, Holder.HAND, away=0.04)),
+        (30.0, signals(Phase.DONE, Holder.HAND, away=0.4)),
+        (31.0, signals(Phase.DONE, Holder.HAND, away=0.4)),
+    ]
+
+
+def to_person() -> HandoverWatch:
+    return HandoverWatch(Parameters(), ("HAND",))
+
+
+def test_an_object_that_always_was_in_a_hand_is_handed_over():
+    watch = follow(to_person(), *given())
+    assert watch.over
+    outcome = watch.outcome()
+    assert outcome.success, outcome.reason
+    told = {name: m.value for name, m in outcome.metrics.items()}
+    assert told["transfer_time"] == pytest.approx(3.0)
+    assert told["transfer_speed"] == pytest.approx(0.06)
+    assert told["transfer_displacement_z"] == pytest.approx(0.05)
+    assert told["transfer_displacement_x"] == 0.0
+    assert told["arrival_error"] == pytest.approx(0.02)
+    assert told["saturated_share"] == pytest.approx(1 / 11)
+    assert told["phase_grasp_object"] == 8.0
+
+
+def test_an_object_that_floated_free_was_not_handed_over_even_if_it_was_caught():
+    moments = given()
+    moments.insert(8, (23.8, signals(Phase.RELEASE_OBJECT, Holder.FREE)))
+    outcome = follow(to_person(), *moments).outcome()
+    assert not outcome.success
+    assert "lost at 23.8 s" in outcome.reason
+
+
+def test_a_lost_object_ends_the_run_soon():
+    watch = follow(to_person(), *given()[:4], (20.5, signals(Phase.ACTIVATE_IMPEDANCE, Holder.FREE)))
+    assert not watch.over
+    assert follow(watch, (21.6, signals(Phase.SIGNAL, Holder.FREE))).over
+
+
+def test_a_pull_that_never_came_is_told_with_the_greatest_speed():
+    waiting = [(t, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.0123)) for t in (40.0, 60.0)]
+    ends = [(t, signals(Phase.GIVEN_UP, Holder.GRIPPER)) for t in (82.0, 83.0)]
+    watch = follow(to_person(), *given()[:6], *waiting, *ends)
+    assert watch.over
+    outcome = watch.outcome()
+    assert not outcome.success
+    assert "never felt a pull within 61 s" in outcome.reason
+    assert "below 0.013 m/s" in outcome.reason
+    assert "transfer_time" not in outcome.metrics
+
+
+def test_a_robot_that_did_not_arrive_tells_how_near_it_came():
+    far = [(t, signals(Phase.MOVE_TO_HANDOVER, Holder.GRIPPER, away=0.31)) for t in (20.0, 60.0)]
+    watch = follow(to_person(), *given()[:3], *far, (70.0, signals(Phase.GIVEN_UP, Holder.GRIPPER, away=0.31)))
+    assert "came no nearer than 0.31 m" in watch.outcome().reason
+
+
+def test_a_gripper_that_closed_beside_the_object_is_told():
+    watch = follow(to_person(), *given()[:2], (12.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.4)))
+    assert "found nothing" in watch.outcome().reason
+
+
+def received(failed: int) -> HandoverWatch:
+    watch = HandoverWatch(Parameters(), ("GRIPPER",), failures=1)
+    return follow(
+        watch,
+        (0.0, signals(Phase.MOVE_TO_HANDOVER, Holder.HAND)),
+        (10.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.HAND)),
+        (11.0, signals(Phase.SIGNAL, Holder.HAND)),
+        (12.0, signals(Phase.CHECK_VELOCITY, Holder.HAND)),
+        (20.0, signals(Phase.CLOSE_GRIPPER, Holder.BOTH, failed=failed)),
+        (21.0, signals(Phase.CHECK_ANGLE, Holder.GRIPPER, failed=failed)),
+        (25.0, signals(Phase.DONE, Holder.GRIPPER, failed=failed)),
+        (26.0, signals(Phase.DONE, Holder.GRIPPER, failed=failed)),
+    )
+
+
+def test_the_staged_failure_must_have_been_noticed():
+    assert received(failed=1).outcome().success
+    outcome = received(failed=0).outcome()
+    assert not outcome.success
+    assert "0 failed receptions where 1 was staged" in outcome.reason
+
+
+def test_an_object_that_is_still_in_both_hands_at_the_end_was_not_delivered():
+    outcome = follow(to_person(), *given()[:8], (30.0, signals(Phase.DONE, Holder.BOTH))).outcome()
+    assert not outcome.success
+    assert "both hold it" in outcome.reason
+
+
+def test_a_run_that_was_cut_short_says_where():
+    outcome = follow(to_person(), *given()[:6]).outcome()
+    assert not outcome.success
+    assert "stopped at 22.0 s in phase CHECK_VELOCITY" in outcome.reason
