@@ -23,6 +23,7 @@ from scenarios.parameters import BadParameter, parse_parameters
 from scenarios.progress import progress_bar
 from scenarios.run_folder import BadRunFolder, RunFolder, check_place
 from scenarios.runner import Task, carry_out
+from scenarios.vsl_train_command import vsl_train
 
 _PATH = click.Path(path_type=Path)
 
@@ -42,6 +43,7 @@ handover list                          scenarios and units
 handover list helix_handover           a scenario's parameters, with ranges
 handover run helix_handover            one run; leaves a folder with a report
 handover build TendonArm --fmi both    units for other tools
+handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
 Exit status
@@ -95,6 +97,9 @@ def build_(units: Sequence[str], fmi: str, out: Path) -> None:
         check_place(out)
         for line in _build_all(units or list(UNITS), fmi, out, named=bool(units)):
             click.echo(line)
+
+
+main.add_command(vsl_train)
 
 
 @main.command("run", context_settings={"show_default": True})

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from cosim.start_values import range_of
 from fmus.catalog import UNITS
-from scenarios.catalog import SCENARIOS
+from scenarios.catalog import SCENARIOS, SYSTEMS
 from scenarios.experiment import Experiment
 from scenarios.report import told
 from scenarios.run_folder import RunFolder
@@ -18,12 +18,17 @@ from scenarios.runner import Ended
 
 
 def print_catalog() -> None:
-    """Print scenarios and units, a line each."""
+    """Print the scenarios and the units of each robot system, a line each."""
     console = _console()
-    console.print("Scenarios", style="bold")
-    _print_rows(console, [(e.name, e.title) for e in SCENARIOS.values()])
-    console.print("Units", style="bold")
-    _print_rows(console, [(name, unit.summary) for name, unit in UNITS.items()])
+    width = max(map(len, [*SCENARIOS, *UNITS]))
+    for system in SYSTEMS:
+        console.print(system.title, style="bold")
+        for heading, rows in (
+            ("scenarios", [(e.name, e.title) for e in system.scenarios]),
+            ("units", [(name, UNITS[name].summary) for name in system.units]),
+        ):
+            console.print(f"  {heading}", style="italic")
+            _print_rows(console, [("", name.ljust(width), told) for name, told in rows])
 
 
 def print_scenario(experiment: type[Experiment[Any]]) -> None:

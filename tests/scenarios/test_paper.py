@@ -12,10 +12,13 @@ from controllers.servo_parameters import Params as ServoParams
 from plants.handover_partner import Params as HandParams
 from plants.stereo_camera import Params as CameraParams
 from plants.tendon_parameters import Params as ArmParams
+from scenarios.catalog import SCENARIOS
 from scenarios.helix_handover.parameters import Parameters, Place, Tuning
 from scenarios.helix_handover.rig import calibration
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
+
+FILES = sorted((Path(scenarios.helix_handover.__file__).parent.parent).glob("*/paper.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -24,11 +27,19 @@ def paper() -> dict[str, dict[str, dict[str, Any]]]:
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
-def test_every_value_has_its_unit_origin_and_status(paper: dict[str, dict[str, dict[str, Any]]]):
-    for group in paper.values():
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.parent.name)
+def test_every_value_has_its_unit_origin_and_status(file: Path):
+    for group in tomli.loads(file.read_text(encoding="utf-8")).values():
         for name, entry in group.items():
             assert set(entry) == {"value", "unit", "where", "status"}, name
+            assert entry["unit"], name
+            assert entry["where"], name
             assert entry["status"] in STATUS, name
+
+
+def test_every_robot_has_its_paper_file():
+    experiments = {e.__module__.split(".")[1] for e in SCENARIOS.values()}
+    assert {file.parent.name for file in FILES} == experiments
 
 
 def test_the_scenarios_defaults_have_an_origin(paper: dict[str, dict[str, dict[str, Any]]]):

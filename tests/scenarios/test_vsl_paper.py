@@ -1,7 +1,8 @@
 """What the code has as defaults is what `paper.toml` tells the origin of."""
 
 import dataclasses
-from pathlib import Path
+import math
+import pathlib
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,18 @@ import tomli
 
 import scenarios.vsl
 from controllers.hybrid_kinematics import Params as KinematicsParams
+from controllers.trajectory_planner import Elbow
 from controllers.trajectory_planner import Params as PlannerParams
+from controllers.vsl_path import Path, QuarterArc, segments_of
+from cosim.block import Causality, declared_variables
+from cosim.ports import Floats
 from plants.vsl_parameters import Params as ArmParams
+from scenarios import vsl_training_data
 from scenarios.vsl.parameters import HybridParameters, Parameters
+from scenarios.vsl_train_command import vsl_train
+from scenarios.vsl_training import SPLIT
 
-STATUS = {"stated", "derived", "assumed", "read off figure"}
-NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping", "damping_time"}
+NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
@@ -23,20 +30,12 @@ Paper = dict[str, dict[str, dict[str, Any]]]
 
 @pytest.fixture(scope="module")
 def paper() -> Paper:
-    file = Path(scenarios.vsl.__file__).parent / "paper.toml"
+    file = pathlib.Path(scenarios.vsl.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
 def told(value: Any) -> Any:
     return getattr(value, "name", value).lower() if hasattr(value, "name") else value
-
-
-def test_every_value_has_its_unit_origin_and_status(paper: Paper):
-    for group in paper.values():
-        for name, entry in group.items():
-            assert set(entry) == {"value", "unit", "where", "status"}, name
-            assert entry["status"] in STATUS, name
-            assert entry["where"], name
 
 
 @pytest.mark.parametrize(
@@ -58,13 +57,28 @@ def test_defaults_are_those_of_the_paper_file(paper: Paper, group: str, params: 
     ("group", "params"),
     [
         ("scenario", Parameters),
+        ("hybrid", HybridParameters),
+        ("planner", PlannerParams),
+        ("kinematics", KinematicsParams),
+        ("arm", ArmParams),
+    ],
+)
+def test_units_are_the_declared_ones(paper: Paper, group: str, params: type[Any]):
+    declared = {v.name: v.unit.symbol for v in declared_variables(params, Causality.PARAMETER)}
+    assert {name: entry["unit"] for name, entry in paper[group].items()} == {n: declared[n] for n in paper[group]}
+
+
+@pytest.mark.parametrize(
+    ("group", "params"),
+    [
+        ("scenario", Parameters),
         ("planner", PlannerParams),
         ("kinematics", KinematicsParams),
         ("arm", ArmParams),
     ],
 )
 def test_every_default_has_an_origin(paper: Paper, group: str, params: type[Any]):
-    apart = NUMERICAL | {"seed", "q_0", "p_0"}
+    apart = NUMERICAL | {"seed"}
     if group != "scenario":
         apart |= CHOSEN_BY_THE_SCENARIO
     assert {f.name for f in dataclasses.fields(params)} - apart == set(paper[group]) - apart
@@ -78,6 +92,41 @@ def test_the_planner_and_the_kinematics_know_the_arms_dimensions(paper: Paper):
 def test_the_scenario_leaves_the_planners_speed_and_points_as_they_are(paper: Paper):
     assert paper["scenario"]["speed"]["value"] == paper["planner"]["V"]["value"]
     assert paper["scenario"]["points"]["value"] == paper["planner"]["N"]["value"]
+
+
+def test_the_arm_starts_where_the_scenario_has_it_start(paper: Paper):
+    np.testing.assert_array_equal(Parameters().q_0, paper["arm"]["q_0"]["value"])
+    np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(paper["arm"]["q_0"]["value"]))
+
+
+def test_the_training_is_as_told(paper: Paper):
+    told = {name: entry["value"] for name, entry in paper["training"].items()}
+    points = next(p.default for p in vsl_train.params if p.name == "points")
+    assert told.pop("points") == points
+    assert told.pop("split") == list(SPLIT) == paper["published"]["split"]["value"]
+    assert {n: np.ravel(v).tolist() for n, v in told.items()} == {
+        n: np.ravel(getattr(vsl_training_data, n.upper())).tolist() for n in told
+    }
+
+
+def test_the_paths_are_the_published_ones(paper: Paper):
+    def ends(path: Path) -> list[list[Floats]]:
+        return [[s.x_0, s.x_g] for s in segments_of(path, np.zeros(3), np.zeros(3))]
+
+    published = {name: np.array(paper["published"][name]["value"]) for name in ("linear", "curve", "square")}
+    np.testing.assert_allclose(ends(Path.LINEAR), [published["linear"]])
+    first, second = published["curve"][:3], published["curve"][3:]
+    np.testing.assert_allclose(ends(Path.CURVE), [first[:2], [second[0], second[1]]], atol=1e-12)
+    for arc, centre in zip(segments_of(Path.CURVE, np.zeros(3), np.zeros(3)), (first[2], second[2]), strict=True):
+        assert isinstance(arc, QuarterArc)
+        np.testing.assert_allclose(arc.x_c, centre)
+    corners = published["square"]
+    np.testing.assert_allclose(ends(Path.SQUARE), np.stack([corners, np.roll(corners, -1, axis=0)], axis=1))
+
+
+def test_the_length_of_a_path_is_that_of_its_segments():
+    lengths = [Parameters(path=path).length for path in (Path.LINEAR, Path.CURVE, Path.SQUARE, Path.CUSTOM)]
+    assert lengths == pytest.approx([0.3, 0.1 * math.pi, 0.4, math.hypot(0.1, 0.1)])
 
 
 def test_the_default_case_is_one_of_the_published_ones(paper: Paper):
