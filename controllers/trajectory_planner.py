@@ -1,6 +1,7 @@
 """Point-to-point trajectories of an arm with three joints. [Gandarias2020] sec. III-C, algorithms 1 and 2."""
 
 import bisect
+import math
 import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics
+from controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics, place
 from controllers.vsl_path import Path, Segment, segments_of
 from cosim.ports import Floats, Vector2, Vector3, output, parameter, port
 from cosim.start_values import parameter_faults
@@ -84,7 +85,8 @@ class TrajectoryPlanner:
     The first point x_0 is held for the settling time, then until `go`. Each segment has N steps of equal length and
     time T = length / (N V): during the k-th, the goal is x_{k+1} with q_{k+1} from the inverse kinematics, and the
     joint velocities are q'_k = J(q_k)^-1 x'_k, so that the joints arrive as the step ends. Between points the goal
-    stays. The last point is held. Where T is shorter than the period, points are left out.
+    stays. The last point is held. Where T is shorter than the period, points are left out. Joint 1 goes on past half a
+    turn instead of all the way back.
 
     Raises:
         UnusablePath: by the constructor, for values out of range, points out of reach or singular, no length.
@@ -163,6 +165,9 @@ class TrajectoryPlanner:
         p = self._params
         points, velocities = segment.sampled(p.N, p.V)
         q = [self._kinematics.inverse(x) for x in points]
+        before = self._q[-1] if self._q else self._q_0
+        for k, theta_1 in enumerate(np.unwrap([before[0], *(angles[0] for angles in q)])[1:]):
+            q[k][0] = theta_1
         began = self._ends[-1] if self._ends else 0.0
         for k in range(p.N):
             self._points.append(points[k + 1])
@@ -177,17 +182,32 @@ def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -
         if segment.length < 1e-6:
             faults.append("x_0 and x_g are the same point: a path has a length")
             continue
-        bad = [(k, x, f) for k, x in enumerate(segment.sampled(p.N, p.V)[0]) if (f := _fault(x, kinematics))]
-        if bad:
-            k, x, fault = bad[0]
-            others = f" (and {len(bad) - 1} more of this segment)" if len(bad) > 1 else ""
-            place = ", ".join(f"{c:.4g}" for c in x.tolist())
+        fault = _fault_at_points(segment, p, kinematics) or _fault_between(segment, p, kinematics)
+        if fault is not None:
             faults.append(
-                f"segment {i + 1} of {len(segments)}, point {k} of {p.N}, ({place}) m{others}: {fault}; what can be "
+                f"segment {i + 1} of {len(segments)}, {fault}; what can be "
                 f"reached is from |L_2 - L_3| = {kinematics.reach[0]:.4g} m to L_2 + L_3 = {kinematics.reach[1]:.4g} m "
                 f"from the shoulder (0, 0, {p.L_1:.4g}) m, {_MARGIN * 1000:.0f} mm off these limits and off its axis"
             )
     return faults
+
+
+def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
+    """Say which of a segment's points is the first bad one, and why."""
+    bad = [(k, x, f) for k, x in enumerate(segment.sampled(p.N, p.V)[0]) if (f := _fault(x, kinematics))]
+    if not bad:
+        return None
+    k, x, fault = bad[0]
+    others = f" (and {len(bad) - 1} more of this segment)" if len(bad) > 1 else ""
+    return f"point {k} of {p.N}, {place(x)}{others}: {fault}"
+
+
+def _fault_between(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
+    """Say where a segment whose points are good runs through a singularity between them, and through which."""
+    for x in segment.sampled(math.ceil(segment.length / _MARGIN), p.V)[0]:
+        if fault := _fault(x, kinematics):
+            return f"between its points, at {place(x)}: {fault}"
+    return None
 
 
 def _fault(x: Floats, kinematics: VslKinematics) -> str | None:

@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "62bee3546bff72d9b2d767962511b59188e7dc6855a2793b57db50e5518fb6b4",
+   "key": "efaa93949732f48784e8afe07343ba4f2bf69ae1fbfecfa8a2d1a13e65d8ec37",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

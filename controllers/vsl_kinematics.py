@@ -25,7 +25,7 @@ class Unreachable(ValueError):
     """The tip cannot be at a point; `p_WG` is the point, `fault` says why."""
 
     def __init__(self, p_WG: Floats, fault: str) -> None:
-        super().__init__(f"{_place(p_WG)}: {fault}")
+        super().__init__(f"{place(p_WG)}: {fault}")
         self.p_WG, self.fault = p_WG, fault
 
 
@@ -133,5 +133,6 @@ def _cosine(x: float) -> float:
     return min(1.0, max(-1.0, x))
 
 
-def _place(p_WG: Floats) -> str:
+def place(p_WG: Floats) -> str:
+    """Return a point, shape (3,), m, as a message tells it."""
     return "(" + ", ".join(f"{x:.4g}" for x in p_WG.tolist()) + ") m"

@@ -20,6 +20,9 @@ ANY = -1
 
 _WIDTH = 115
 
+_DEEPEST = 3
+"""Lists within lists that are looked into; a matrix has two."""
+
 
 class UnusableModel(ValueError):
     """Text that is no model of this version; `source` says where it came from, `fault` why it cannot be used."""
@@ -108,7 +111,7 @@ class _Reader:
     def numbers(self, table: dict[str, Any], of: str, key: str, shape: tuple[int, ...]) -> Floats:
         """Return finite numbers of a shape, whose extents may be ANY."""
         value = self.entry(table, key, of)
-        if not _all_numbers(value):
+        if not _all_numbers(value, _DEEPEST):
             raise UnusableModel(self._source, f"{of}.{key} must be made of finite numbers")
         try:
             array = np.array(value, dtype=np.float64)
@@ -145,9 +148,9 @@ class _Reader:
         )
 
 
-def _all_numbers(value: object) -> bool:
+def _all_numbers(value: object, depth: int) -> bool:
     if isinstance(value, list):
-        return all(_all_numbers(v) for v in cast("list[object]", value))
+        return depth > 0 and all(_all_numbers(v, depth - 1) for v in cast("list[object]", value))
     return (
         isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
     )

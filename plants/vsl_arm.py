@@ -27,6 +27,8 @@ HEAVIEST = 0.5
 class UnusableInput(ValueError):
     """Inputs that are not numbers, or a load or pressure that there is not; `faults` lists all of them."""
 
+    is_refusal = True
+
     def __init__(self, faults: list[str]) -> None:
         super().__init__("VslArm: " + "; ".join(faults))
         self.faults = faults

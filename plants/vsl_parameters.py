@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.ports import Vector2, Vector3, parameter
+from cosim.start_values import parameter_faults
 from cosim.units import (
     Ampere,
     Kilogram,
@@ -32,6 +33,8 @@ HIGHEST_PRESSURE = 3.0e5
 
 class UnusableVslArm(ValueError):
     """Parameters of which no arm can be built; `faults` lists all of them."""
+
+    is_refusal = True
 
     def __init__(self, faults: list[str]) -> None:
         super().__init__("VslArm: " + "; ".join(faults))
@@ -122,7 +125,12 @@ class Params:
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:
-        """Raise UnusableVslArm, with all faults, if values contradict each other."""
+        """Raise UnusableVslArm, with all faults, if values lie outside their ranges or contradict each other."""
+        faults = parameter_faults(self) or self._contradictions()
+        if faults:
+            raise UnusableVslArm(faults)
+
+    def _contradictions(self) -> list[str]:
         faults: list[str] = []
         for name, length in (("L_2", self.L_2), ("L_3", self.L_3)):
             if not 2.0 * self.cap < length:
@@ -137,5 +145,4 @@ class Params:
             )
         if self.motion is Motion.DYNAMIC and not (self.link_mass > 0.0 and self.gripper_mass > 0.0):
             faults.append("link_mass and gripper_mass must be greater than 0 for an arm that swings")
-        if faults:
-            raise UnusableVslArm(faults)
+        return faults

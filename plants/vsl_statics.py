@@ -17,6 +17,8 @@ _LARGEST_SHARE, _SMALLEST_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # of gravity, by whic
 class NoEquilibrium(RuntimeError):
     """The arm buckles: there is no stable rest that its unloaded shape leads to."""
 
+    is_refusal = True
+
     def __init__(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
         super().__init__(
             f"VslArm: no stable rest at joint angles ({theta[0]:.4g}, {theta[1]:.4g}) rad with a load of {load:.4g} kg "

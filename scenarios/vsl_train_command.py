@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 
+from controllers.hybrid_kinematics import Params
 from controllers.vsl_kinematics import Elbow, VslKinematics
 from cosim.exceptions import CosimError, UnitFailure
 from fmus.binaries import NotCompiled
@@ -16,12 +17,11 @@ from fmus.build import cached
 from fmus.compile import CompilationError
 from scenarios.interruption import Interruption
 from scenarios.progress import progress_bar
-from scenarios.vsl_training import FEWEST, Errors, VslTraining, file_text
+from scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
 
 _PATH = click.Path(path_type=Path)
 
-_ARM = VslKinematics(L_1=0.15, L_2=0.225, L_3=0.225, elbow=Elbow.UP)
-"""Rigid kinematics as `HybridKinematics` has them by default."""
+_ELBOW = click.Choice([e.name.lower() for e in Elbow], case_sensitive=False)
 
 
 class _BadCall(click.ClickException):
@@ -39,11 +39,12 @@ class _ArmFailed(click.ClickException):
 @click.command("vsl-train", context_settings={"show_default": True})
 @click.option("--points", type=click.IntRange(min=FEWEST, max=1_000_000), default=1500, help="Points to measure.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
+@click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
 @click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
 @click.option(
     "--out", type=_PATH, default=Path("vsl_model.json"), help="File for the model; one of that name is replaced."
 )
-def vsl_train(points: int, seed: int, plant: Path | None, out: Path) -> None:
+def vsl_train(points: int, seed: int, elbow: str, plant: Path | None, out: Path) -> None:
     """Train the kinematics of the arm with variable-stiffness links on the arm's own FMU.
 
     Measures points at random pressures, joint angles and loads, fits what rigid kinematics leave, and prints the errors
@@ -54,7 +55,9 @@ def vsl_train(points: int, seed: int, plant: Path | None, out: Path) -> None:
     """
     with Interruption() as interruption, _told_in_one_line(interruption):
         _check_file(out)
-        training = VslTraining(fmu=plant or _built(), kinematics=_ARM, points=points, seed=seed)
+        arm = Params(elbow=Elbow[elbow.upper()])
+        kinematics = VslKinematics(arm.L_1, arm.L_2, arm.L_3, arm.elbow)
+        training = VslTraining(fmu=plant or _built(), kinematics=kinematics, points=points, seed=seed)
         with progress_bar(sys.stderr) as progress:
             model, errors = training.carry_out(progress)
         _write(out, file_text(model, out))
@@ -87,8 +90,11 @@ def _built() -> Path:
 
 def _check_file(out: Path) -> None:
     folder = out.absolute().parent
+    longest = 240  # of the 255 bytes of a file's name; the unfinished file's name is longer
     if out.suffix not in (".json", ".py"):
         raise _BadCall(f"--out {out}: a name that ends in .json, or in .py for the module form")
+    if len(os.fsencode(out.name)) > longest:
+        raise _BadCall(f"--out {out}: the name is longer than {longest} bytes")
     if out.is_dir():
         raise _BadCall(f"--out {out}: there is a folder of that name")
     if not folder.is_dir():
@@ -99,17 +105,18 @@ def _check_file(out: Path) -> None:
 
 def _write(out: Path, text: str) -> None:
     """Write a file that appears whole or not at all."""
-    handle, part = tempfile.mkstemp(dir=out.absolute().parent, prefix=f".{out.name}-")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        Path(part).chmod(0o644)
-        os.replace(part, out)
-    except BaseException as e:
-        Path(part).unlink(missing_ok=True)
-        if isinstance(e, OSError):
-            raise _BadCall(f"--out {out}: {e.strerror}") from e
-        raise
+        handle, part = tempfile.mkstemp(dir=out.absolute().parent, prefix=f".{out.name}-")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+            Path(part).chmod(0o644)
+            os.replace(part, out)
+        except BaseException:
+            Path(part).unlink(missing_ok=True)
+            raise
+    except OSError as e:
+        raise _BadCall(f"--out {out}: {e.strerror}") from e
 
 
 @contextmanager
@@ -119,7 +126,7 @@ def _told_in_one_line(interruption: Interruption) -> Generator[None, None, None]
     except UnitFailure as e:
         interruption.check()  # a unit may have taken Ctrl-C for a failure of its own
         raise _ArmFailed(e.cause) from e
-    except (CosimError, NotCompiled) as e:
+    except (CosimError, NotCompiled, NothingToLearn) as e:
         interruption.check()
         raise _BadCall(str(e)) from e
     except CompilationError as e:

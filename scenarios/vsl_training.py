@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.vsl_fit import Fit, fit_cubic
-from controllers.vsl_kinematics import VslKinematics
-from controllers.vsl_model import VslModel, inputs_of, turned
+from controllers.vsl_kinematics import Elbow, VslKinematics
+from controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, turned
 from controllers.vsl_model_text import model_text
 from cosim.block import Kind
 from cosim.fmu_description import FmuPort
@@ -26,16 +26,27 @@ SPLIT = (0.70, 0.15, 0.15)
 FEWEST = 400
 """Points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
 
+_LEAST_VARIATION = 1e-9
+"""Share of its size by which an input must vary to be learned from; less is rounding."""
+
 _MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
 
 Generated; when the sources of the arm (plants/vsl_*.py) have changed, run again
 
-    handover vsl-train --points {points} --seed {seed} --out controllers/vsl_default_model.py
+    handover vsl-train --points {points} --seed {seed}{elbow} --out controllers/vsl_default_model.py
 """
 
 DEFAULT_MODEL = """\\
 {text}"""
 '''
+
+
+class NothingToLearn(ValueError):
+    """Measured points from which no kinematics can be learned: the arm is another, or its sensors are dead."""
+
+    def __init__(self, fmu: Path, fault: str) -> None:
+        super().__init__(f"{fmu}: {fault}")
+        self.fmu, self.fault = fmu, fault
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,13 +86,14 @@ class VslTraining:
 
         Raises:
             InvalidFmu, UnitRefused, UnitFailure: the arm cannot be used, does not start, or fails.
+            NothingToLearn: fewer than half of the tips are within reach, or an input is the same at all points.
         """
         d = describe_arm(self.fmu)
         points_seed, arm_seed = (int(n) for n in np.random.SeedSequence(self.seed).generate_state(2) >> 1)
         rng = np.random.default_rng(points_seed)
         parameters = parameters_of(d, arm_seed)
         measured = collect(d, self.kinematics, self.points, rng, parameters, progress)
-        usable = measured.rows(self._within_reach(measured.p_WG))
+        usable = self._usable(measured)
         training, validation, test = (usable.rows(chosen) for chosen in split(len(usable), rng))
         inverse = fit_cubic(*self.inverse_pairs(training), *self.inverse_pairs(validation))
         forward = fit_cubic(*self.forward_pairs(training), *self.forward_pairs(validation))
@@ -138,6 +150,22 @@ class VslTraining:
         jacobians = [self.kinematics.jacobian(q) for q in inputs[:, :3]]
         return np.array([J @ dq for J, dq in zip(jacobians, angles, strict=True)])
 
+    def _usable(self, measured: Dataset) -> Dataset:
+        usable = measured.rows(self._within_reach(measured.p_WG))
+        if len(usable) < len(measured) / 2:
+            k = self.kinematics
+            raise NothingToLearn(
+                self.fmu,
+                f"{len(usable)} of {len(measured)} measured tips are where links of {k.L_2:g} and {k.L_3:g} m on a "
+                f"shoulder {k.L_1:g} m high can be; half of them should be",
+            )
+        x = inputs_of(usable.q, usable.p, usable.i)
+        still = np.ptp(x, axis=0) <= _LEAST_VARIATION * np.max(np.abs(x), axis=0)
+        if np.any(still):
+            names = ", ".join(name for name, s in zip(FORWARD_INPUTS, still, strict=True) if s)
+            raise NothingToLearn(self.fmu, f"the same at all points, whatever is commanded: {names}")
+        return usable
+
     def _within_reach(self, p_WG: Floats) -> NDArray[np.bool_]:
         least, _ = self.kinematics.reach
         from_shoulder = _lengths(p_WG - np.array([0.0, 0.0, self.kinematics.L_1]))
@@ -173,7 +201,8 @@ def file_text(model: VslModel, path: Path) -> str:
     if path.suffix != ".py":
         return text
     told = model.provenance
-    return _MODULE.format(points=told["points"]["measured"], seed=told["seed"], text=text)
+    elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
+    return _MODULE.format(points=told["points"]["measured"], seed=told["seed"], elbow=elbow, text=text)
 
 
 def _told(fit: Fit, unit: str) -> dict[str, float]:

@@ -19,6 +19,8 @@ _SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[
 _ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
 """The arm's lines at its three moments: where they lie over each other, all are seen."""
 
+_DISTANCE = "horizontal distance from the base (mm)"
+
 _APART = 0.01
 """Points nearer to each other than this are shown once, m (assumed)."""
 
@@ -43,9 +45,8 @@ def _path(watch: PathWatch, folder: Path) -> Figure:
         lines.append(([p.estimated for p in points], {"color": _ESTIMATE, "ls": ":", "lw": 1.8, "label": label}))
     with figure(folder / "path", 1, size=(6.4, 5.6)) as (axes,):
         for positions, style in lines:
-            x, z = _in_plane(np.array(positions))
-            axes.plot(x, z, **style)
-        axes.plot(*_in_plane(watch.path[:1]), "o", ms=6, color=_DESIRED, label="start")
+            axes.plot(*_in_plane(np.array(positions), watch), **style)
+        axes.plot(*_in_plane(watch.path[:1], watch), "o", ms=6, color=_DESIRED, label="start")
         axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
         axes.set(xlim=_widened(axes.get_xlim(), axes.get_ylim()), ylim=_widened(axes.get_ylim(), axes.get_xlim()))
         axes.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
@@ -54,11 +55,10 @@ def _path(watch: PathWatch, folder: Path) -> Figure:
 
 def _shapes(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> Figure:
     shapes = record["arm.shape"]
-    x, z = _in_plane(watch.path)
     with figure(folder / "shape", 1, size=(8.0, 5.2)) as (axes,):
-        axes.plot(x, z, color=_DESIRED, lw=3.0, alpha=0.35, label="desired path")
+        axes.plot(*_in_plane(watch.path, watch), color=_DESIRED, lw=3.0, alpha=0.35, label="desired path")
         for k, (role, t) in enumerate(_moments(watch).items()):
-            arm_x, arm_z = _in_plane(shapes[np.searchsorted(record.time, t - 1e-9)])
+            arm_x, arm_z = _along_tip(shapes[np.searchsorted(record.time, t - 1e-9)], watch)
             axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
             if parameters.load > 0.0:
                 axes.plot(arm_x[-1], arm_z[-1] - 8.0, "s", ms=9, color=COLOURS[k])
@@ -124,9 +124,9 @@ def _signals(record: Record, folder: Path) -> Figure:
             joints.plot([], [], color=colour, label=name)
             currents.plot(t, record["arm.i_meas"][:, k], color=colour, lw=0.9, label=name)
         for k in range(2):
-            colour = COLOURS[k + 1]
-            pressures.plot(t, record["planner.p_cmd"][:, k] / 1e5, color=colour, ls="--", lw=1.0)
-            pressures.plot(t, record["arm.p_meas"][:, k] / 1e5, color=colour, lw=1.0, label=f"link {k + 2}")
+            colour, lw = COLOURS[k + 1], (2.6, 1.0)[k]  # equal pressures lie over each other
+            pressures.plot(t, record["planner.p_cmd"][:, k] / 1e5, color=colour, ls="--", lw=lw)
+            pressures.plot(t, record["arm.p_meas"][:, k] / 1e5, color=colour, lw=lw, label=f"link {k + 2}")
         joints.set(ylabel="joint angle (°)")
         currents.set(ylabel="current (A)")
         pressures.set(ylabel="pressure (bar)", xlabel="time (s)", ylim=(0.0, None))
@@ -148,8 +148,8 @@ def _moments(watch: PathWatch) -> dict[str, float]:
 
 def _spread(watch: PathWatch) -> tuple[Floats, str]:
     """Return the points' reach, mm, and what it is; their height for a path that reaches equally far throughout."""
-    r, z = _in_plane(np.array([p.desired for p in watch.points]))
-    return (z, "z in W (mm)") if np.ptp(r) < 1000 * _APART else (r, "horizontal distance from the base (mm)")
+    r, z = (1000 * np.array(values) for values in zip(*((p.reach, p.desired[2]) for p in watch.points), strict=True))
+    return (z, "z in W (mm)") if np.ptp(r) < 1000 * _APART else (r, _DISTANCE)
 
 
 def _widened(limits: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
@@ -167,12 +167,21 @@ def _draw_box(axes: Axes, x: float, values: Floats, colour: str) -> None:
     axes.plot(x, np.mean(values), "o", ms=4, color=colour)
 
 
-def _in_plane(positions: Floats) -> tuple[Floats, Floats]:
-    """Return horizontal distance from the first joint's axis, negative behind it, and height, mm."""
+def _in_plane(positions: Floats, watch: PathWatch) -> tuple[Floats, Floats]:
+    """Return x of a path in the plane XZ, else the distance from the first joint's axis, and the height, mm."""
     mm = positions * 1000
-    return np.copysign(np.hypot(mm[:, 0], mm[:, 1]), mm[:, 0]), mm[:, 2]
+    return (mm[:, 0] if _flat(watch) else np.hypot(mm[:, 0], mm[:, 1])), mm[:, 2]
+
+
+def _along_tip(shape: Floats, watch: PathWatch) -> tuple[Floats, Floats]:
+    """Return the same of the arm; off the plane XZ what points away from its tip is negative."""
+    mm, tip = shape * 1000, shape[-1, :2]
+    return (mm[:, 0] if _flat(watch) else mm[:, :2] @ (tip / np.linalg.norm(tip))), mm[:, 2]
+
+
+def _flat(watch: PathWatch) -> bool:
+    return bool(np.all(np.abs(watch.path[:, 1]) < 1e-6))
 
 
 def _horizontal(watch: PathWatch) -> str:
-    flat = bool(np.all(np.abs(watch.path[:, 1]) < 1e-6))
-    return "x in W (mm)" if flat else "horizontal distance from the base (mm)"
+    return "x in W (mm)" if _flat(watch) else _DISTANCE

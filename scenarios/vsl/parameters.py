@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.trajectory_planner import Elbow, Path
+from controllers.vsl_path import segments_of
 from cosim.ports import Floats, Vector3, parameter
 from cosim.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from plants.vsl_parameters import HIGHEST_PRESSURE, Link, Motion
@@ -47,19 +48,14 @@ class Parameters:
 
     @property
     def q_0(self) -> Floats:
-        """Joint angles at which the arm starts, with the tip level with the shoulder, shape (3,), rad."""
+        """Joint angles at which the arm starts, with the tip 0.3 m out, level with the shoulder, shape (3,), rad."""
         sign = 1.0 if self.elbow is Elbow.UP else -1.0
         return sign * np.array([0.0, 0.8411, -1.6821])
 
     @property
     def length(self) -> float:
         """Length of the path, m."""
-        return {
-            Path.LINEAR: 0.3,
-            Path.CURVE: 0.1 * np.pi,
-            Path.SQUARE: 0.4,
-            Path.CUSTOM: float(np.linalg.norm(self.x_g - self.x_0)),
-        }[self.path]
+        return sum(segment.length for segment in segments_of(self.path, self.x_0, self.x_g))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -146,6 +146,15 @@ def test_pressures_are_passed_on():
     np.testing.assert_array_equal(y.p_cmd, [5e4, 2e5])
 
 
+def test_joint_1_goes_on_past_half_a_turn():
+    ys = moving(path=Path.CUSTOM, x_0=np.array([-0.3, 0.1, 0.2]), x_g=np.array([-0.3, -0.1, 0.2]))
+    theta_1 = np.array([y.q_ref[0] for y in ys])
+    assert np.all(np.diff(theta_1) >= 0.0)
+    assert theta_1[-1] == pytest.approx(math.pi + math.atan2(0.1, 0.3))
+    for y in ys:
+        np.testing.assert_allclose(ARM.forward(y.q_ref), y.p_WG_goal, atol=1e-12)
+
+
 @pytest.mark.parametrize("settle", [0.0, 0.1])
 def test_outputs_are_those_of_the_coming_step(settle: float):
     planner = TrajectoryPlanner(Params(settle=settle))
@@ -176,6 +185,14 @@ def test_a_restored_state_goes_on_bit_for_bit(steps: int):
         ({"x_g": np.array([0.0, 0.0, 0.35])}, ["point 100 of 100", "axis of joint 1"]),
         ({"x_g": np.array([0.3, 0.0, 0.05])}, ["x_0 and x_g are the same point"]),
         ({"x_g": np.array([np.nan, 0.0, 0.05])}, ["not finite"]),
+        (
+            {"x_0": np.array([-0.2, 0.0, 0.3]), "x_g": np.array([0.2, 0.0, 0.3]), "N": 101},
+            ["between its points, at (0, 0, 0.3) m: singular", "axis of joint 1"],
+        ),
+        (
+            {"L_3": 0.2, "x_0": np.array([0.2, 0.002, 0.15]), "x_g": np.array([-0.2, 0.002, 0.15]), "N": 3},
+            ["between its points, at (0.025, 0.002, 0.15) m: singular", "folded"],
+        ),
         ({"L_2": 0.4, "L_3": 0.1, "x_g": np.array([0.2, 0.0, 0.15])}, ["|L_2 - L_3| = 0.3 m", "out of reach"]),
     ],
 )

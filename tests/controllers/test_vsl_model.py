@@ -55,6 +55,13 @@ def test_the_penalty_is_chosen_on_the_validation_points():
     assert fit.validation_rms < 0.5
 
 
+def test_the_penalty_is_per_point():
+    x, y = X[:40], cubic_values(X[:40]) + np.random.default_rng(0).normal(0.0, 0.3, (40, 3))
+    once, twice = (fit_cubic(np.tile(x, (n, 1)), np.tile(y, (n, 1)), X[40:], cubic_values(X[40:])) for n in (1, 2))
+    assert once.penalty == twice.penalty > 1e-10
+    np.testing.assert_allclose(twice.cubic.predict(X), once.cubic.predict(X), atol=1e-6)
+
+
 def test_there_are_120_monomials_of_seven_inputs():
     powers = all_powers(7)
     assert powers.shape == (120, 7)
@@ -183,6 +190,16 @@ def test_what_is_no_model_is_refused(change: Callable[[dict[str, Any]], None], t
     with pytest.raises(UnusableModel, match=told) as caught:
         parse_model(json.dumps(changed), "x.json")
     assert "model x.json" in str(caught.value)
+
+
+def test_numbers_within_many_lists_are_refused():
+    deep: Any = 1.0
+    for _ in range(500):
+        deep = [deep]
+    changed = content()
+    put(deep, "forward", "mean")(changed)
+    with pytest.raises(UnusableModel, match=r"forward\.mean must be made of finite numbers"):
+        parse_model(json.dumps(changed), "x.json")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 100000, '{"format": 1}'])

@@ -134,6 +134,14 @@ def test_currents_hold_the_weight():
     np.testing.assert_allclose(y.i_meas, [0.0, tau_2 / 1.78, tau_3 / 1.78], rtol=1e-6)
 
 
+def test_the_gears_have_no_friction_at_the_start():
+    arm = VslArm(replace(PRINTED, q_0=reach(*OUT)))
+    u = ArmInputs(q_cmd=reach(*OUT), load=0.1)
+    before = arm.outputs(0.0, u).i_meas
+    assert before[1] > 0.5
+    np.testing.assert_allclose(arm.step(0.0, 0.02, u).i_meas, before, atol=1e-9)
+
+
 def test_current_depends_on_the_way_by_which_the_joint_came():
     u = ArmInputs(q_cmd=reach(0.35, 0.0, 0.1))
     above, below = (
@@ -308,6 +316,12 @@ def test_contradicting_parameters_are_refused_all_at_once():
         VslArm(Params(motion=Motion.DYNAMIC, L_2=0.06, cap=0.04, valve_tolerance=2000.0, link_mass=0.0))
     assert len(caught.value.faults) == 3
     assert "two caps of 0.04 m leave nothing flexible of L_2 0.06 m: cap must be less than 0.03 m" in str(caught.value)
+
+
+def test_values_out_of_range_are_refused_all_at_once():
+    with pytest.raises(UnusableVslArm, match=r"L_2: -1\.0 is out of range: from 0\.01 to 2 m; hinges: 0") as caught:
+        VslArm(Params(L_2=-1.0, hinges=0))
+    assert len(caught.value.faults) == 2
 
 
 def test_every_start_value_lies_in_its_range():

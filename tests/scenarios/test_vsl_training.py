@@ -1,10 +1,12 @@
 import os
+import re
 import signal
 import sys
 import types
 import zipfile
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,7 +28,7 @@ from fmus.archive import write_archive
 from fmus.build import build_block, cached
 from scenarios import vsl_train_command
 from scenarios.vsl_train_command import vsl_train
-from scenarios.vsl_training import VslTraining, content_key, split
+from scenarios.vsl_training import Errors, VslTraining, content_key, split
 from scenarios.vsl_training_data import Dataset, describe_arm
 
 sys.path.insert(0, str(Path(__file__).parent))  # vsl_training_arms
@@ -124,6 +126,8 @@ def test_another_seed_gives_another_model():
         (["--seed", "-1"], "-1 is not in the range"),
         (["--out", "none/m.json"], "there is no folder"),
         (["--out", "m.txt"], "ends in .json"),
+        (["--out", "m" * 250 + ".json"], "the name is longer than"),
+        (["--elbow", "left"], "'left' is not one of"),
         (["--out", "folder.json"], "there is a folder of that name"),
         (["--plant", "none.fmu"], "none.fmu"),
         (["--plant", "text.fmu"], "not an FMU"),
@@ -147,6 +151,44 @@ def test_an_arm_that_fails_leaves_no_file(tmp_path: Path):
     assert result.exit_code == 3
     assert "the arm broke" in result.output
     assert not (tmp_path / "m.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arm", "told"),
+    [
+        ("DistantArm", "0 of 400 measured tips are where links of 0.225 and 0.225 m"),
+        ("ArmWithoutGauges", r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+    ],
+)
+def test_an_arm_that_teaches_nothing_is_refused(arm: str, told: str, tmp_path: Path):
+    fmu = build_block(f"vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
+    result = call("--points", "400", "--plant", fmu, "--out", tmp_path / "m.json")
+    assert result.exit_code == 2
+    assert re.search(told, result.output)
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "m.json").exists()
+
+
+def test_a_folder_that_goes_away_is_told_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def gone(training: VslTraining, _progress: Callable[[float, float], None]) -> tuple[VslModel, Errors]:
+        (tmp_path / "a").rmdir()
+        return shipped(), training.errors(shipped(), points(10, np.zeros(3), np.zeros(3)))
+
+    (tmp_path / "a").mkdir()
+    monkeypatch.setattr(VslTraining, "carry_out", gone)
+    result = call("--out", tmp_path / "a" / "m.json")
+    assert result.exit_code == 2
+    assert "No such file or directory" in result.output
+    assert "Traceback" not in result.output
+
+
+def test_the_elbow_is_the_models(tmp_path: Path):
+    result = call("--points", "400", "--elbow", "down", "--out", tmp_path / "m.py")
+    assert result.exit_code == 0, result.output
+    module = types.ModuleType("m")
+    exec((tmp_path / "m.py").read_text(), vars(module))
+    assert parse_model(vars(module)["DEFAULT_MODEL"], "m").kinematics == replace(ARM, elbow=Elbow.DOWN)
+    assert "--seed 0 --elbow down --out" in (module.__doc__ or "")
 
 
 def test_ctrl_c_leaves_the_file_of_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

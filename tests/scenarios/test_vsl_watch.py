@@ -23,13 +23,13 @@ def signals(
     done: bool = False,
     outside: bool = False,
 ) -> Signals:
-    """Return a goal at x = goal and a tip `below` the point at x = at; servos are 1 mm off."""
+    """Return a goal at x = goal and a tip `below` the point at x = at; servos are 1 mm off, the tracker 0.5 mm."""
     told, reached = (np.array([x, 0.0, 0.1]) for x in (goal, goal if at is None else at))
     tip = reached - below * UP
     values: dict[str, dict[str, Any]] = {
         "planner": {"p_WG_goal": told, "moving": segment > 0 and not done, "done": done, "segment": segment},
-        "arm": {"p_WG": tip, "p_WG_meas": tip},
-        "kinematics": {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.002 * UP, "outside": outside},
+        "arm": {"p_WG": tip + 0.0005 * UP, "p_WG_meas": tip},
+        "kinematics": {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.003 * UP, "outside": outside},
     }
     views: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
         unit: {name: (np.atleast_1d(np.array(value)),) for name, value in ys.items()} for unit, ys in values.items()
@@ -70,7 +70,7 @@ def test_errors_are_those_of_the_points():
     assert values["error_p25"] == pytest.approx(0.02)
     assert values["error_p75"] == pytest.approx(0.05)
     assert values["max_error"] == pytest.approx(0.06)
-    assert values["mean_error_true"] == pytest.approx(0.034)
+    assert values["mean_error_true"] == pytest.approx(0.0335)
     assert values["error_near"] == pytest.approx(0.01)
     assert values["error_far"] == pytest.approx(0.05)
     assert values["path_distance"] == pytest.approx(0.034, rel=0.3)
@@ -112,8 +112,8 @@ def test_a_path_that_never_began_fails_without_errors():
 def test_the_hybrid_tells_of_its_forward_model_and_of_extrapolation():
     watch = follow(PathWatch(HybridParameters(), hybrid=True), *path(0.003, 0.003, outside=True))
     metrics = watch.outcome().metrics
-    assert metrics["estimate_error"].value == pytest.approx(0.002)
-    assert metrics["model_error"].value == pytest.approx(0.002)  # 3 mm below the point, taken to be 1 mm below it
+    assert metrics["estimate_error"].value == pytest.approx(0.0025)
+    assert metrics["model_error"].value == pytest.approx(0.0015)  # 2.5 mm below the point, taken to be 1 mm below it
     assert metrics["servo_error"].value == pytest.approx(0.001)
     assert metrics["outside"].value == 0.5
 

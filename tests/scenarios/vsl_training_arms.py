@@ -1,5 +1,9 @@
 """Arms that are no good to learn from."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from plants.vsl_arm import Inputs, Outputs, VslArm
 
 
@@ -10,3 +14,18 @@ class BreakingArm(VslArm):
         if t > 3.0:
             raise RuntimeError("the arm broke")
         return super().step(t, dt, u)
+
+
+class DistantArm(VslArm):
+    """Has its tip far away."""
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        y = super().step(t, dt, u)
+        return replace(y, p_WG_meas=y.p_WG_meas + 1.0)
+
+
+class ArmWithoutGauges(VslArm):
+    """Does not measure its pressures."""
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return replace(super().step(t, dt, u), p_meas=np.zeros(2))
