@@ -4,9 +4,15 @@ import re
 import shlex
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
+
+from fmus.build import cached
+from fmus.catalog import UNITS
+from fmus.fmi2_description import NoFmi2Form
+from scenarios.catalog import SYSTEMS
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -28,8 +34,9 @@ def program(text: str, folder: Path) -> str:
 
 
 def test_the_readme_has_what_is_tested_here():
-    assert len([c for c in COMMANDS if " run " in c]) == 4
+    assert len([c for c in COMMANDS if " run " in c]) == 9
     assert len([c for c in COMMANDS if " build " in c]) == 1
+    assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
     assert len(PROGRAMS) == 3
 
 
@@ -43,6 +50,36 @@ def test_the_make_targets_exist():
 def test_every_path_that_is_linked_exists():
     for path in re.findall(r"\]\((?!http)([^)#]+)\)", README):
         assert (ROOT / path).exists(), path
+
+
+def test_the_table_of_robots_names_their_units_and_scenarios():
+    rows = [row for row in README.splitlines() if row.startswith("|") and "paper.toml" in row]
+    assert len(rows) == len(SYSTEMS)
+    for row, system in zip(rows, SYSTEMS, strict=True):
+        _, robot, plants, controllers, scenarios, _ = row.split("|")
+        assert system.title.split(",")[0] in robot
+        assert re.findall(r"`(\w+)`", scenarios) == [e.name for e in system.scenarios]
+        assert set(re.findall(r"`(\w+)`", plants)) == {u for u in system.units if is_plant(u)}
+        assert set(re.findall(r"`(\w+)`", controllers)) == {u for u in system.units if not is_plant(u)}
+
+
+def is_plant(unit: str) -> bool:
+    return UNITS[unit].block.startswith("plants.")
+
+
+def test_the_table_of_units_has_their_steps_and_standards():
+    cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `\w+`", row)]
+    told = {unit: (step.strip(), fmi.strip()) for units, step, fmi in cells for unit in re.findall(r"`(\w+)`", units)}
+    assert set(told) == set(UNITS)
+    for name, entry in UNITS.items():
+        step, fmi = told[name]
+        number, unit = step.split()
+        assert Fraction(number) * {"ms": Fraction(1, 1000), "s": 1}[unit] == entry.step
+        try:
+            cached(name, 2)
+            assert fmi == "2, 3"
+        except NoFmi2Form:
+            assert fmi == "3"
 
 
 def test_a_unit_runs_in_fmpy(tmp_path: Path):
@@ -63,8 +100,9 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in COMMANDS if " run " in c])
 def test_the_runs_succeed(command: str, tmp_path: Path):
-    for build in (c for c in COMMANDS if " build " in c):
-        assert handover(build, tmp_path).returncode == 0
+    needed = [" build ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
+    for before in (c for c in COMMANDS if any(word in c for word in needed)):
+        assert handover(before, tmp_path).returncode == 0
     done = handover(command, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "succeeded" in done.stdout
