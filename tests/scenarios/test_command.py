@@ -8,6 +8,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fmus.build import build_block, cached
+from fmus.catalog import UNITS
+from scenarios.catalog import SCENARIOS
 from scenarios.command import main
 from scenarios.record import Record
 
@@ -26,10 +28,12 @@ def assert_refused(result: Result, told: str, *untouched: Path) -> None:
         assert not path.exists()
 
 
-def test_list_names_scenarios_and_units():
+def test_list_names_robots_scenarios_and_units():
     shown = call("list").output
-    for name in ("helix_handover", "TendonArm", "HandoverPartner", "StereoCamera", "HandoverVision", "VisualServo"):
-        assert name in shown
+    for title in ("Helix, ", "VSL arm, ", "Free-flyer, ", "IR grasp, "):
+        assert title in shown
+    for name in (*SCENARIOS, *UNITS):
+        assert name in shown.split()
 
 
 def test_list_of_a_scenario_shows_ranges_and_units():
@@ -42,7 +46,7 @@ def test_list_of_a_scenario_shows_ranges_and_units():
     ("arguments", "told"),
     [
         (("run", "helix_hand"), "did you mean helix_handover?"),
-        (("list", "nothing_like_it"), "valid: helix_handover"),
+        (("list", "nothing_like_it"), "valid: flyer_collaborative, flyer_failed_reception, "),
         (("run", "helix_handover", "-p", "alfa=0.2"), "did you mean alpha"),
         (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
         (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),
