@@ -22,8 +22,8 @@ class FlyerBody:
     def faults(self) -> list[str]:
         """Return what no rigid body can have."""
         faults: list[str] = []
-        if not self.mass > 0.0:
-            faults.append(f"mass = {self.mass:g} kg must be positive")
+        if not 0.0 < self.mass < np.inf:
+            faults.append(f"mass = {self.mass:g} kg must be positive and finite")
         if not np.all(np.isfinite(self.p_BG)):
             faults.append(f"p_BG = {self.p_BG.tolist()} must be finite")
         if not positive_definite(self.I_B):

@@ -45,7 +45,7 @@ def published_gains(behaviour: Behaviour, body: FlyerBody) -> ImpedanceGains:
     k, d, k_R, d_R = {Behaviour.RIGID: (7.0, 15.0, 70.0, 5.0), Behaviour.COMPLIANT: (0.7, 5.0, 7.0, 1.0)}[behaviour]
     I = np.eye(3)
     return ImpedanceGains(
-        stiffness_translation=k * body.mass * I,
+        stiffness_translation=np.diag([k * body.mass] * 3),
         damping_translation=d * I,
         stiffness_rotation=k_R * body.I_B,
         damping_rotation=d_R * I,

@@ -7,7 +7,8 @@ import numpy as np
 
 from controllers.flyer_astrobee import ARM
 from controllers.flyer_behaviour import Behaviour
-from controllers.flyer_rotation import rows_of, triple, turned, unit_quaternion
+from controllers.flyer_rotation import rows_of, unit_quaternion
+from cosim.plain_rotation import triple, turned
 from cosim.ports import Floats, Vector3, Vector4, parameter
 from cosim.units import Metre, MetrePerSecond, Number, Radian, Second
 
@@ -111,7 +112,7 @@ class Params:
 
     def check(self) -> None:
         """Raise UnusableHandover, with all faults, if this is no handover that can be done."""
-        faults = self._place_faults() + self._velocity_faults()
+        faults = self._place_faults() + self._velocity_faults() + self._time_faults()
         if faults:
             raise UnusableHandover(faults)
 
@@ -156,3 +157,11 @@ class Params:
                     f"{name} = {v:g} m/s must exceed gate_speed = {self.gate_speed:g} m/s, or rest itself trips it"
                 )
         return faults
+
+    def _time_faults(self) -> list[str]:
+        times = ("settle_time", "gripper_time", "signal_time") + ("pause",) * (self.task is HandoverTask.COLLABORATIVE)
+        return [
+            f"{name} = {getattr(self, name):g} s must not exceed patience = {self.patience:g} s, or it gives up first"
+            for name in times
+            if self.task is not HandoverTask.HOLD and not getattr(self, name) <= self.patience
+        ]

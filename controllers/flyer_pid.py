@@ -18,11 +18,11 @@ class PidGains:
     k_D: float
 
     def faults(self, name: str) -> list[str]:
-        """Return what keeps the continuous loop of a free body from being stable: Routh's k_P k_D > k_I."""
+        """Return what keeps the continuous loop of a free body from being stable: Routh's k_P k_D > k_I >= 0."""
         if not (self.k_P > 0.0 and self.k_D > 0.0):
             return [f"{name}: k_P = {self.k_P:g} and k_D = {self.k_D:g} must be positive"]
-        if not self.k_P * self.k_D > self.k_I:
-            return [f"{name}: k_I = {self.k_I:g} must be less than k_P k_D = {self.k_P * self.k_D:g} 1/s3"]
+        if not 0.0 <= self.k_I < self.k_P * self.k_D:
+            return [f"{name}: k_I = {self.k_I:g} must be from 0 to less than k_P k_D = {self.k_P * self.k_D:g} 1/s3"]
         return []
 
     def scaled(self, factor: float) -> "PidGains":

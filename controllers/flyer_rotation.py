@@ -1,15 +1,11 @@
-"""Rotations as plain floats: for three numbers numpy costs ten times the arithmetic."""
+"""Orientations of a free-flyer and the turns between them, as plain floats."""
 
 import math
 
 import numpy as np
 
+from cosim.plain_rotation import Quaternion, Rows, Triple, inverse, product
 from cosim.ports import Floats
-
-Triple = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-Rows = tuple[float, float, float, float, float, float, float, float, float]
-"""A matrix, row by row."""
 
 
 class UnusableOrientation(ValueError):
@@ -46,40 +42,9 @@ def rows_of(q: Quaternion) -> Rows:
     return 1.0 - yy - zz, xy - sz, xz + sy, xy + sz, 1.0 - xx - zz, yz - sx, xz - sy, yz + sx, 1.0 - xx - yy
 
 
-def turned(R: Rows, v: Triple) -> Triple:
-    """Return R v."""
-    a, b, c, d, e, f, g, h, i = R
-    x, y, z = v
-    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
-
-
-def turned_back(R: Rows, v: Triple) -> Triple:
-    """Return R^T v."""
-    a, b, c, d, e, f, g, h, i = R
-    x, y, z = v
-    return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
-
-
-def cross(a: Triple, b: Triple) -> Triple:
-    """Return a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return q_AC of q_AB and q_BC."""
-    a, b, c, d = p
-    s, x, y, z = q
-    return (
-        a * s - b * x - c * y - d * z,
-        a * x + b * s + c * z - d * y,
-        a * y - b * z + c * s + d * x,
-        a * z + b * y - c * x + d * s,
-    )
-
-
 def seen_from(p: Quaternion, q: Quaternion) -> Quaternion:
     """Return q_AC of q_BA and q_BC: the turn from the one to the other."""
-    return product((p[0], -p[1], -p[2], -p[3]), q)
+    return product(inverse(p), q)
 
 
 def rotation_vector(q: Quaternion) -> Triple:
@@ -113,20 +78,3 @@ def quaternion_about(phi: Triple) -> Quaternion:
         return 1.0, x / 2.0, y / 2.0, z / 2.0
     f = math.sin(angle / 2.0) / angle
     return math.cos(angle / 2.0), f * x, f * y, f * z
-
-
-def norm(v: Triple) -> float:
-    """Return the length of v."""
-    return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-
-
-def rows(M: Floats) -> Rows:
-    """Return a (3, 3) array's entries."""
-    a, b, c, d, e, f, g, h, i = np.asarray(M, dtype=np.float64).reshape(9).tolist()
-    return a, b, c, d, e, f, g, h, i
-
-
-def triple(v: Floats) -> Triple:
-    """Return a (3,) array's entries."""
-    x, y, z = v.tolist()
-    return x, y, z

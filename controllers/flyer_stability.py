@@ -1,5 +1,6 @@
 """Whether a free-flyer's control loop is stable at its rate and delay, and what would make it so."""
 
+import math
 from collections.abc import Callable
 
 from controllers.flyer_body import FlyerBody
@@ -28,6 +29,9 @@ def stability_faults(
         delay: time from a measurement to the command's arrival at the propulsion, s.
         lag: time constant of the propulsion, s.
     """
+    times = (("delay", delay), ("lag", lag))
+    if faults := [f"{name} = {x:g} s must be finite and not negative" for name, x in times if not 0.0 <= x < math.inf]:
+        return faults
     plant = body.linear_plant(lag)
 
     def radius(factor: float, later: float) -> float:

@@ -2,7 +2,7 @@
 
 import math
 
-from controllers.flyer_rotation import Triple, norm
+from cosim.plain_rotation import Triple, norm
 
 
 class VelocityMonitor:

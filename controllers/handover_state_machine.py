@@ -10,18 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from controllers.flyer_handover_parameters import NAME, HandoverTask, Params, UnusableHandover
-from controllers.flyer_rotation import (
-    Quaternion,
-    Triple,
-    angle_between,
-    cross,
-    norm,
-    rows_of,
-    triple,
-    turned,
-    unit_quaternion,
-)
+from controllers.flyer_rotation import angle_between, rows_of, unit_quaternion
 from controllers.flyer_velocity_monitor import VelocityMonitor
+from cosim.plain_rotation import Quaternion, Triple, cross, norm, triple, turned
 from cosim.ports import Vector3, Vector4, output, port
 from cosim.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
@@ -85,9 +76,8 @@ class HandoverStateMachine:
     """Leads through a handover by the states of figure 3.1.
 
     - Robot to human, figure 3.2: OPEN_GRIPPER, MOVE_TO_OBJECT (at the end straight ahead, for what is touched floats
-      away), GRASP_OBJECT, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE,
-      SIGNAL, CHECK_VELOCITY until the gripper is faster than release_velocity, RELEASE_OBJECT, DEACTIVATE_IMPEDANCE,
-      RETREAT, DONE.
+      away), GRASP_OBJECT, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until the gripper is faster than
+      release_velocity, RELEASE_OBJECT, DEACTIVATE_IMPEDANCE, RETREAT, DONE.
     - Human to robot, figure 3.3: OPEN_GRIPPER, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until it
       is faster than receive_velocity, CLOSE_GRIPPER, CHECK_ANGLE; above angle_threshold it holds the object and goes on
       as above, else the reception has failed: OPEN_GRIPPER, and from SIGNAL again.
@@ -102,7 +92,8 @@ class HandoverStateMachine:
     is not between the fingers.
 
     Raises:
-        UnusableHandover: by the constructor, for goals out of reach or thresholds that cannot work; all are named.
+        UnusableHandover: by the constructor, for goals out of reach, or thresholds or times that cannot work; all are
+            named.
         UnusableOrientation: the estimated attitude is zero or not finite.
     """
 

@@ -11,21 +11,10 @@ from controllers.flyer_astrobee import ARM, INERTIA, MASS
 from controllers.flyer_behaviour import Behaviour
 from controllers.flyer_body import FlyerBody
 from controllers.flyer_gains import ImpedanceGains, published_gains
-from controllers.flyer_rotation import (
-    Triple,
-    cross,
-    norm,
-    rotation_vector,
-    rows,
-    rows_of,
-    seen_from,
-    triple,
-    turned,
-    turned_back,
-    unit_quaternion,
-)
+from controllers.flyer_rotation import rotation_vector, rows_of, seen_from, unit_quaternion
 from controllers.flyer_stability import UnusableController, stability_faults
 from controllers.sampled_loop import SampledLoop
+from cosim.plain_rotation import ZERO, cross, norm, rows, triple, turned, turned_back
 from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
 from cosim.units import (
     Kilogram,
@@ -45,7 +34,6 @@ from cosim.units import (
 )
 
 _NAME = "ImpedanceController"
-_NONE: Triple = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +115,7 @@ class ImpedanceController:
 
     At construction the loop near the goal (12 states, 18 with a lag) is closed at the period with python-control, with
     the expected delay and lag but without saturation. Rigid and with the default lag it bears a delay of 16 ms, without
-    lag 26 ms.
+    lag 26 ms. The period is that of Astrobee's software, 1/62.5 s; sec. 4.1.2 prints 67.5 Hz.
 
     Raises:
         UnusableController: by the constructor, for an impossible body, gains that are not positive definite, or a loop
@@ -182,7 +170,7 @@ class ImpedanceController:
         e = (g_x - p_x - r_x, g_y - p_y - r_y, g_z - p_z - r_z)
         q_DB = seen_from(q_WD, q_WB)
         phi = rotation_vector(q_DB)
-        f, tau = _NONE, _NONE
+        f, tau = ZERO, ZERO
         if u.active:
             w = triple(u.w_WB_meas)
             v_x, v_y, v_z = u.v_WB_meas.tolist()

@@ -18,9 +18,28 @@ from controllers.reflex_visibility import Recovery, Visibility, displaced
 from cosim.ports import Floats, Vector2, Vector3, output, port
 from cosim.units import Metre, Number, Radian, SquareMetre, Tick
 
-__all__ = ["Inputs", "IrReflex", "Outputs", "Params", "Phase", "Stop", "Strategy", "UnusableReflex", "Visibility"]
+__all__ = [
+    "Inputs",
+    "IrReflex",
+    "Outputs",
+    "Params",
+    "Phase",
+    "Stop",
+    "Strategy",
+    "UnusableReading",
+    "UnusableReflex",
+    "Visibility",
+]
 
-_PERIOD = Fraction(3, 200)
+_PERIOD = Fraction(3, 200)  # one round of the three sensors, at 5 ms each (assumed)
+
+
+class UnusableReading(ValueError):
+    """An input that is no number; `faults` names all of them."""
+
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("IrReflex: " + "; ".join(faults))
+        self.faults = faults
 
 
 class Phase(enum.IntEnum):
@@ -39,7 +58,11 @@ class Phase(enum.IntEnum):
 
 
 class Stop(enum.IntEnum):
-    """Why the refinement ended: the cost is small, steps or recoveries are used up, no progress, or none was wanted."""
+    """Why the refinement ended.
+
+    The cost is small, steps or recoveries are used up, there is no progress, no finger sees the object, or none of it
+    was wanted.
+    """
 
     RUNNING = 0
     THRESHOLD = 1
@@ -87,16 +110,19 @@ class IrReflex:
     - REACH: to the pre-grasp pose. Then BLIND closes at once and FORWARD after going forward_distance ahead.
     - CHECK: all fingers see the object: PROBE. None does: APPROACH. Some do: RECOVER (see `Recovery`). A finger that is
       not in the cost is given two closing motions to see, and no more: it may lag behind however long.
-    - PROBE: each input in turn, and back. Every probe_every steps; between, Broyden's update of J.
+    - PROBE: each input in turn, and back, by its probing move, be it beyond the reach. Every probe_every steps;
+      between, Broyden's update of J.
     - STEP: x + alpha dx within max_step and the reach. A step that raises f is taken back and alpha halved.
-    - CLOSE: when f is at most the threshold, or at the best pose if steps, recoveries or progress end (`Stop`).
+    - CLOSE: when f is at most the threshold, or at the best pose if steps, recoveries or progress end (`Stop`). A
+      hand whose recoveries end with the object out of sight closes where it is: it may have pushed the object along.
     - PULL, SHAKE, DONE: pull_distance back, then a sine across.
 
     The residuals are r_i = weight_i (d_i - target) over fingers with a weight: with the printed r_i = d_i the least
     cost is at contact, where the fingers push the object away.
 
     Raises:
-        UnusableReflex: values that contradict each other or are out of range; all faults are named.
+        UnusableReflex: by the constructor, for values that contradict each other or are out of range; all are named.
+        UnusableReading: by `step`, for inputs that are not finite; all are named.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -140,6 +166,7 @@ class IrReflex:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Go on with the move under way; when it is over, decide on the next one by its reading."""
+        _refuse(u)
         if self._phase is Phase.SHAKE:
             self._shake()
         elif self._phase is not Phase.DONE:
@@ -241,7 +268,7 @@ class IrReflex:
         self._go(Phase.CHECK, self._move.goal, self.params.scans)
 
     def _close(self, stop: Stop) -> None:
-        """Grasp the object: here, or, if the cost is not small, from the best pose known."""
+        """Grasp the object: here, or, if the cost is not small but fingers still see, from the best pose known."""
         self._stop = stop
         x = self._descent.best if stop in (Stop.STALLED, Stop.PATIENCE) and self._descent.best else self._move.goal
         self._go(Phase.CLOSE, (*x[:3], 1.0), 0, self.params.closing_time)
@@ -293,6 +320,14 @@ class IrReflex:
         self._phase, self._stop = Phase(phase), Stop(stop)
         for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
             part.set_state(saved)
+
+
+def _refuse(u: Inputs) -> None:
+    """Raise UnusableReading for what is no number: no move would ever arrive, and no finger would ever see."""
+    told = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
+    wrong = [name for name, values in told.items() if not all(map(math.isfinite, values))]
+    if wrong:
+        raise UnusableReading([f"{name} must be finite, not {told[name]}" for name in wrong])
 
 
 def _periods(time: float) -> int:

@@ -12,24 +12,10 @@ from controllers.flyer_astrobee import ARM, INERTIA, MASS
 from controllers.flyer_body import FlyerBody
 from controllers.flyer_pid import PidGains, pid_law
 from controllers.flyer_profile import Bounds, Profile, Reference, profile_between
-from controllers.flyer_rotation import (
-    Quaternion,
-    Rows,
-    Triple,
-    angle_between,
-    cross,
-    norm,
-    rotation_vector,
-    rows,
-    rows_of,
-    seen_from,
-    triple,
-    turned,
-    turned_back,
-    unit_quaternion,
-)
+from controllers.flyer_rotation import angle_between, rotation_vector, rows_of, seen_from, unit_quaternion
 from controllers.flyer_stability import UnusableController, stability_faults
 from controllers.sampled_loop import SampledLoop
+from cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, norm, rows, triple, turned, turned_back
 from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
 from cosim.units import (
     Kilogram,
@@ -50,7 +36,6 @@ from cosim.units import (
 )
 
 _NAME = "PoseController"
-_STILL: Triple = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,7 +195,7 @@ class PoseController:
         p, goal, R_WB = triple(u.p_WB_meas), triple(u.p_WG_goal), rows_of(q_WB)
         r_x, r_y, r_z = turned(R_WB, self._p_BG)
         e = (goal[0] - p[0] - r_x, goal[1] - p[1] - r_y, goal[2] - p[2] - r_z)
-        f, tau = _STILL, _STILL
+        f, tau = ZERO, ZERO
         if u.active:
             v = triple(u.v_WB_meas)
             reference = self._way(p, v, q_WB, goal, q_goal).at(self._elapsed * self._T)
@@ -243,8 +228,8 @@ class PoseController:
         self._profile: Profile | None = None
         self._elapsed = 0
         self._goal: tuple[Triple, Quaternion] | None = None
-        self._sum_e: Triple = _STILL
-        self._sum_phi: Triple = _STILL
+        self._sum_e: Triple = ZERO
+        self._sum_phi: Triple = ZERO
 
     def _way(self, p: Triple, v: Triple, q_WB: Quaternion, goal: Triple, q_goal: Quaternion) -> Profile:
         """Return the way to the goal: the one under way, or one from here.

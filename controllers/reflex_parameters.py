@@ -34,8 +34,8 @@ class Strategy(enum.IntEnum):
 class Params:
     """Vectors of four are in the order of the control inputs p_x (m), p_y (m), yaw (rad), sigma (1).
 
-    All values but the sensors' range, the fingers in the cost and the pull are own choices: the source does not give
-    them. `literal` takes eqs. (4) and (9) as printed: the residual is the distance itself, every step is probed anew,
+    All values but the sensors' range and the fingers in the cost are own choices: the source does not give them.
+    `literal` takes eqs. (4) and (9) as printed: the residual is the distance itself, every step is probed anew,
     and threshold_literal ends it.
     """
 

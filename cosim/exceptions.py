@@ -1,8 +1,11 @@
 """What can be wrong with a file, a wiring or a running unit; each carries its data and says what would be right."""
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+_STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
@@ -17,9 +20,9 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 
 def last_line(log: Iterable[str]) -> str:
-    """Return the last line of a log that says anything: of a traceback, what was raised."""
+    """Return the last line of a log that says anything, without status and call: of a traceback, what was raised."""
     lines = [line.strip() for entry in log for line in entry.splitlines() if line.strip()]
-    return lines[-1] if lines else ""
+    return _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
 
 
 class CosimError(Exception):

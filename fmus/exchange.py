@@ -78,8 +78,16 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     arrays = [(s.variable, s.variable.shape, buffers.array(s, writeable=True)) for s in reals[len(scalars) :]]
     slots = [s for buffer in NOT_REAL for s in layout.of(Causality.OUTPUT, buffer)]
     others = [(s.variable, _writer(buffers, s)) for s in slots]
+    write_exact = _exact_writer(buffers, [*reals[len(scalars) :], *slots])
 
     def write(y: Any) -> None:
+        try:
+            write_scalars(y)
+            write_exact(y)
+        except (struct.error, TypeError, ValueError, OverflowError):
+            write_with_care(y)
+
+    def write_with_care(y: Any) -> None:
         try:
             write_scalars(y)
         except struct.error:
@@ -98,6 +106,36 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
                 raise UnfitOutput(variable, value) from error
 
     return write
+
+
+def _exact_writer(buffers: Buffers, slots: Sequence[Slot]) -> Callable[[Any], None]:
+    """Return a function that writes outputs of the very types that are declared.
+
+    It raises TypeError for others, which may still be some that can be taken, as an array of whole numbers is. Written
+    out, the checks take half the time of a loop over variables.
+    """
+    names: dict[str, Any] = {"array": np.ndarray, "real": np.dtype(np.float64)}
+    lines: list[str] = []
+    for i, slot in enumerate(slots):
+        inexact, write = _exact_statement(buffers, slot, i, names)
+        lines += [f"y{i} = x.{slot.variable.name}", f"if {inexact}: raise TypeError", write]
+    return _compiled("\n    ".join(lines) or "pass", names)
+
+
+def _exact_statement(buffers: Buffers, slot: Slot, i: int, names: dict[str, Any]) -> tuple[str, str]:
+    """Return the condition under which output y<i> is inexact and the statement that writes it."""
+    at, v = slot.offset, slot.variable
+    if slot.buffer is Buffer.FLOAT64:
+        names[f"to{i}"], names[f"shape{i}"] = buffers.array(slot, writeable=True), v.shape
+        inexact = f"y{i}.__class__ is not array or y{i}.shape != shape{i} or y{i}.dtype is not real"
+        return inexact, f"to{i}[...] = y{i}"
+    if slot.buffer in (Buffer.BOOLEAN, Buffer.INT64):
+        is_boolean = slot.buffer is Buffer.BOOLEAN
+        names[f"to{i}"] = buffers.booleans if is_boolean else buffers.integers
+        names[f"type{i}"] = bool if is_boolean else v.enumeration or int
+        return f"y{i}.__class__ is not type{i}", f"to{i}[{at}] = y{i}"
+    names[f"put{i}"] = _writer(buffers, slot)
+    return "False", f"put{i}(y{i})"
 
 
 def _scalar_reader(buffers: Buffers, reals: Sequence[Slot], names: Sequence[str]) -> Callable[[Any], None]:

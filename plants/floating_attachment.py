@@ -2,31 +2,16 @@
 
 from dataclasses import dataclass
 
-from plants.floating_rotation import (
-    IDENTITY,
-    ZERO,
-    Nine,
-    Quadruple,
-    Triple,
-    along,
-    between,
-    cross,
-    inverse,
-    matrix_of,
-    minus,
-    plus,
-    product,
-    turned,
-    turned_back,
-)
+from cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, inverse, product, turned, turned_back
+from plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
 
 
 class Frame:
     """Pose and velocity of a thing that holds, all in world coordinates; R is the matrix of q."""
 
-    def __init__(self, p: Triple, q: Quadruple, v: Triple = ZERO, w: Triple = ZERO) -> None:
+    def __init__(self, p: Triple, q: Quaternion, v: Triple = ZERO, w: Triple = ZERO) -> None:
         self.p, self.q, self.v, self.w = p, q, v, w
-        self.R: Nine = matrix_of(q)
+        self.R: Rows = matrix_of(q)
 
 
 @dataclass(frozen=True)
@@ -70,12 +55,12 @@ class Attachment:
     """
 
     def __init__(
-        self, stiffness: Stiffness, r: Triple = ZERO, place: Triple = ZERO, turn: Quadruple = IDENTITY
+        self, stiffness: Stiffness, r: Triple = ZERO, place: Triple = ZERO, turn: Quaternion = IDENTITY
     ) -> None:
         self.stiffness = stiffness
         self.r, self.place, self.turn = r, place, turn
 
-    def load(self, F: Frame, p: Triple, q: Quadruple, R: Nine) -> tuple[Triple, Triple]:
+    def load(self, F: Frame, p: Triple, q: Quaternion, R: Rows) -> tuple[Triple, Triple]:
         """Return force and torque on an object at p, q (R its matrix) that does not move, in its own frame."""
         s = self.stiffness
         arm = turned(F.R, self.place)
@@ -89,7 +74,7 @@ class Attachment:
         c_turn = s.c_turn
         return f, (k_turn * x + c_turn * tx, k_turn * y + c_turn * ty, k_turn * z + c_turn * tz)
 
-    def give_way(self, F: Frame, p: Triple, q: Quadruple, force_share: float, torque_share: float) -> None:
+    def give_way(self, F: Frame, p: Triple, q: Quaternion, force_share: float, torque_share: float) -> None:
         """Move place and turn towards where the object is, so that these shares of the displacements are left."""
         if force_share < 1.0:
             there = turned_back(F.R, minus(plus(p, turned(matrix_of(q), self.r)), F.p))

@@ -4,22 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cosim.plain_rotation import ZERO, Rows, Triple, cross, norm, product, turned, turned_back
 from cosim.ports import Floats
 from plants.floating_attachment import Attachment, Frame, Palm
-from plants.floating_rotation import (
-    ZERO,
-    Nine,
-    Triple,
-    along,
-    cross,
-    length,
-    matrix_of,
-    product,
-    turn_by,
-    turned,
-    turned_back,
-    unit,
-)
+from plants.floating_rotation import along, matrix_of, turn_by, unit
 from plants.rigid_body import RigidBody
 
 Six = tuple[float, float, float, float, float, float]
@@ -143,7 +131,7 @@ class FloatingObject:
             self._kept[key] = np.linalg.inv(masses).tolist()
         return self._kept[key]
 
-    def _move(self, h: float, R: Nine, nu: Six) -> None:
+    def _move(self, h: float, R: Rows, nu: Six) -> None:
         body = self.body
         w = nu[3:]
         body.v = turned(R, nu[:3])
@@ -204,7 +192,7 @@ def _tightened(
     for a, (f, tau), (s, s_turn), (s_0, s_turn_0, f_0, tau_0) in zip(
         attachments, wrenches, scales, before, strict=True
     ):
-        F, T = length(f), length(tau)
+        F, T = norm(f), norm(tau)
         tighter.append(
             (_scale(s, F, s_0, f_0, a.stiffness.f_max), _scale(s_turn, T, s_turn_0, tau_0, a.stiffness.tau_max))
         )

@@ -1,7 +1,8 @@
 """The gripper of a free-flyer: two fingers that close along z of G around an object, and a palm behind them."""
 
+from cosim.plain_rotation import Rows, Triple, cross, inverse, product, turned, turned_back
 from plants.floating_attachment import Attachment, Frame, Palm, Stiffness
-from plants.floating_rotation import Nine, Triple, cross, inverse, matrix_of, minus, plus, product, turned, turned_back
+from plants.floating_rotation import matrix_of, minus, plus
 from plants.flyer_hand_parameters import Params
 from plants.rigid_body import RigidBody
 
@@ -15,8 +16,8 @@ class FlyerGripper:
     The gripper opens towards -x of G. The object's centre line, its long axis y, is within reach of the fingers where
     its point nearest to G is at most capture_axial and capture_lateral away along x and z of G, and G at most
     capture_end beyond its end. An object that is held keeps the pose that it had when the fingers closed, drawn to the
-    fingers' middle in x and z with the time constant centring_time, until the fingers have
-    opened by release_angle or it slides out of their reach.
+    fingers' middle in x and z with the time constant centring_time, until the fingers have opened by release_angle or
+    it slides out of their reach.
     """
 
     def __init__(self, params: Params) -> None:
@@ -32,7 +33,7 @@ class FlyerGripper:
             p.grip_torque_max,
         )
         self._angle_object = p.angle_object
-        self.angle = p.angle_open
+        self.angle = p.angle_0
         self.grip: Attachment | None = None
 
     def act(self, dt: float, closure: float, G: Frame, body: RigidBody) -> None:
@@ -77,6 +78,10 @@ class FlyerGripper:
         palm = self.palm(G, body)
         return palm is not None and palm.depth > 0.0
 
+    def crushes(self, G: Frame, body: RigidBody) -> bool:
+        """Return whether an object is between fingers that are closed further than it is thick."""
+        return self.angle < self._angle_object and self._reaches(G, body)
+
     def _reaches(self, G: Frame, body: RigidBody) -> bool:
         p, (_, (x, y, z)) = self._p, self._nearest(G, body, matrix_of(body.q))
         return abs(x) <= p.capture_axial and abs(y) <= p.capture_end and abs(z) <= p.capture_lateral
@@ -88,7 +93,7 @@ class FlyerGripper:
         s, place = self._nearest(G, body, matrix_of(body.q))
         return Attachment(self.stiffness, (0.0, s, 0.0), place, product(inverse(G.q), body.q))
 
-    def _nearest(self, G: Frame, body: RigidBody, R: Nine) -> tuple[float, Triple]:
+    def _nearest(self, G: Frame, body: RigidBody, R: Rows) -> tuple[float, Triple]:
         """Return where on the centre line the point nearest to G lies, seen from the centre, and the point in G."""
         axis = (R[1], R[4], R[7])
         d = minus(G.p, body.p)

@@ -2,27 +2,9 @@
 
 import pickle
 
-import numpy as np
-
+from cosim.plain_rotation import ZERO, Quaternion, Triple, cross, inverse, norm, product, triple, turned, turned_back
 from plants.floating_attachment import Attachment, Frame, Stiffness
-from plants.floating_rotation import (
-    IDENTITY,
-    ZERO,
-    Quadruple,
-    Triple,
-    along,
-    between,
-    cross,
-    inverse,
-    length,
-    matrix_of,
-    minus,
-    plus,
-    product,
-    triple,
-    turned,
-    turned_back,
-)
+from plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
 from plants.flyer_hand_parameters import Params
 from plants.hand_tremor import HandTremor
 from plants.rigid_body import RigidBody
@@ -40,7 +22,7 @@ class FlyerHand:
     damping times depth and speed, at most arm_force_max.
     """
 
-    def __init__(self, params: Params, p: Triple, q: Quadruple) -> None:
+    def __init__(self, params: Params, p: Triple, q: Quaternion) -> None:
         self._p = params
         self._arm = Stiffness(
             params.arm_stiffness,
@@ -60,7 +42,7 @@ class FlyerHand:
         )
         self._shake, self._rest, self._led = ZERO, p, p
         self.p, self.q = p, q
-        self.p_OH, self.q_OH = triple(np.asarray(params.p_OH).tolist()), IDENTITY
+        self.p_OH, self.q_OH = triple(params.p_OH), IDENTITY
         self.course = Frame(p, q)
         self.hold: Attachment | None = None
 
@@ -69,11 +51,11 @@ class FlyerHand:
         """Where the hand is, without its tremor."""
         return minus(self.p, self._shake)
 
-    def move(self, dt: float, p: Triple, q: Quadruple) -> Frame:
+    def move(self, dt: float, p: Triple, q: Quaternion) -> Frame:
         """Return the course at the end of a step that leads to a pose, without tremor, where nothing is in the way."""
         self._recover(dt)
         self._tremor.advance(dt)
-        self._shake = triple(self._tremor.displacement.tolist())
+        self._shake = triple(self._tremor.displacement)
         led, self._led = self._led, plus(p, self._shake)
         return _led(dt, led, self._led, q)
 
@@ -102,7 +84,7 @@ class FlyerHand:
             place, turn = turned_back(F.R, minus(self.p, F.p)), product(inverse(F.q), body.q)
             self.hold = Attachment(self._arm, self.p_OH, place, turn)
         elif self.hold is not None:
-            stretched = length(minus(self.p, self._rest)) > self._p.arm_reach + _SPARE
+            stretched = norm(minus(self.p, self._rest)) > self._p.arm_reach + _SPARE
             if not wants or stretched:
                 self.hold = None
 
@@ -139,5 +121,5 @@ class FlyerHand:
         self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH = places
 
 
-def _led(dt: float, before: Triple, p: Triple, q: Quadruple) -> Frame:
+def _led(dt: float, before: Triple, p: Triple, q: Quaternion) -> Frame:
     return Frame(p, q, ((p[0] - before[0]) / dt, (p[1] - before[1]) / dt, (p[2] - before[2]) / dt))

@@ -116,6 +116,7 @@ class Params:
     capture_end: Metre = parameter(0.01, "how far beyond an object's end G may be", minimum=0.0, maximum=0.1)
     angle_open: Radian = parameter(1.20, "angle of the open gripper", minimum=0.0, maximum=3.0)
     angle_empty: Radian = parameter(0.60, "angle of the gripper closed on nothing", minimum=0.0, maximum=3.0)
+    angle_0: Radian = parameter(1.20, "angle of the gripper at the start", minimum=0.0, maximum=3.0)
     aperture: Metre = parameter(0.055, "thickness that the open gripper just takes", minimum=0.001, maximum=0.5)
     release_angle: Radian = parameter(
         0.20, "how far the fingers open before the object comes free", minimum=0.0, maximum=3.0
@@ -159,6 +160,11 @@ class Params:
         faults: list[str] = []
         if not self.angle_empty < self.angle_open:
             faults.append(f"angle_empty {self.angle_empty:g} rad must be less than angle_open {self.angle_open:g} rad")
+        if not self.angle_empty <= self.angle_0 <= self.angle_open:
+            faults.append(
+                f"angle_0 {self.angle_0:g} rad must lie between angle_empty {self.angle_empty:g} rad and angle_open "
+                f"{self.angle_open:g} rad"
+            )
         if self.angle_object + self.release_angle > self.angle_open:
             faults.append(
                 f"the object never comes free: the fingers hold it at {self.angle_object:g} rad and must open by "

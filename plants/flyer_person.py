@@ -6,20 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.plain_rotation import Quaternion, Triple, norm, product, triple, turned
 from plants.floating_attachment import Frame
-from plants.floating_rotation import (
-    Quadruple,
-    Triple,
-    along,
-    between,
-    length,
-    minus,
-    plus,
-    product,
-    quadruple,
-    triple,
-    turned,
-)
+from plants.floating_rotation import along, between, minus, plus, quaternion
 from plants.flyer_hand_parameters import Motion, Params, StartHolder
 
 _PEAK = 1.875
@@ -55,9 +44,9 @@ class Seen:
     gripped: bool
     held: bool
     p_WH: Triple
-    q_WH: Quadruple
+    q_WH: Quaternion
     p_OH: Triple
-    q_OH: Quadruple
+    q_OH: Quaternion
 
 
 class FlyerPerson:
@@ -76,13 +65,12 @@ class FlyerPerson:
         self._p = params
         self._rng = np.random.default_rng([params.seed, 1])
         pull = np.asarray(params.pull_direction) / np.linalg.norm(params.pull_direction)
-        self._pull = triple(pull.tolist())
-        self.rest = triple(np.asarray(params.p_WH_0).tolist())
+        self._pull = triple(pull)
+        self.rest = triple(params.p_WH_0)
         q = np.asarray(params.q_WH_0) / np.linalg.norm(params.q_WH_0)
-        self._rest_q = quadruple(q.tolist())
-        self._end = triple(np.asarray(params.p_OH).tolist())
-        self._offered = triple(np.asarray(params.p_OG).tolist())
-        self._rng = np.random.default_rng([params.seed, 1])
+        self._rest_q = quaternion(q)
+        self._end = triple(params.p_OH)
+        self._offered = triple(params.p_OG)
         self.activity = Activity.WAIT
         self.p, self.q = self.rest, self._rest_q  # where the arm wants the hand, without tremor
         self.holding = params.object_with is StartHolder.HAND
@@ -154,7 +142,7 @@ class FlyerPerson:
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
             p, _ = goals[activity](seen)
-            self._duration = max(_SHORTEST, _PEAK * length(minus(p, self.p)) / self._p.reach_speed)
+            self._duration = max(_SHORTEST, _PEAK * norm(minus(p, self.p)) / self._p.reach_speed)
 
     def _waits(self, dt: float, seen: Seen) -> None:
         if not self._called:
@@ -175,7 +163,7 @@ class FlyerPerson:
         if self._motion is not Motion.PUSH and takes is self.holding:
             return False
         goal, _ = self._at_object(seen) if takes else self._at_palm(seen)
-        return length(minus(goal, self.rest)) <= self._p.arm_reach
+        return norm(minus(goal, self.rest)) <= self._p.arm_reach
 
     def _reaches(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
         self._follow(*self._at_object(seen))
@@ -234,7 +222,7 @@ class FlyerPerson:
         self._since = self._since + dt if there else 0.0
         return there and self._since >= self._reaction
 
-    def _follow(self, p: Triple, q: Quadruple) -> None:
+    def _follow(self, p: Triple, q: Quaternion) -> None:
         """Go on along a minimum-jerk course to a goal that may move."""
         s = minimum_jerk(self._clock / self._duration)
         self.p = along(self._from, s, minus(p, self._from))
@@ -247,11 +235,11 @@ class FlyerPerson:
         self._way = min(distance, self._way + dt * speed * x * x * (3.0 - 2.0 * x))
         self.p = along(self._from, self._way, axis)
 
-    def _at_object(self, seen: Seen) -> tuple[Triple, Quadruple]:
+    def _at_object(self, seen: Seen) -> tuple[Triple, Quaternion]:
         """Return the hand's pose at the object's end: the object's axes."""
         return plus(seen.O.p, turned(seen.O.R, self._end)), seen.O.q
 
-    def _at_palm(self, seen: Seen) -> tuple[Triple, Quadruple]:
+    def _at_palm(self, seen: Seen) -> tuple[Triple, Quaternion]:
         """Return the hand's pose where a push begins: with the object, p_OG in front of the palm; a fist, beside it."""
         p, G = self._p, seen.G
         front = p.palm_depth - p.offer_gap
@@ -262,7 +250,7 @@ class FlyerPerson:
         place = (front - 0.5 * float(p.object_size[0]) + x, y, z)
         return plus(G.p, turned(G.R, place)), q
 
-    def _at_rest(self, seen: Seen) -> tuple[Triple, Quadruple]:  # noqa: ARG002
+    def _at_rest(self, seen: Seen) -> tuple[Triple, Quaternion]:  # noqa: ARG002
         return self.rest, self._rest_q
 
 

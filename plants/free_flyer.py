@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cosim.plain_rotation import Triple, triple, turned
 from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
 from cosim.units import (
     Kilogram,
@@ -22,7 +23,7 @@ from cosim.units import (
     RadianPerSecond,
     Second,
 )
-from plants.floating_rotation import Triple, matrix_of, quadruple, triple, turned
+from plants.floating_rotation import matrix_of, quaternion
 from plants.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
 
 _HALF_A_TURN = math.pi
@@ -125,9 +126,9 @@ class FreeFlyer:
         params.check()
         self._substep, self._turn = params.substep, params.turn
         q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
-        places = [triple(np.asarray(a).tolist()) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
+        places = [triple(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
         p_BG, p_WB, v_WB, w_WB = places
-        self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quadruple(q.tolist()), v_WB, w_WB)
+        self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
         deviations = (params.position_noise, 0.5 * params.attitude_noise, params.velocity_noise, params.rate_noise)
         self._deviations = np.repeat(np.array(deviations, dtype=np.float64), 3)
         self._rng = np.random.default_rng(params.seed)
@@ -140,7 +141,7 @@ class FreeFlyer:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
-        wrench = triple(u.f_B.tolist()), triple(u.tau_B.tolist()), triple(u.f_G.tolist()), triple(u.tau_G.tolist())
+        wrench = triple(u.f_B), triple(u.tau_B), triple(u.f_G), triple(u.tau_G)
         h = dt / (count := self._substeps(dt))
         advance = self._body.advance
         for _ in range(count):

@@ -26,6 +26,9 @@ from cosim.units import (
 from plants.grasp_objects import SOLIDS, Solid, Thing, outlines
 from plants.infrared_sensor import InfraredSensor, UnusableSensor
 
+_LIGHTEST = 1e-3
+"""Least mass of an object, kg: contacts with much heavier phalanges fling away what is lighter."""
+
 
 class UnusableScene(ValueError):
     """Values of which no scene can be built; `faults` lists all of them."""
@@ -40,7 +43,7 @@ class Params:
     """Table, object, hand and sensors.
 
     [Luberto] states the operating range of the sensors, their converter (sec. V-B) and the form of their
-    characteristic, eq. (11), whose coefficients follow its fig. 8. All else is assumed; the shapes are in
+    characteristic, eq. (11). All else is assumed, the characteristic's coefficients too; the shapes are in
     `plants.grasp_hand` and `plants.grasp_objects`.
     """
 
@@ -115,9 +118,11 @@ class Params:
         return InfraredSensor(*coefficients, self.nearest, self.farthest, self.contact_share, self.incidence_exponent)
 
     def check(self) -> None:
-        """Raise UnusableScene, with all faults: ranges, an object beside the table, a characteristic not invertible."""
+        """Raise UnusableScene, with all faults: ranges, mass, an object beside the table, an unusable sensor."""
         faults = parameter_faults(self)
         if not faults:
+            if 0.0 < self.mass_O < _LIGHTEST:
+                faults.append(f"mass_O {self.mass_O:g} kg must be 0, for the thing's own, or at least {_LIGHTEST:g} kg")
             faults.extend(self._table_faults())
             try:
                 self.sensor()

@@ -36,6 +36,14 @@ class StepSizeError(ValueError):
         self.dt = dt
 
 
+class UnusableCommand(ValueError):
+    """A command that is no number; `faults` names the inputs."""
+
+    def __init__(self, faults: list[str]) -> None:
+        super().__init__("GraspScene: " + "; ".join(faults))
+        self.faults = faults
+
+
 @dataclass(kw_only=True)
 class Inputs:
     """What arm and hand are told."""
@@ -68,9 +76,10 @@ class GraspScene:
       of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left (`grasp_hand`). One elastic tendon,
       T = k max(0, sigma L - sum r q), turns all joints, so a blocked finger lets the others close further.
     - Object: rigid, with dry friction on the table and in the hand (`grasp_objects`).
-    - Sensors: on the distal phalanges, one active at a time, for 5 ms, in the order of the fingers; it is read at the
-      end of its time. A reading is the mean over three rays of the beam of `InfraredSensor.ticks`, plus noise,
-      rounded. At the start all three have been read. Only the object returns light.
+    - Sensors: on the distal phalanges, one active at a time (sec. V-B), for 5 ms (assumed), in the order of the
+      fingers; it is read at the end of its time. A reading is the mean over three rays of the beam of
+      `InfraredSensor.ticks`, plus noise, rounded. At the start all three have been read. Only the object returns
+      light, and no finger hides it.
 
     Contacts are solved by pymunk, in steps of 1 ms; a step of the block is a multiple of that. pymunk's solver starts
     from impulses that it does not give away. So that a state is complete, the world is made anew of its positions and
@@ -80,6 +89,7 @@ class GraspScene:
         UnusableScene: by the constructor, for parameters of which no scene can be built, or a hand that would start
             in the object.
         StepSizeError: by `step`, for steps that are no multiple of 1 ms.
+        UnusableCommand: by `step`, for commands that are not finite; all are named.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
@@ -177,8 +187,12 @@ class GraspScene:
 
 def _command(u: Inputs) -> Command:
     """Return what is commanded, without negative zeros: equal commands are kept once."""
-    x, y = u.p_WH_cmd
-    return float(x) + 0.0, float(y) + 0.0, float(u.yaw_cmd) + 0.0, min(max(float(u.sigma_cmd), 0.0), 1.0) + 0.0
+    x, y, yaw, sigma = *u.p_WH_cmd.tolist(), float(u.yaw_cmd), float(u.sigma_cmd)
+    if not all(map(math.isfinite, (x, y, yaw, sigma))):
+        told = {"p_WH_cmd": (x, y), "yaw_cmd": (yaw,), "sigma_cmd": (sigma,)}
+        wrong = {name: values for name, values in told.items() if not all(map(math.isfinite, values))}
+        raise UnusableCommand([f"{name} must be finite, not {list(values)}" for name, values in wrong.items()])
+    return x + 0.0, y + 0.0, yaw + 0.0, min(max(sigma, 0.0), 1.0) + 0.0
 
 
 def _refuse_overlap(world: GraspWorld) -> None:

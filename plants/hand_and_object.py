@@ -10,25 +10,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from cosim.plain_rotation import ZERO, Triple, cross, norm, triple, turned
 from cosim.ports import Floats, Vector3, Vector4, Vector14, output, port
 from cosim.units import Metre, MetrePerSecond, Newton, NewtonMetre, Number, Radian, RadianPerSecond
 from plants.floating_attachment import Attachment, Frame
 from plants.floating_object import FloatingObject
-from plants.floating_rotation import (
-    ZERO,
-    Triple,
-    along,
-    between,
-    cross,
-    length,
-    matrix_of,
-    minus,
-    plus,
-    quadruple,
-    triple,
-    turned,
-    unit,
-)
+from plants.floating_rotation import along, between, matrix_of, minus, plus, quaternion, unit
 from plants.flyer_gripper import FlyerGripper
 from plants.flyer_hand import FlyerHand
 from plants.flyer_hand_parameters import Motion, Params, StartHolder, UnusableHand
@@ -116,7 +103,7 @@ class HandAndObject:
 
     Raises:
         UnusableHand: by the constructor, for parameters that contradict each other; by the first step, if the gripper
-            starts in the hand or has the free object in its palm.
+            starts in the hand or has the free object in its palm or its closed fingers.
         TurnsTooFast: see `RigidBody`.
     """
 
@@ -129,7 +116,7 @@ class HandAndObject:
         self._person = FlyerPerson(params)
         self._hand = FlyerHand(params, self._person.p, self._person.q)
         self._gripper = FlyerGripper(params)
-        self._object = FloatingObject(params.object_mass, triple(np.asarray(params.object_size).tolist()))
+        self._object = FloatingObject(params.object_mass, triple(params.object_size))
         self._robot: Frame | None = None
         self._f_G, self._tau_G, self._f_H = ZERO, ZERO, ZERO
         body = self._object.body
@@ -138,8 +125,8 @@ class HandAndObject:
             body.p = minus(self._hand.p, turned(matrix_of(body.q), self._hand.p_OH))
             self._hand.take_or_leave(True, body)
         else:
-            body.p = triple(np.asarray(params.p_WO_0).tolist())
-            body.q = unit(quadruple(np.asarray(params.q_WO_0).tolist()))
+            body.p = triple(params.p_WO_0)
+            body.q = unit(quaternion(params.q_WO_0))
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where everything is; no time passes."""
@@ -147,7 +134,7 @@ class HandAndObject:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
-        G = Frame(triple(u.p_WG.tolist()), quadruple(u.q_WG.tolist()), triple(u.v_WG.tolist()), triple(u.w_WB.tolist()))
+        G = Frame(triple(u.p_WG), quaternion(u.q_WG), triple(u.v_WG), triple(u.w_WB))
         if self._robot is None:
             self._refuse_overlap(G)
         before, body, person, hand = self._robot or G, self._object.body, self._person, self._hand
@@ -184,11 +171,16 @@ class HandAndObject:
 
     def _refuse_overlap(self, G: Frame) -> None:
         p, faults = self._p, list[str]()
-        apart = length(minus(self._hand.p, G.p))
+        apart = norm(minus(self._hand.p, G.p))
         if apart < p.fist_radius + p.palm_width:
             faults.append(f"the hand starts in the gripper, {apart:.3g} m from G; p_WH_0 must be farther away")
         if self._gripper.touches(G, self._object.body):
             faults.append("the object starts in the gripper's palm; move p_WO_0 or the robot's start")
+        if self._gripper.crushes(G, self._object.body):
+            faults.append(
+                f"the object starts between fingers that are closed further than it is thick: angle_0 {p.angle_0:g} "
+                f"rad; open them to {p.angle_object:.3g} rad at least, or move p_WO_0 or the robot's start"
+            )
         if faults:
             raise UnusableHand(faults)
 

@@ -28,8 +28,7 @@ class PymunkBody:
     @property
     def position(self) -> Point:
         """Position of the centre of mass, in m."""
-        x, y = self.body.position
-        return x, y
+        return self.body.position
 
     @property
     def angle(self) -> float:

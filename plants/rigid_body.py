@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from cosim.plain_rotation import ZERO, Quaternion, Triple, rows, turned, turned_back
 from cosim.ports import Floats
-from plants.floating_rotation import ZERO, Nine, Quadruple, Triple, matrix_of, turned, turned_back
+from plants.floating_rotation import matrix_of
 
 UNIT_TOLERANCE = 1e-6
 """How far the norm of a quaternion that is given may be from 1."""
@@ -45,12 +46,12 @@ class RigidBody:
     """
 
     def __init__(
-        self, mass: float, I_B: Floats, p_BG: Triple, p: Triple, q: Quadruple, v: Triple = ZERO, w: Triple = ZERO
+        self, mass: float, I_B: Floats, p_BG: Triple, p: Triple, q: Quaternion, v: Triple = ZERO, w: Triple = ZERO
     ) -> None:
         self.mass = mass
         self.p_BG = p_BG
-        self._inertia = _nine(np.asarray(I_B, dtype=np.float64))
-        self._inverse = _nine(np.asarray(np.linalg.inv(I_B), dtype=np.float64))
+        self._inertia = rows(np.asarray(I_B, dtype=np.float64))
+        self._inverse = rows(np.asarray(np.linalg.inv(I_B), dtype=np.float64))
         self.p, self.q, self.v = p, q, v
         R = matrix_of(q)
         self.spin: Triple = turned(R, turned(self._inertia, turned_back(R, w)))
@@ -106,7 +107,7 @@ class RigidBody:
         n = 1.0 / math.sqrt(square)
         self.q = (q0 * n, q1 * n, q2 * n, q3 * n)
 
-    def _rates(self, q: Quadruple, L: Triple, wrench: tuple[Triple, Triple, Triple, Triple]) -> _Rates:
+    def _rates(self, q: Quaternion, L: Triple, wrench: tuple[Triple, Triple, Triple, Triple]) -> _Rates:
         """Return v', L' and q'; written out, because this is where a run spends its time."""
         (fx, fy, fz), (tx, ty, tz), (gx, gy, gz), (sx, sy, sz) = wrench
         a, b, c, d = q
@@ -140,8 +141,10 @@ class RigidBody:
 def inertia_faults(mass: float, I_B: Floats) -> list[str]:
     """Return what is wrong with a mass in kg and an inertia about the centre of mass, (3, 3), in kg m^2."""
     faults: list[str] = []
-    if not mass > 0.0:
-        faults.append(f"mass {mass:g} kg must be positive")
+    if not 0.0 < mass < math.inf:
+        faults.append(f"mass {mass:g} kg must be positive and finite")
+    if not np.all(np.isfinite(I_B)):
+        return [*faults, f"I_B {np.asarray(I_B).tolist()} kg m2 must be finite"]
     if not np.allclose(I_B, np.transpose(I_B), rtol=0.0, atol=1e-9 * float(np.max(np.abs(I_B)))):
         return [*faults, f"I_B {np.asarray(I_B).tolist()} kg m2 must be symmetric"]
     small, middle, large = sorted(float(a) for a in np.linalg.eigvalsh(I_B))
@@ -161,13 +164,8 @@ def unit_faults(name: str, q: Floats) -> list[str]:
     return [f"{name} {np.asarray(q).tolist()} must be a unit quaternion; its norm is {norm:g}"]
 
 
-def _moved(q: Quadruple, L: Triple, h: float, k: _Rates) -> tuple[Quadruple, Triple]:
+def _moved(q: Quaternion, L: Triple, h: float, k: _Rates) -> tuple[Quaternion, Triple]:
     return (
         (q[0] + h * k[6], q[1] + h * k[7], q[2] + h * k[8], q[3] + h * k[9]),
         (L[0] + h * k[3], L[1] + h * k[4], L[2] + h * k[5]),
     )
-
-
-def _nine(matrix: Floats) -> Nine:
-    a, b, c, d, e, f, g, h, i = np.ravel(matrix).tolist()
-    return a, b, c, d, e, f, g, h, i

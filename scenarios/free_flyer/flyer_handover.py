@@ -87,7 +87,15 @@ class FlyerHandover(Experiment[HandoverWatch]):
         s.add("pose", fmu("pose"), p_BG=p_BG, delay=p.delay, lag=lag)
         s.add("thrusters", fmu("thrusters"), ideal=p.ideal, delay=p.delay)
         s.add("robot", fmu("robot"), seed=robot_seed, p_BG=p_BG, p_WB_0=at["p_WG_0"] - p_BG)
-        s.add("person", fmu("person"), seed=person_seed, p_WO_0=p_WO_0, arm_force_max=p.strength, **self.person)
+        s.add(
+            "person",
+            fmu("person"),
+            seed=person_seed,
+            p_WO_0=p_WO_0,
+            angle_0=float(at["angle_0"]),
+            arm_force_max=p.strength,
+            **self.person,
+        )
         wire_handover(s)
         return s
 

@@ -25,6 +25,10 @@ _FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
 """Signals, labels and lines; the object's is wide, since it goes with the gripper or the hand."""
 
 
+_WATCHING = ("SIGNAL", "CHECK_VELOCITY")
+"""Phases in which the threshold of the gripper's speed counts."""
+
+
 def draw_handover(parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
     """Draw all figures of a run into a folder; return them in the order of a report."""
     if len(record.time) < 2:
@@ -65,9 +69,10 @@ def _phase_names(record: Record) -> dict[int, str]:
 
 def _gripper(parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> Figure:
     published = paper_values("free_flyer", "published")
-    t = record.time
+    t, names_of = record.time, _phase_names(record)
+    watching = np.isin(record["decision.phase"], [code for code, name in names_of.items() if name in _WATCHING])
     with figure(folder / "gripper", 2, size=(9.0, 5.2)) as (angle, speed):
-        for axis, names in ((angle, _phase_names(record)), (speed, {})):
+        for axis, names in ((angle, names_of), (speed, {})):
             shade_phases(axis, t, record["decision.phase"], names)
             axis.set(xlim=(t[0], t[-1]))
         angle.plot(t, record["person.gripper_angle"], color=COLOURS[0])
@@ -77,18 +82,23 @@ def _gripper(parameters: Parameters, watch: HandoverWatch, record: Record, folde
         for transfer in watch.transfers:
             threshold = published[f"velocity_{transfer.receiver.lower()}"][parameters.behaviour]
             until = t[-1] if transfer.felt is None else transfer.felt
-            speed.hlines(threshold, transfer.signalled, until, color=COLOURS[1], lw=1.4)
+            shown = watching & (t >= transfer.signalled) & (t <= until)
+            speed.plot(t, np.where(shown, threshold, np.nan), color=COLOURS[1], lw=1.4)
         speed.set(ylabel="gripper speed (m/s)", xlabel="time (s)", ylim=(0, None))
-    caption = "Angle of the gripper, dashed: above it it counts as full; its speed, orange: at which the robot acts."
+    caption = (
+        "Angle of the gripper, dashed: above it it counts as full; its speed, orange: at which the robot would act."
+    )
     return Figure("gripper", caption)
 
 
 def _moments(watch: HandoverWatch, record: Record) -> dict[str, int]:
     """Return the rows of the start, of when the robot felt the person, and of the end, by their titles."""
-    felt = [transfer.felt for transfer in watch.transfers if transfer.felt is not None]
-    names = ("transfer", "return")
-    times = {"start": 0.0, **dict(zip(names, felt, strict=False)), "end": float(record.time[-1])}
-    return {f"{t:.1f} s, {title}": int(np.searchsorted(record.time, t)) for title, t in times.items()}
+    times = [(0.0, "start")]
+    for name, transfer in zip(("transfer", "return"), watch.transfers, strict=False):
+        times += [(t, "failed reception") for t in transfer.in_vain]
+        times += [] if transfer.felt is None else [(transfer.felt, name)]
+    times.append((float(record.time[-1]), "end"))
+    return {f"{t:.1f} s, {title}": int(np.searchsorted(record.time, t)) for t, title in times}
 
 
 def _scenes(watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:

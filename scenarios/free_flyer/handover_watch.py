@@ -79,7 +79,9 @@ class HandoverWatch(Watch):
     def _enter(self, phase: str, left: str, t: float, p_WG: tuple[float, float, float], speed: float) -> None:
         if phase == "ACTIVATE_IMPEDANCE" and self._arrival is None:
             self._arrival = (math.dist(p_WG, self._place), speed)
-        if phase == "SIGNAL" and self._under_way is None and len(self.transfers) < len(self.receivers):
+        if phase == "SIGNAL" and self._under_way is not None:
+            self._under_way.asked_again(t)
+        elif phase == "SIGNAL" and len(self.transfers) < len(self.receivers):
             self.transfers.append(Transfer(self.receivers[len(self.transfers)], t))
         if left == "CHECK_VELOCITY" and phase != "GIVEN_UP" and self._under_way is not None:
             self._under_way.felt, self._under_way.speed = t, speed
@@ -127,7 +129,7 @@ class HandoverWatch(Watch):
         told["failed_receptions"] = Metric(self._failed, "1", "receptions after which the gripper was found empty")
         if self._arrival is not None:
             told["arrival_error"] = Metric(self._arrival[0], "m", "gripper to its place when it began to yield")
-            told["arrival_speed"] = Metric(self._arrival[1], "m/s", "gripper's speed then")
+            told["arrival_speed"] = Metric(self._arrival[1], "m/s", "gripper's speed when it began to yield")
         share = self._saturated / max(self._steps, 1)
         told["saturated_share"] = Metric(share, "1", "share of the time for which the thrusters were at their limits")
         told |= self._stability
@@ -152,7 +154,7 @@ class HandoverWatch(Watch):
         if self._phase not in ("DONE", "GIVEN_UP"):
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done; {self._where}"
         if self._phase == "GIVEN_UP" and before == "CHECK_VELOCITY" and transfer is not None:
-            waited = self.phases[-1][1] - transfer.signalled
+            waited = self.phases[-1][1] - transfer.asked
             return (
                 f"the robot never felt a {_TOUCH[transfer.receiver]} within {waited:.0f} s of its signal: "
                 f"its gripper's speed stayed below {math.ceil(1000 * transfer.fastest) / 1000:.3f} m/s; {self._where}"
@@ -161,10 +163,10 @@ class HandoverWatch(Watch):
             return f"the robot gave up after {self._failed} failed receptions; {self._where}"
         if self._phase == "GIVEN_UP" and before == "GRASP_OBJECT":
             return f"the robot closed its gripper and found nothing in it; {self._where}"
-        if self._phase == "GIVEN_UP" and self._arrival is None:
+        if self._phase == "GIVEN_UP" and before == "MOVE_TO_HANDOVER":
             place = "(" + ", ".join(f"{x:.2f}" for x in self._place) + ")"
             nearest = f"the gripper came no nearer than {self._nearest:.2f} m to its place at {place} m"
-            return f"out of reach, or not at rest in time: {nearest} in phase {before}; {self._where}"
+            return f"out of reach, or not at rest in time: {nearest}; {self._where}"
         if self._phase == "GIVEN_UP":
             return f"the robot gave up in phase {before}; {self._where}"
         if self._failed != self.failures:

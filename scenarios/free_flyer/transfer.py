@@ -13,9 +13,11 @@ class Transfer:
     Attributes:
         receiver: who is to have the object, `HAND` or `GRIPPER`.
         signalled: when the robot first gave the signal for it, s.
-        felt: when the robot last took the gripper's speed for a pull, s; None before.
-        speed: the gripper's speed at that time, m/s.
-        fastest: the greatest speed while the robot waited for a pull, m/s.
+        asked: when it last gave it, s; later than `signalled` after a failed reception.
+        felt: when the robot took the gripper's speed for a pull or a push since, s; None before.
+        in_vain: when it had done so in receptions that failed, s.
+        speed: the gripper's speed when it was felt, m/s.
+        fastest: the greatest speed while the robot waited since it last asked, m/s.
         farthest: how far the gripper was from its place at most, from the signal for as long as it yields, m.
         farthest_along: the same along the axes of W.
         done: when the receiver had the object alone, s; None before.
@@ -23,12 +25,23 @@ class Transfer:
 
     receiver: str
     signalled: float
+    asked: float = field(init=False)
     felt: float | None = None
+    in_vain: list[float] = field(default_factory=list[float])
     speed: float = 0.0
     fastest: float = 0.0
     farthest: float = 0.0
     farthest_along: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     done: float | None = None
+
+    def __post_init__(self) -> None:
+        self.asked = self.signalled
+
+    def asked_again(self, t: float) -> None:
+        """Take note that the robot signals once more: what it had felt was in vain."""
+        if self.felt is not None:
+            self.in_vain.append(self.felt)
+        self.asked, self.felt, self.fastest = t, None, 0.0
 
     def displaced(self, p_WG: tuple[float, float, float], place: tuple[float, float, float]) -> None:
         """Take note of where the gripper is, and where it ought to be."""
@@ -45,12 +58,15 @@ class Transfer:
                 self.farthest, "m", f"gripper from its place at most, from the signal on, object to {whom}"
             ),
             **{
-                f"displacement_{axis}": Metric(away, "m", f"along {axis}, object to {whom}")
+                f"displacement_{axis}": Metric(
+                    away, "m", f"gripper from its place along {axis} at most, object to {whom}"
+                )
                 for axis, away in zip("xyz", self.farthest_along, strict=True)
             },
         }
         if self.felt is not None:
             told["speed"] = Metric(self.speed, "m/s", f"gripper's speed at which the robot {act}")
         if self.done is not None:
-            told["time"] = Metric(self.done - self.signalled, "s", f"from the signal until the {whom} has the object")
+            since = f"from the {'first ' if self.in_vain else ''}signal until the {whom} has the object"
+            told["time"] = Metric(self.done - self.signalled, "s", since)
         return {f"{prefix}_{name}": metric for name, metric in told.items()}

@@ -35,13 +35,15 @@ def draw_grasp(parameters: Parameters, moments: Mapping[str, float], record: Rec
 
 def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t, reflex = record.time, ReflexParams()
-    seen, true = record["reflex.distance"] * 1000, record["scene.range"] * 1000
     threshold = reflex.threshold_literal if parameters.literal else reflex.threshold
     with figure(folder / "distances", 2, size=(8.0, 5.6), heights=(3, 2)) as (above, below):
         for i, finger in enumerate(_FINGERS):
-            above.plot(t, seen[:, i], color=_OF_FINGER[i], drawstyle="steps-post", label=finger)
-            met = np.where(true[:, i] < 1000 * reflex.distance_max, true[:, i], np.nan)
-            above.plot(t, met, color=_OF_FINGER[i], lw=0.8, ls=":")
+            seen, true = (
+                np.where(record[s][:, i] < reflex.distance_max, 1000 * record[s][:, i], np.nan)
+                for s in ("reflex.distance", "scene.range")
+            )
+            above.plot(t, seen, color=_OF_FINGER[i], drawstyle="steps-post", label=finger)
+            above.plot(t, true, color=_OF_FINGER[i], lw=0.8, ls=":")
         if not parameters.literal:
             above.axhline(1000 * reflex.target, color="#4d5866", lw=0.8, ls="--")
         above.set(ylabel="distance (mm)", ylim=(0, 70), xlim=(t[0], t[-1]))
@@ -52,8 +54,9 @@ def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
         for axes, names in ((above, _GROUPS), (below, {})):
             shade_phases(axes, t, _grouped(record), names)
     caption = (
-        "Distances as the controller sees them, eq. (11), and along the beams in truth (dotted), and the cost of thumb "
-        "and ring. Dashed: target distance, and cost at which the hand closes."
+        "Distances as the controller sees them, eq. (11), and along the beams in truth (dotted), where there are any "
+        "in the sensors' range, and the cost of thumb and ring, in which a finger that sees nothing counts with "
+        f"{1000 * reflex.distance_max:.0f} mm. Dashed: target distance, and cost at which the hand closes."
     )
     return Figure("distances", caption)
 
@@ -85,17 +88,18 @@ def _scene(parameters: Parameters, moments: Mapping[str, float], record: Record,
     rows = {role: int(np.searchsorted(record.time, at - 1e-9)) for role, at in moments.items()}
     low, high = _frame(record, list(rows.values()))
     wide, tall = high - low
-    with figure(folder / "scene", 1, len(rows), size=(11.0, 0.9 + 9.3 / len(rows) * tall / wide)) as panels:
+    with figure(folder / "scene", 1, len(rows), size=(11.0, 1.4 + 9.3 / len(rows) * tall / wide)) as panels:
         for axes, (role, k) in zip(panels, rows.items(), strict=True):
             _draw_moment(axes, parameters, record, k)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
             axes.set_title(f"{record.time[k]:.1f} s, {role}")
         panels[0].set(ylabel="y (mm)")
         for name, colour in zip(_FINGERS, _OF_FINGER, strict=True):
-            panels[0].plot([], [], color=colour, lw=5, label=name)
-        panels[0].legend(loc="upper right", handlelength=1.0)
+            panels[len(panels) // 2].plot([], [], color=colour, lw=5, label=name)
+        panels[len(panels) // 2].legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.15), handlelength=1.0)
     caption = (
-        "The table from above: hand, object, and the sensors' beams (solid as far as the object, where it is met)."
+        "The table from above: hand, object, and the sensors' beams, solid as far as the object where they meet it, "
+        "else dotted."
     )
     return Figure("scene", caption)
 

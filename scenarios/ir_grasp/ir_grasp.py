@@ -18,7 +18,15 @@ from scenarios.record import Record
 
 
 class IrGrasp(Experiment[GraspWatch]):
-    """One trial of the paper's table I: one object, one pose, one strategy."""
+    """One trial of the paper's table I: one object, one pose, one strategy.
+
+    The paper gives neither the pre-grasp pose nor the perturbations. The gap of 70 mm between palm and object
+    (`standoff`), the shift and its spread were chosen so that closing blind fails about as often as in table I; that
+    the reflex does better than blind then says that it finds the object, not that sensing is needed. A blind hand
+    that first goes 55 mm forward (`strategy=forward`, `forward=0.055`) does as well as the reflex: of 40 grasps each
+    (5 things, seeds 1000 to 1007) the reflex held 39 nominal and 38 perturbed ones, forward by 55 mm 40 and 40,
+    forward by 35 mm 40 and 26, blind 10 and 0.
+    """
 
     name: ClassVar[str] = "ir_grasp"
     title: ClassVar[str] = "a soft hand grasps an object whose place is known roughly, by infrared reflexes"
@@ -76,7 +84,7 @@ class IrGrasp(Experiment[GraspWatch]):
         return s
 
     def stop_time(self, parameters: Parameters) -> Fraction:  # noqa: ARG002
-        """Return a time that the controller's limits on steps and recoveries keep any run below."""
+        """Return a time that no run came near: of 140 by reflex the longest, with the printed equations, took 26 s."""
         return Fraction(90)
 
     def watch(self, parameters: Parameters) -> GraspWatch:

@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 
+from controllers.reflex_parameters import Params as ReflexParams
 from cosim.ports import Floats
 from cosim.signals import Signals
+from plants.grasp_scene import SEES_NOTHING
 from scenarios.experiment import Metric, Outcome, Watch
 from scenarios.ir_grasp.parameters import Parameters
 
@@ -91,8 +93,10 @@ class GraspWatch(Watch):
         }
         for i, finger in enumerate(("thumb", "index", "ring")):
             whole = f"{finger} to object as the hand began to close"
-            told[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by eq. (11)")
-            told[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam")
+            unseen = " (sees nothing)" if seen[i] >= ReflexParams().distance_max else ""
+            unmet = " (meets nothing)" if true[i] >= SEES_NOTHING else ""
+            told[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by eq. (11){unseen}")
+            told[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam{unmet}")
         self._at_closing = told
 
     def _count(self, phase: str, signals: Signals) -> None:

@@ -334,6 +334,14 @@ def test_places_out_of_the_workspace_are_refused_all_at_once():
     assert "receive_velocity = 0.005 m/s must exceed gate_speed = 0.01 m/s" in text
 
 
+def test_waits_that_outlast_the_patience_are_refused_unless_it_only_holds():
+    impatient: dict[str, Any] = {"patience": 2.0, "signal_time": 3.0, "pause": 4.0}
+    with pytest.raises(UnusableHandover, match="signal_time = 3 s must not exceed patience = 2 s") as caught:
+        HandoverStateMachine(Params(task=HandoverTask.COLLABORATIVE, **impatient))
+    assert len(caught.value.faults) == 2
+    HandoverStateMachine(Params(task=HandoverTask.HOLD, **impatient))
+
+
 def test_orientation_that_is_none_is_refused():
     with pytest.raises(UnusableHandover, match="q_WG_handover"):
         HandoverStateMachine(Params(q_WG_handover=np.zeros(4)))

@@ -261,6 +261,20 @@ def test_matrices_that_are_not_positive_definite_are_refused_all_at_once():
     assert "none may exceed the others' sum" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"delay": -0.01}, r"delay = -0\.01 s must be finite and not negative"),
+        ({"lag": np.nan}, "lag = nan s must be finite"),
+        ({"mass": np.inf}, "mass = inf kg must be positive and finite"),
+        ({"I_B": -np.eye(3)}, "I_B = .* must be symmetric and positive definite"),
+    ],
+)
+def test_a_body_or_a_time_that_cannot_be_is_refused(changes: dict[str, Any], told: str):
+    with pytest.raises(UnusableController, match=told):
+        ImpedanceController(replace(Params(), **changes))
+
+
 @pytest.mark.parametrize("q", [np.zeros(4), np.array([np.nan, 0.0, 0.0, 1.0])])
 def test_orientation_that_is_none_is_refused(q: Floats):
     with pytest.raises(UnusableOrientation, match="q_WB_meas"):

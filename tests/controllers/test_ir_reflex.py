@@ -16,6 +16,7 @@ from controllers.ir_reflex import (
     Phase,
     Stop,
     Strategy,
+    UnusableReading,
     UnusableReflex,
     Visibility,
 )
@@ -225,6 +226,14 @@ def test_it_goes_on_from_any_state_bit_for_bit(literal: bool, p_x: float):
             break
     assert set(Phase) - {Phase.APPROACH, Phase.RECOVER} <= met
     assert (Phase.RECOVER in met) or p_x < -0.15
+
+
+def test_a_reading_that_is_no_number_is_refused_and_leaves_no_trace():
+    reflex, other = IrReflex(Params()), IrReflex(Params())
+    with pytest.raises(UnusableReading) as refused:
+        reflex.step(0.0, DT, Inputs(ticks=np.array([0.0, math.nan, 0.0]), p_WH=np.zeros(2), yaw=math.inf))
+    assert [fault.split()[0] for fault in refused.value.faults] == ["ticks", "yaw"]
+    assert reflex.get_state() == other.get_state()
 
 
 def test_outputs_at_the_start_are_those_of_the_first_step_while_nothing_is_decided():

@@ -241,6 +241,12 @@ def test_what_thrust_cannot_give_is_refused_all_at_once():
     assert "at most 0.0407 m/s2" in str(caught.value)
 
 
+@pytest.mark.parametrize("k_I", [-0.1, 0.72, np.nan])
+def test_integral_that_no_loop_bears_is_refused(k_I: float):
+    with pytest.raises(UnusableController, match=r"position gains: k_I = .* from 0 to less than k_P k_D = 0\.72"):
+        PoseController(Params(k_I=k_I))
+
+
 @pytest.mark.parametrize("seconds", [0.0, 3.0])
 def test_restored_state_continues_bit_for_bit(seconds: float):
     goal = {"p_WG_goal": np.array([0.4, 0.2, -0.3]), "q_WG_goal": np.array([0.8, 0.0, 0.6, 0.0])}

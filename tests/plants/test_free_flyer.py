@@ -214,6 +214,9 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored():
         ({"q_WB_0": np.array([1.0, 0.0, 0.2, 0.0])}, "norm is 1.0198"),
         ({"q_WB_0": np.zeros(4)}, "norm is 0"),
         ({"mass": -1.0}, "mass -1 kg must be positive"),
+        ({"mass": np.inf}, "mass inf kg must be positive and finite"),
+        ({"I_B": np.diag([np.inf, 1.0, 1.0])}, "must be finite"),
+        ({"I_B": np.full((3, 3), np.nan)}, "must be finite"),
     ],
 )
 def test_what_no_body_has_is_refused(changes: dict[str, Any], told: str):

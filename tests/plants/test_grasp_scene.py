@@ -11,7 +11,7 @@ from cosim.ports import Floats
 from plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
 from plants.grasp_objects import SOLIDS, Thing
 from plants.grasp_parameters import Params, UnusableScene
-from plants.grasp_scene import SEES_NOTHING, GraspScene, Inputs, Outputs, StepSizeError
+from plants.grasp_scene import SEES_NOTHING, GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
 from plants.grasp_tendon import PULLEYS, STIFFNESS, resting_posture
 from plants.grasp_world import DT, GraspWorld, beginning
 
@@ -55,14 +55,14 @@ def test_outputs_are_of_the_declared_shapes_and_take_no_time():
 
 
 def test_pictures_show_the_hand_where_the_physics_has_it():
-    scene = GraspScene(AROUND)
-    y = scene.outputs(0.0, Inputs())
-    for k in range(120):
-        y = scene.step(k * STEP, STEP, inputs(-0.11 - 0.001 * k, 0.01 * math.sin(0.1 * k), 0.003 * k, 1.0))
-    _, (_, _, *phalanges) = scene._world.snapshot  # pyright: ignore[reportPrivateUsage]
-    points = finger_points(y.p_WH, y.yaw, y.q)
+    world = GraspWorld(AROUND, beginning(AROUND))
+    for k in range(1800):
+        world.advance((-0.11 - 7e-5 * k, 0.01 * math.sin(0.007 * k), 2e-4 * k, 1.0))
+    _, (_, _, *phalanges) = world.snapshot
+    x, y, yaw = world.wrist
+    points = finger_points(np.array([x, y]), yaw, np.array(world.joints))
     middles = [(a + b) / 2.0 for finger in points for a, b in pairwise(finger)]
-    assert y.touching > 0
+    assert world.touching > 0
     np.testing.assert_allclose(middles, [m[:2] for m in phalanges], atol=1e-3)  # joints give by some 0.1 mm
 
 
@@ -139,6 +139,16 @@ def test_steps_of_any_size_make_the_same_course():
 def test_a_step_that_is_no_multiple_of_a_millisecond_is_refused(dt: float):
     with pytest.raises(StepSizeError, match=r"no multiple of the internal step 0\.001 s"):
         GraspScene(AROUND).step(0.0, dt, inputs())
+
+
+def test_a_command_that_is_no_number_is_refused_and_leaves_no_trace():
+    scene, other = GraspScene(AROUND), GraspScene(AROUND)
+    with pytest.raises(UnusableCommand) as refused:
+        scene.step(0.0, STEP, inputs(x=math.nan, sigma=math.inf))
+    assert [fault.split()[0] for fault in refused.value.faults] == ["p_WH_cmd", "sigma_cmd"]
+    with pytest.raises(UnusableCommand, match="yaw_cmd"):
+        scene.step(0.0, STEP, inputs(yaw=-math.inf))
+    assert scene.get_state() == other.get_state()
 
 
 def test_wrist_and_closure_obey_their_limits_and_arrive():
@@ -264,6 +274,8 @@ def test_faults_of_the_parameters_are_told_at_once():
         GraspScene(Params(p_WO_0=np.array([0.58, 0.0]), b=0.003, nearest=0.07))
     assert len(caught.value.faults) == 4
     assert "the cylinder stands out 13 mm beyond the table" in caught.value.faults[0]
+    with pytest.raises(UnusableScene, match=r"mass_O 1e-12 kg must be 0.* or at least 0\.001 kg"):
+        GraspScene(Params(mass_O=1e-12))
     with pytest.raises(UnusableScene, match="wrist_speed"):
         GraspScene(Params(wrist_speed=-1.0))
     handle = Params(thing=Thing.BABY_CUP_B, p_WO_0=np.array([0.55, 0.0]))

@@ -95,6 +95,14 @@ def test_gripper_follows_its_command_at_its_rate_and_tells_empty_from_full():
     assert held.holder is Holder.GRIPPER
 
 
+def test_gripper_that_starts_closed_opens_and_takes_nothing_by_that():
+    scene = Scene(replace(IDLE, angle_0=0.60), np.array([0.5, 0.0, 0.0]))
+    assert scene.y.gripper_angle == 0.60
+    assert scene.go(0.48, closure=0.0).gripper_angle == pytest.approx(0.60 + 0.6 * 0.48)
+    assert scene.go(1.0).gripper_angle == pytest.approx(1.20)
+    assert {y.holder for y in scene.seen} == {Holder.FREE}
+
+
 def test_object_comes_free_when_the_fingers_are_open_enough():
     scene = Scene(IDLE)
     closed = scene.go(2.0, closure=1.0).gripper_angle

@@ -8,8 +8,8 @@ from cosim.ports import Floats
 from plants.hand_and_object import HandAndObject, Inputs, Motion, Params, StartHolder, UnusableHand
 
 
-def begun(p_WG: Floats) -> None:
-    HandAndObject(Params(p_WO_0=np.zeros(3))).step(0.0, 0.016, Inputs(p_WG=p_WG))
+def begun(p_WG: Floats, **changes: Any) -> None:
+    HandAndObject(Params(p_WO_0=np.zeros(3), **changes)).step(0.0, 0.016, Inputs(p_WG=p_WG))
 
 
 @pytest.mark.parametrize(
@@ -24,6 +24,7 @@ def begun(p_WG: Floats) -> None:
         ({"aperture": 0.01}, "does not fit into the gripper"),
         ({"angle_empty": 1.3}, "angle_empty 1.3 rad must be less"),
         ({"release_angle": 1.0}, "never comes free"),
+        ({"angle_0": 0.5}, "angle_0 0.5 rad must lie between angle_empty 0.6 rad and angle_open 1.2 rad"),
         ({"pull_direction": np.zeros(3)}, "pull_direction"),
         ({"q_WO_0": np.array([1.0, 1.0, 0.0, 0.0])}, "q_WO_0 .* norm is 1.41421"),
         ({"q_WH_0": np.zeros(4)}, "q_WH_0 .* norm is 0"),
@@ -46,3 +47,6 @@ def test_a_robot_that_starts_in_the_hand_is_refused():
         begun(np.array([-0.40, 0.13, -0.05]))
     with pytest.raises(UnusableHand, match="object starts in the gripper's palm"):
         begun(np.array([-0.03, -0.07, 0.0]))
+    with pytest.raises(UnusableHand, match=r"between fingers .* angle_0 0\.6 rad; open them to 0\.785 rad"):
+        begun(np.array([0.0, -0.07, 0.0]), angle_0=0.60)
+    begun(np.array([0.0, -0.07, 0.0]), angle_0=0.80)

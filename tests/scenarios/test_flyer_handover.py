@@ -44,6 +44,8 @@ def test_the_robot_gives_an_object_to_a_person(tmp_path: Path):
     assert ended.outcome.success, ended.outcome.reason
     record = Record(tmp_path / "r" / "signals.parquet")
     assert holders(record) == [FREE, GRIPPER, BOTH, HAND]
+    assert record["person.gripper_angle"][0] == pytest.approx(0.60)  # "initiates the handover with a closed gripper"
+    assert record["person.gripper_angle"][record.time > 1.1][0] == pytest.approx(1.20)
     assert metric(ended, "failed_receptions") == 0
     assert metric(ended, "arrival_error") < 0.05
     assert metric(ended, "transfer_speed") > 0.059
@@ -76,9 +78,10 @@ def test_a_failed_reception_is_noticed_and_repeated(tmp_path: Path):
     record = Record(tmp_path / "r" / "signals.parquet")
     assert holders(record) == [HAND, BOTH, GRIPPER]
     assert record["decision.failed_receptions"][-1] == 1
-    closed_on_nothing = record["decision.failed_receptions"] == 0
-    assert record["person.gripper_angle"][closed_on_nothing].min() < 0.71
-    assert record["person.gripper_angle"][-1] > 0.71
+    angle, felt = record["person.gripper_angle"], ended.summary["metrics"]["phase_close_gripper"]["value"]
+    closed_on_nothing = (record["decision.failed_receptions"] == 0) & (record.time > felt)
+    assert angle[closed_on_nothing].min() < 0.71
+    assert angle[-1] > 0.71
 
 
 def test_the_robot_holds_an_object_for_a_person(tmp_path: Path):

@@ -80,6 +80,7 @@ def test_the_pictures_are_of_what_is_simulated(paper: Paper):
     assert paper["person"]["palm_depth"]["value"] == scene.PALM_DEPTH
 
 
-def test_the_robot_reaches_for_the_object_where_it_is(paper: Paper):
+def test_a_handover_begins_where_person_and_robot_expect_it(paper: Paper):
     assert paper["handover_place"]["p_WO_0"]["value"] == paper["person"]["p_WO_0"]["value"]
+    assert paper["handover_place"]["angle_0"]["value"] == paper["person"]["angle_empty"]["value"]
     assert paper["handover_place"]["p_OG"]["value"] == paper["person"]["p_OG"]["value"]

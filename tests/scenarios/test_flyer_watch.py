@@ -152,6 +152,41 @@ def test_the_staged_failure_must_have_been_noticed():
     assert "0 failed receptions where 1 was staged" in outcome.reason
 
 
+def asked_again() -> HandoverWatch:
+    """Return a watch that saw a first push at 20 s, found in vain, and another signal at 30 s."""
+    watch = HandoverWatch(Parameters(), ("GRIPPER",), failures=1)
+    return follow(
+        watch,
+        (10.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.HAND)),
+        (11.0, signals(Phase.SIGNAL, Holder.HAND)),
+        (12.0, signals(Phase.CHECK_VELOCITY, Holder.HAND, speed=0.09)),
+        (20.0, signals(Phase.CLOSE_GRIPPER, Holder.HAND, speed=0.1)),
+        (21.0, signals(Phase.CHECK_ANGLE, Holder.HAND)),
+        (22.0, signals(Phase.OPEN_GRIPPER, Holder.HAND, failed=1)),
+        (30.0, signals(Phase.SIGNAL, Holder.HAND, failed=1)),
+        (31.0, signals(Phase.CHECK_VELOCITY, Holder.HAND, failed=1, speed=0.004)),
+    )
+
+
+def test_a_push_in_vain_is_kept_apart_from_the_one_that_counts():
+    watch = follow(asked_again(), (40.0, signals(Phase.CLOSE_GRIPPER, Holder.BOTH, failed=1, speed=0.03)))
+    (transfer,) = watch.transfers
+    assert (transfer.signalled, transfer.asked) == (11.0, 30.0)
+    assert (transfer.in_vain, transfer.felt, transfer.speed) == ([20.0], 40.0, 0.03)
+
+
+def test_a_wait_after_a_failed_reception_is_told_from_the_last_signal():
+    reason = follow(asked_again(), (92.0, signals(Phase.GIVEN_UP, Holder.HAND, failed=1))).outcome().reason
+    assert "never felt a push within 62 s" in reason
+    assert "below 0.004 m/s" in reason
+
+
+def test_a_robot_that_gave_up_on_the_way_to_the_object_is_not_told_of_the_handover_place():
+    way = [(t, signals(Phase.MOVE_TO_OBJECT, Holder.FREE, away=0.6)) for t in (1.0, 30.0)]
+    reason = follow(to_person(), *way, (61.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.6))).outcome().reason
+    assert reason == "the robot gave up in phase MOVE_TO_OBJECT; nobody holds it"
+
+
 def test_an_object_that_is_still_in_both_hands_at_the_end_was_not_delivered():
     outcome = follow(to_person(), *given()[:8], (30.0, signals(Phase.DONE, Holder.BOTH))).outcome()
     assert not outcome.success

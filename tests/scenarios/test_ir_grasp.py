@@ -92,10 +92,10 @@ def test_a_run_leaves_its_figures(run: tuple[Path, dict[str, Any]]):
     assert (run[0] / "report.html").read_text().count("data:image/png;base64,") == 3
 
 
-def test_the_same_seed_gives_the_same_course_whatever_runs_beside_it():
-    first, again = grasp(3), grasp(3)
-    assert first == again
+def test_the_same_seed_gives_the_same_course_and_another_seed_another():
+    first = grasp(3)
     assert grasp(4).metrics["refinement_time"] != first.metrics["refinement_time"]
+    assert grasp(3) == first
 
 
 def test_a_blind_hand_misses_the_moved_cylinder_and_says_so():
@@ -129,6 +129,15 @@ def test_every_thing_can_be_grasped(thing: Thing, perturbed: bool):
 
 @pytest.mark.slow
 def test_as_printed_the_refinement_runs_to_its_end():
-    outcome = grasp(0, literal=True)
-    assert "stop" in outcome.metrics
+    outcome, own = grasp(0, literal=True), grasp(0)
+    assert outcome.metrics["stop"].value in (Stop.THRESHOLD, Stop.STALLED, Stop.PATIENCE)
     assert outcome.metrics["steps"].value >= 1
+    assert outcome.metrics["probing_moves"].value > own.metrics["probing_moves"].value
+
+
+@pytest.mark.slow
+def test_a_blind_hand_that_closes_55_mm_nearer_does_as_well_as_the_reflex():
+    """The control that the class tells of: with a standoff so large, coming nearer is what counts."""
+    seeds = range(1000, 1010)
+    near = [grasp(seed, strategy=Strategy.FORWARD, forward=0.055).success for seed in seeds]
+    assert sum(near) >= 9

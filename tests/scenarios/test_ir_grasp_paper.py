@@ -10,6 +10,7 @@ import tomli
 import scenarios.ir_grasp
 from controllers.reflex_parameters import Params as ReflexParams
 from cosim.block import Causality, declared_variables
+from plants.grasp_objects import Thing
 from plants.grasp_parameters import Params as SceneParams
 from scenarios.ir_grasp.parameters import Parameters
 
@@ -34,3 +35,9 @@ def test_every_default_has_its_origin(paper: Paper, group: str):
         value = default.name.lower() if declared[name].items else default
         assert np.array_equal(value, entry["value"]), name
         assert entry["unit"] == declared[name].unit.symbol, name
+
+
+def test_the_published_totals_are_the_sums_over_the_things(paper: Paper):
+    published = paper["published"]
+    rows = [published[thing.name.lower()]["value"] for thing in Thing]
+    assert np.sum(rows, axis=0).tolist() == published["total"]["value"]

@@ -15,8 +15,14 @@ HELD = (0.1, 0.0)
 """Where a held object is, in H."""
 
 
-def signals(phase: Phase, p_HO: tuple[float, float] = HELD, touching: int = 3, p_WH: float = -0.1) -> Signals:
-    """Return what a hand along x, and an object at a place in its frame, would show."""
+def signals(
+    phase: Phase,
+    p_HO: tuple[float, float] = HELD,
+    touching: int = 3,
+    p_WH: float = -0.1,
+    index: tuple[float, float] = (0.05, 0.05),
+) -> Signals:
+    """Return what a hand along x, and an object at a place in its frame, would show; the index: as seen, and truly."""
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {"scene": {}, "reflex": {}}
     ports: dict[str, dict[str, FmuPort]] = {"scene": {}, "reflex": {}}
 
@@ -30,9 +36,9 @@ def signals(phase: Phase, p_HO: tuple[float, float] = HELD, touching: int = 3, p
 
     for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0)):
         show("scene", name, Kind.REAL, value)
-    show("scene", "range", Kind.REAL, [0.01, 0.05, 0.01])
+    show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
     show("scene", "touching", Kind.INTEGER, touching)
-    for name, value in (("distance", [0.01, 0.05, 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
+    for name, value in (("distance", [0.01, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
         show("reflex", name, Kind.REAL, value)
     show("reflex", "p_WH_cmd", Kind.REAL, [p_WH, 0.0])
     show("reflex", "steps", Kind.INTEGER, 4)
@@ -81,6 +87,18 @@ def test_a_hand_that_closed_beside_the_object_says_where_it_is():
     outcome = grasp(*done, at_closing=signals(Phase.PULL, **beside)).outcome()
     assert not outcome.success
     assert "without touching the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
+
+
+def test_a_finger_that_sees_nothing_is_told_from_one_at_the_end_of_its_range():
+    def told(seen: float, true: float) -> list[str]:
+        closing = signals(Phase.CLOSE, index=(seen, true))
+        metrics = follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics
+        return [metrics[f"{kind}_distance_index"].description for kind in ("final", "true")]
+
+    assert told(0.065, 0.2)[0].endswith("by eq. (11) (sees nothing)")
+    assert told(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
+    assert told(0.06, 0.07)[0].endswith("by eq. (11)")
+    assert told(0.06, 0.07)[1].endswith("along the beam")
 
 
 def test_an_object_that_one_finger_pushes_along_is_not_held():
