@@ -10,6 +10,7 @@ from controllers.flyer_behaviour import Behaviour
 from controllers.flyer_rotation import rows_of, unit_quaternion
 from cosim.plain_rotation import triple, turned
 from cosim.ports import Floats, Vector3, Vector4, parameter
+from cosim.refusal import Refusal
 from cosim.units import Metre, MetrePerSecond, Number, Radian, Second
 
 NAME = "HandoverStateMachine"
@@ -17,12 +18,10 @@ NAME = "HandoverStateMachine"
 _VELOCITIES = {Behaviour.RIGID: (0.059, 0.021), Behaviour.COMPLIANT: (0.08, 0.037)}  # release, receive: sec. 4.1.2
 
 
-class UnusableHandover(ValueError):
+class UnusableHandover(Refusal):
     """A handover that cannot be done as its parameters have it; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__(f"{NAME}: " + "; ".join(faults))
-        self.faults = faults
+    block = NAME
 
 
 class HandoverTask(enum.IntEnum):

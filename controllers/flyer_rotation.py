@@ -9,7 +9,9 @@ from cosim.ports import Floats
 
 
 class UnusableOrientation(ValueError):
-    """A quaternion that is zero or not finite, so that it tells of no orientation."""
+    """A quaternion that is zero or not finite, so that it tells of no orientation; nothing has changed."""
+
+    is_refusal = True
 
     def __init__(self, block: str, name: str, q: Floats) -> None:
         super().__init__(f"{block}: {name} = {np.asarray(q).tolist()} must be finite and not zero")

@@ -5,16 +5,17 @@ from collections.abc import Callable
 
 from controllers.flyer_body import FlyerBody
 from controllers.sampled_loop import LinearController, SampledLoop, largest_stable
+from cosim.refusal import Refusal
 
 _LONGEST_DELAY = 1.0  # s, up to which a stable one is looked for
 
 
-class UnusableController(ValueError):
+class UnusableController(Refusal):
     """A controller that cannot work as its parameters have it; `faults` lists all of them."""
 
     def __init__(self, block: str, faults: list[str]) -> None:
-        super().__init__(f"{block}: " + "; ".join(faults))
-        self.faults = faults
+        self.block = block
+        super().__init__(faults)
 
 
 def stability_faults(

@@ -16,6 +16,7 @@ from controllers.reflex_parameters import Params, Strategy, UnusableReflex
 from controllers.reflex_probing import Probing
 from controllers.reflex_visibility import Recovery, Visibility, displaced
 from cosim.ports import Floats, Vector2, Vector3, output, port
+from cosim.refusal import Refusal
 from cosim.units import Metre, Number, Radian, SquareMetre, Tick
 
 __all__ = [
@@ -34,12 +35,10 @@ __all__ = [
 _PERIOD = Fraction(3, 200)  # one round of the three sensors, at 5 ms each (assumed)
 
 
-class UnusableReading(ValueError):
+class UnusableReading(Refusal):
     """An input that is no number; `faults` names all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("IrReflex: " + "; ".join(faults))
-        self.faults = faults
+    block = "IrReflex"
 
 
 class Phase(enum.IntEnum):

@@ -8,18 +8,17 @@ import numpy as np
 
 from controllers.reflex_calibration import Calibration
 from cosim.ports import Vector2, Vector3, Vector4, parameter
+from cosim.refusal import Refusal
 from cosim.start_values import parameter_faults
 from cosim.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
 
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
 
 
-class UnusableReflex(ValueError):
+class UnusableReflex(Refusal):
     """Values with which the reflex cannot work; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("IrReflex: " + "; ".join(faults))
-        self.faults = faults
+    block = "IrReflex"
 
 
 class Strategy(enum.IntEnum):

@@ -6,17 +6,16 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from cosim.ports import Vector3, Vector6, Vector9, parameter
+from cosim.refusal import Refusal
 from cosim.units import Metre, Number, Second, SquareMetre
 
 _ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
 
 
-class UnusableParameters(ValueError):
+class UnusableParameters(Refusal):
     """Values with which the visual servo cannot work; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("VisualServo: " + "; ".join(faults))
-        self.faults = faults
+    block = "VisualServo"
 
 
 @dataclass(frozen=True, kw_only=True)

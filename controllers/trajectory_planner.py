@@ -13,6 +13,7 @@ import numpy as np
 from controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics, place
 from controllers.vsl_path import Path, Segment, segments_of
 from cosim.ports import Floats, Vector2, Vector3, output, parameter, port
+from cosim.refusal import Refusal
 from cosim.start_values import parameter_faults
 from cosim.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
 
@@ -25,14 +26,10 @@ _PERIOD = Fraction(1, 50)  # s
 _SAME_TIME = 1e-9  # s, what sums of intervals lose
 
 
-class UnusablePath(ValueError):
+class UnusablePath(Refusal):
     """A path that the arm cannot follow; `faults` names the first bad point of each segment."""
 
-    is_refusal = True
-
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("TrajectoryPlanner: " + "; ".join(faults))
-        self.faults = faults
+    block = "TrajectoryPlanner"
 
 
 @dataclass(frozen=True, kw_only=True)

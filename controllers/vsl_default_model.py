@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "efaa93949732f48784e8afe07343ba4f2bf69ae1fbfecfa8a2d1a13e65d8ec37",
+   "key": "2ef7d1727064c5bb07d27496e5d6d95000f2366d3974ee406093e9fbb8e03a6d",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

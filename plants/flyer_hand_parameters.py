@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.ports import Floats, Vector3, Vector4, parameter
+from cosim.refusal import Refusal
 from cosim.units import (
     Hertz,
     Kilogram,
@@ -28,12 +29,10 @@ LEAST_ROOM = 0.05
 """Metres that must lie between the gripper's and the hand's place on an object for both to hold it."""
 
 
-class UnusableHand(ValueError):
+class UnusableHand(Refusal):
     """Parameters, or a start, that contradict each other; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("HandAndObject: " + "; ".join(faults))
-        self.faults = faults
+    block = "HandAndObject"
 
 
 class Motion(enum.IntEnum):

@@ -11,6 +11,7 @@ import numpy as np
 
 from cosim.plain_rotation import Triple, triple, turned
 from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from cosim.refusal import Refusal
 from cosim.units import (
     Kilogram,
     KilogramMetre2,
@@ -29,12 +30,10 @@ from plants.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faul
 _HALF_A_TURN = math.pi
 
 
-class UnusableFlyer(ValueError):
+class UnusableFlyer(Refusal):
     """Parameters that no rigid body has; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("FreeFlyer: " + "; ".join(faults))
-        self.faults = faults
+    block = "FreeFlyer"
 
 
 @dataclass(frozen=True, kw_only=True)

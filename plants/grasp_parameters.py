@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.ports import Floats, Vector2, parameter
+from cosim.refusal import Refusal
 from cosim.start_values import parameter_faults
 from cosim.units import (
     Kilogram,
@@ -30,12 +31,10 @@ _LIGHTEST = 1e-3
 """Least mass of an object, kg: contacts with much heavier phalanges fling away what is lighter."""
 
 
-class UnusableScene(ValueError):
+class UnusableScene(Refusal):
     """Values of which no scene can be built; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("GraspScene: " + "; ".join(faults))
-        self.faults = faults
+    block = "GraspScene"
 
 
 @dataclass(frozen=True, kw_only=True)

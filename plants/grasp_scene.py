@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.ports import Vector2, Vector3, Vector8, output, port
+from cosim.refusal import Refusal
 from cosim.units import Metre, Newton, Number, Radian, Tick
 from plants.grasp_hand import FINGERS
 from plants.grasp_parameters import Params, UnusableScene
@@ -25,7 +26,9 @@ _MIDDLE = ((1.0, 0.0),)
 
 
 class StepSizeError(ValueError):
-    """A step is no multiple of the internal time step."""
+    """A step is no multiple of the internal time step; nothing has changed."""
+
+    is_refusal = True
 
     def __init__(self, dt: float) -> None:
         fewer = max(int(dt / DT), 1)
@@ -36,12 +39,10 @@ class StepSizeError(ValueError):
         self.dt = dt
 
 
-class UnusableCommand(ValueError):
+class UnusableCommand(Refusal):
     """A command that is no number; `faults` names the inputs."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("GraspScene: " + "; ".join(faults))
-        self.faults = faults
+    block = "GraspScene"
 
 
 @dataclass(kw_only=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from cosim.geometry import rotation_of
 from cosim.ports import Floats, Vector3, Vector4, output, parameter, port
+from cosim.refusal import Refusal
 from cosim.units import (
     Hertz,
     Kilogram,
@@ -25,12 +26,10 @@ from cosim.units import (
 from plants.hand_tremor import HandTremor
 
 
-class UnusablePartner(ValueError):
+class UnusablePartner(Refusal):
     """Parameters that contradict each other; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("HandoverPartner: " + "; ".join(faults))
-        self.faults = faults
+    block = "HandoverPartner"
 
 
 class Holder(enum.IntEnum):

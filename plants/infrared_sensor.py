@@ -3,15 +3,15 @@
 import math
 from bisect import bisect_left
 
+from cosim.refusal import Refusal
+
 _TOP = 4095  # of a 12-bit converter
 
 
-class UnusableSensor(ValueError):
+class UnusableSensor(Refusal):
     """A characteristic that cannot be inverted over the range of the sensor; `faults` lists all that is wrong."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("InfraredSensor: " + "; ".join(faults))
-        self.faults = faults
+    block = "InfraredSensor"
 
 
 class InfraredSensor:

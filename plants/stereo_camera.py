@@ -39,6 +39,8 @@ _HANGING = np.array([0.0, 1.0, 0.0, 0.0])  # q_WR of the arm at rest: R_WR = dia
 class BadCover(ValueError):
     """A camera's cover ends before it begins."""
 
+    is_refusal = True
+
     def __init__(self, camera: str, start: float, end: float) -> None:
         super().__init__(f"camera {camera!r}: covered from {start} s until {end} s; the end must not come first")
         self.camera, self.start, self.end = camera, start, end

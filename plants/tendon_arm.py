@@ -20,7 +20,9 @@ _POINTS = 25
 
 
 class StepSizeError(ValueError):
-    """A step is no multiple of the internal time step."""
+    """A step is no multiple of the internal time step; nothing has changed."""
+
+    is_refusal = True
 
     def __init__(self, dt: float, internal_step: float) -> None:
         fewer = max(int(dt / internal_step), 1)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.ports import Vector3, parameter
+from cosim.refusal import Refusal
 from cosim.start_values import parameter_faults
 from cosim.units import (
     Hertz,
@@ -20,12 +21,10 @@ from cosim.units import (
 )
 
 
-class UnusableArm(ValueError):
+class UnusableArm(Refusal):
     """Values of which no arm can be built; `faults` lists all of them."""
 
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("TendonArm: " + "; ".join(faults))
-        self.faults = faults
+    block = "TendonArm"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.ports import Floats, Polyline25, Vector2, Vector3, output, port
+from cosim.refusal import Refusal
 from cosim.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
 from plants.vsl_chain import Complexes, VslChain
 from plants.vsl_dynamics import NoConvergence, VslDynamics
@@ -24,14 +25,10 @@ HEAVIEST = 0.5
 """Largest load, kg; the published experiments go to 0.1 kg."""
 
 
-class UnusableInput(ValueError):
+class UnusableInput(Refusal):
     """Inputs that are not numbers, or a load or pressure that there is not; `faults` lists all of them."""
 
-    is_refusal = True
-
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("VslArm: " + "; ".join(faults))
-        self.faults = faults
+    block = "VslArm"
 
 
 @dataclass(kw_only=True)

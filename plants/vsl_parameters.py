@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.ports import Vector2, Vector3, parameter
+from cosim.refusal import Refusal
 from cosim.start_values import parameter_faults
 from cosim.units import (
     Ampere,
@@ -31,14 +32,10 @@ HIGHEST_PRESSURE = 3.0e5
 """Pa; the published experiments go to 2 bar."""
 
 
-class UnusableVslArm(ValueError):
+class UnusableVslArm(Refusal):
     """Parameters of which no arm can be built; `faults` lists all of them."""
 
-    is_refusal = True
-
-    def __init__(self, faults: list[str]) -> None:
-        super().__init__("VslArm: " + "; ".join(faults))
-        self.faults = faults
+    block = "VslArm"
 
 
 class Motion(enum.IntEnum):

@@ -1,4 +1,5 @@
 import json
+import re
 import sys
 import zipfile
 from fractions import Fraction
@@ -24,6 +25,7 @@ def assert_refused(result: Result, told: str, *untouched: Path) -> None:
     assert result.exit_code == 2, result.output
     assert told in result.output
     assert "Traceback" not in result.output
+    assert not re.search(r"_fmu_[0-9a-f]{16}", result.output)  # the private name of a unit's modules
     for path in untouched:
         assert not path.exists()
 
@@ -51,6 +53,23 @@ def test_list_of_a_scenario_shows_ranges_and_units():
         (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
         (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),
         (("run", "helix_handover", "--seed", "-1"), "x>=0"),
+        (("run", "flyer_impedance", "-p", "delay=0.032"), "stable with a delay of at most about 0.027 s"),
+        (("run", "vsl_hybrid", "-p", "path=custom", "-p", "x_g=0.6,0,0.15"), "point 49 of 100"),
+        (
+            (
+                "run",
+                "ir_grasp",
+                "-p",
+                "run_up=0",
+                "-p",
+                "standoff=0",
+                "-p",
+                "perturbed=false",
+                "-p",
+                "thing=paper_box_a",
+            ),
+            "the hand would start in the object: palm by",
+        ),
         (("run", "helix_handover", "--unit", "arms=x.fmu"), "did you mean arm?"),
         (("run", "helix_handover", "--unit", "arm"), "NAME=FILE"),
         (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
