@@ -126,7 +126,7 @@ class Instance:
         kind = ports[0].fmi_type
         if kind == "Enumeration":
             kind = "Integer" if self._fmi == 2 else "Int64"
-        make = OutputBuffer if verb == "Get" else SignalBuffer
+        make = OutputBuffer if verb == "Get" and kind in ("String", "Binary") else SignalBuffer
         call = f"{self._prefix}{verb}{kind}"
         return make(call, self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
 

@@ -10,12 +10,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from numpy.typing import NDArray
-
 from cosim.exceptions import CosimError, UnitFailure, UnitRefused
 from cosim.fmpy_edge import unpack
 from cosim.instance import Instance
 from cosim.schedule import Algorithm, Schedule, Slot
+from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
 from cosim.system import System
 
@@ -26,9 +25,6 @@ Observer = Callable[[float, Signals], None]
 def never() -> bool:
     """Let a run go on to its stop time."""
     return False
-
-
-_Copies = Sequence[tuple[NDArray[Any], NDArray[Any]]]
 
 
 class Master:
@@ -50,7 +46,7 @@ class Master:
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self._due: dict[str, int] = dict.fromkeys(system.units, 0)
         self._instances: dict[str, Instance] = {}
-        self._copies: dict[str, _Copies] = {}
+        self._copies: dict[str, Sequence[Copy]] = {}
         self._cleanup = contextlib.ExitStack()
 
     def __enter__(self) -> "Master":
@@ -136,7 +132,7 @@ class Master:
             self._instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
 
     def _step(self, slot: Slot) -> None:
-        self._instances[slot.unit].step(self.time, float(slot.period))
+        self._instances[slot.unit].step(self.time, slot.period)
         self._due[slot.unit] += slot.every
 
     def _charge(self, slot: Slot, began: float) -> float:
@@ -158,10 +154,10 @@ class Master:
             cleanup.callback(instance.free)
             self._instances[name] = instance
         for name, instance in self._instances.items():
-            copies: list[tuple[NDArray[Any], NDArray[Any]]] = []
+            copies: list[Copy] = []
             for port, source in self.system.sources_of(name).items():
                 copies += zip(instance.u[port], self._instances[source.unit].y[source.port], strict=True)
-            self._copies[name] = copies
+            self._copies[name] = joined(copies)
 
     def _initialize(self) -> None:
         for name, unit in self.system.units.items():

@@ -28,11 +28,11 @@ class Algorithm(enum.Enum):
 
 @dataclass(frozen=True)
 class Slot:
-    """A unit in the schedule: it steps every `every` ticks, by `period` seconds."""
+    """A unit in the schedule: it steps every `every` ticks, by `period` seconds (rounded once)."""
 
     unit: str
     every: int
-    period: Fraction
+    period: float
 
 
 class Schedule:
@@ -73,7 +73,7 @@ class Schedule:
         declared = {u.name: _sources(system, u, u.description.feedthrough) for u in units}
         presumed = {u.name: _sources(system, u, u.description.presumed_feedthrough) for u in units}
         periods = {u.name: u.period for u in units}
-        return tuple(Slot(n, int(periods[n] / self.tick), periods[n]) for n in _ordered(declared, presumed))
+        return tuple(Slot(n, int(periods[n] / self.tick), float(periods[n])) for n in _ordered(declared, presumed))
 
 
 def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:

@@ -1,7 +1,7 @@
 """Preallocated buffers through which an FMU's variables of one type are set or read in one call."""
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,9 @@ _POINTER: Callable[[Any], Any] = ctypes.POINTER
 
 Views = tuple[NDArray[Any], ...]
 """Where a port's value lives. Plain values: one array. Binary: addresses and sizes. Strings: addresses."""
+
+Copy = tuple[NDArray[Any], NDArray[Any]]
+"""Where values go, and where they come from."""
 
 _VALUES: dict[str, Any] = {
     "Real": ctypes.c_double,
@@ -55,20 +58,19 @@ class SignalBuffer:
 
 
 class OutputBuffer(SignalBuffer):
-    """A buffer for reading. Binaries and strings are copied: the unit may reuse its memory at the next call."""
+    """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call."""
 
     def __init__(
         self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
     ) -> None:
         super().__init__(name, function, component, fmi, ports)
         self._is_text = ports[0].fmi_type == "String"
-        self._is_binary = ports[0].fmi_type == "Binary"
         self._kept: list[Any] = [ctypes.create_string_buffer(1) for _ in range(len(self._arrays[0]))]
 
     def __call__(self) -> int:
-        """Get all values; return the FMI status."""
+        """Get and copy all values; return the FMI status."""
         status = super().__call__()
-        if status <= 1 and (self._is_text or self._is_binary):
+        if status <= 1:
             for i in range(len(self._kept)):
                 self._keep(i)
         return status
@@ -84,6 +86,30 @@ class OutputBuffer(SignalBuffer):
                 self._kept[i] = ctypes.create_string_buffer(size)
             ctypes.memmove(self._kept[i], address, size)
         addresses[i] = ctypes.addressof(self._kept[i])
+
+
+def joined(copies: Iterable[Copy]) -> list[Copy]:
+    """Return copies that do the same, with those joined whose targets and whose sources follow each other in memory."""
+    done: list[Copy] = []
+    for target, source in sorted(copies, key=lambda copy: copy[0].ctypes.data):
+        to, of = (_joined(*pair) for pair in zip(done[-1], (target, source), strict=True)) if done else (None, None)
+        if to is not None and of is not None:
+            done[-1] = (to, of)
+        else:
+            done.append((target, source))
+    return done
+
+
+def _joined(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any] | None:
+    """Return two views of one array as one view, or None if the second does not follow the first."""
+    whole = first.base
+    if whole is None or whole is not second.base:
+        return None
+    begin, middle, end = (
+        (address - whole.ctypes.data) // whole.itemsize
+        for address in (first.ctypes.data, second.ctypes.data, second.ctypes.data + second.nbytes)
+    )
+    return whole[begin:end] if begin + len(first) == middle else None
 
 
 def _arrays(fmi_type: str, fmi: int, n: int) -> tuple[Views, tuple[Any, ...]]:

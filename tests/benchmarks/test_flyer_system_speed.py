@@ -1,0 +1,53 @@
+"""CPU time of the free-flyer's scenarios: robot, thrusters, controllers and person as FMUs, coupled by the master.
+
+Run with `pytest tests/benchmarks/test_flyer_system_speed.py --benchmark-enable -s`. Recording is off. Beside it stands
+what the units' own steps take of it, by the master's count, and what the master adds.
+"""
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from cosim.master import Master
+from cosim.signals import Signals
+from fmus.build import cached
+from scenarios.catalog import SCENARIOS
+from scenarios.experiment import Experiment
+
+SEED = 0
+
+
+class Clock:
+    """Notes the CPU time after the start, so that loading the FMUs does not count, and the simulated time."""
+
+    def __init__(self) -> None:
+        self.begin = self.t = 0.0
+
+    def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
+        self.begin = self.begin or time.process_time()
+        self.t = t
+
+
+def pace(experiment: Experiment[Any]) -> tuple[float, float]:
+    """Simulated seconds a second of CPU of a run, and the units' share of the CPU time."""
+    p, clock = experiment.parameters_type(), Clock()
+    watch = experiment.watch(p)
+    system = experiment.build(p, SEED, lambda unit: cached(experiment.units[unit], 3))
+    with Master(system) as master:
+        master.run(experiment.stop_time(p), [watch, clock], until=lambda: watch.over)
+        spent = time.process_time() - clock.begin
+    assert watch.over
+    return clock.t / spent, sum(sum(cpu) for cpu in master.cpu.values()) / spent
+
+
+@pytest.mark.parametrize("name", ["flyer_impedance", "flyer_robot_to_human", "flyer_collaborative"])
+def test_pace(benchmark: BenchmarkFixture, name: str):
+    runs: list[tuple[float, float]] = []
+    benchmark.pedantic(lambda: runs.append(pace(SCENARIOS[name]())), rounds=5, warmup_rounds=1)
+    paces, shares = np.transpose(runs)
+    median, best, share = float(np.median(paces)), float(np.max(paces)), 100.0 * float(np.median(shares))
+    print(f"\n{name}: {median:.0f} simulated s a CPU s, {best:.0f} at best; {share:.0f} % of it in the units")
+    benchmark.extra_info.update(median=median, best=best, share=share)
