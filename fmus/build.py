@@ -119,7 +119,7 @@ def file_name(name: str, fmi: int) -> str:
 
 
 def _model(entry: Entry, token: str) -> Model:
-    block = _import_block(entry.block)
+    block = import_block(entry.block)
     description = describe(block)
     return Model(
         name=entry.name,
@@ -132,7 +132,12 @@ def _model(entry: Entry, token: str) -> Model:
     )
 
 
-def _import_block(path: str) -> type[Any]:
+def import_block(path: str) -> type[Any]:
+    """Return the class that a path such as `plants.tendon_arm:TendonArm` names.
+
+    Raises:
+        UnknownBlock: the module has no such class.
+    """
     module, _, name = path.partition(":")
     found = getattr(importlib.import_module(module), name, None)
     if not isinstance(found, type):

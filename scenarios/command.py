@@ -18,7 +18,7 @@ from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.interruption import Interruption
-from scenarios.listing import print_catalog, print_scenario, print_summary
+from scenarios.listing import print_catalog, print_scenario, print_summary, print_unit
 from scenarios.parameters import BadParameter, parse_parameters
 from scenarios.progress import progress_bar
 from scenarios.run_folder import BadRunFolder, RunFolder, check_place
@@ -41,6 +41,7 @@ _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Uni
 \b
 handover list                          scenarios and units
 handover list helix_handover           a scenario's parameters, with ranges
+handover list VslArm                   a unit's parameters, inputs and outputs
 handover run helix_handover            one run; leaves a folder with a report
 handover build TendonArm --fmi both    units for other tools
 handover vsl-train --out model.json    kinematics learned on the VSL arm
@@ -51,7 +52,7 @@ Exit status
   1  the run ended, but the task failed
   2  bad call or bad input; nothing was written
   3  a unit failed; what was recorded until then is kept
-  130  aborted with Ctrl-C
+  130  aborted with Ctrl-C: before the run, or by a second one during it
 
 \b
 Environment
@@ -66,13 +67,17 @@ def main() -> None:
 
 
 @main.command("list")
-@click.argument("scenario", required=False)
-def list_(scenario: str | None) -> None:
-    """List scenarios and units, or the parameters of one SCENARIO."""
-    if scenario is None:
+@click.argument("name", required=False, metavar="[SCENARIO|UNIT]")
+def list_(name: str | None) -> None:
+    """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT."""
+    if name is None:
         print_catalog()
+    elif name in UNITS:
+        print_unit(UNITS[name])
+    elif name in SCENARIOS:
+        print_scenario(SCENARIOS[name])
     else:
-        print_scenario(_scenario(scenario))
+        raise BadCall(f"no scenario or unit {name!r}: {nearest(name, [*SCENARIOS, *UNITS])}")
 
 
 @main.command("build")
@@ -145,6 +150,8 @@ def _replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> di
             raise BadCall(f"--unit {text!r} is not of the form NAME=FILE")
         if name not in experiment.units:
             raise BadCall(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
+        if name in found:
+            raise BadCall(f"--unit: {name} is given twice")
         found[name] = Path(file)
     return found
 

@@ -1,5 +1,6 @@
 """What `handover` prints: the catalog, a scenario's parameters, a run's summary."""
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -8,8 +9,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from cosim.block import Causality, Kind, Variable, describe
 from cosim.start_values import range_of
-from fmus.catalog import UNITS
+from fmus.build import import_block
+from fmus.catalog import UNITS, Entry
 from scenarios.catalog import SCENARIOS, SYSTEMS
 from scenarios.experiment import Experiment
 from scenarios.report import told
@@ -36,13 +39,22 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
     console = _console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold")
     console.print("Parameters, to be set with -p name=value")
-    rows: list[tuple[str, ...]] = []
-    for v in experiment.parameters():
-        allowed = " | ".join(n.lower() for n, _ in v.items) if v.items else range_of(v)
-        rows.append((v.name, _plain(v.start), allowed, v.description))
-    _print_rows(console, rows)
+    _print_rows(console, [(v.name, _plain(v.start), _allowed(v), v.description) for v in experiment.parameters()])
     console.print("Units, to be replaced with --unit name=file.fmu")
     _print_rows(console, list(experiment.units.items()))
+
+
+def print_unit(unit: Entry) -> None:
+    """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
+    console = _console()
+    d = describe(import_block(unit.block))
+    step = "sampled every" if d.period is not None else "stepped by, for instance,"
+    console.print(f"{unit.name}: {unit.summary}", style="bold")
+    console.print(f"{step} {float(unit.step) * 1000:.4g} ms")
+    for heading, variables in (("Parameters", d.parameters), ("Inputs", d.inputs), ("Outputs", d.outputs)):
+        if variables:
+            console.print(heading, style="bold")
+            _print_rows(console, [(v.name, _type_of(v), _start_of(v), _allowed(v), v.description) for v in variables])
 
 
 def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> None:
@@ -59,6 +71,21 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
     console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
 
 
+def _allowed(v: Variable) -> str:
+    return " | ".join(n.lower() for n, _ in v.items) if v.items else range_of(v)
+
+
+def _type_of(v: Variable) -> str:
+    shape = f"[{','.join(map(str, v.shape))}]" if v.shape else ""
+    unit = v.unit.symbol if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
+    return f"{v.kind.value}{shape} {unit}".rstrip()
+
+
+def _start_of(v: Variable) -> str:
+    told = "" if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else _plain(v.start)
+    return told if len(told) <= 40 else told[:37] + "..."
+
+
 def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
     table = Table.grid(padding=(0, 2))
     for row in rows:
@@ -67,10 +94,18 @@ def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
 
 
 def _console() -> Console:
-    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+    return _Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Say no more to a reader who has left; how the run ended is still told by the exit status."""
+        self.quiet = True
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _plain(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return ",".join(f"{x:g}" for x in value.reshape(-1).tolist())
-    return str(getattr(value, "name", value)).lower()
+    return f"{value:g}" if isinstance(value, float) else str(getattr(value, "name", value)).lower()

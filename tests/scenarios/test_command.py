@@ -1,5 +1,7 @@
 import json
+import os
 import re
+import subprocess
 import sys
 import zipfile
 from fractions import Fraction
@@ -44,11 +46,45 @@ def test_list_of_a_scenario_shows_ranges_and_units():
     assert "front | front_left | left | back_left" in " ".join(shown.split())
 
 
+def test_list_of_a_unit_shows_parameters_and_ports_with_units_and_ranges():
+    shown = " ".join(call("list", "VslArm").output.split())
+    assert "EI_0 real N.m2 0.55" in shown
+    assert "link_2 enumeration vsl vsl | rigid" in shown
+    assert "load real kg 0 from 0 to 0.5 kg" in shown
+    assert "shape real[25,3] m" in shown
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_every_unit_can_be_listed(name: str):
+    result = call("list", name)
+    assert result.exit_code == 0, result.output
+    assert "Outputs" in result.output
+
+
+def test_a_reader_who_leaves_does_not_change_the_status(tmp_path: Path):
+    command = [sys.executable, "-c", "from scenarios.entry import main; main()", "list"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
+    (tmp_path / "click.py").write_text("raise KeyboardInterrupt\n")
+    command = [sys.executable, "-c", "from scenarios.entry import main; main()", "list"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (130, "Aborted!\n")
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
         (("run", "helix_hand"), "did you mean helix_handover?"),
-        (("list", "nothing_like_it"), "valid: flyer_collaborative, flyer_failed_reception, "),
+        (("list", "nothing_like_it"), "valid: FreeFlyer, "),
         (("run", "helix_handover", "-p", "alfa=0.2"), "did you mean alpha"),
         (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
         (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),
@@ -72,6 +108,7 @@ def test_list_of_a_scenario_shows_ranges_and_units():
         ),
         (("run", "helix_handover", "--unit", "arms=x.fmu"), "did you mean arm?"),
         (("run", "helix_handover", "--unit", "arm"), "NAME=FILE"),
+        (("run", "helix_handover", "--unit", "arm=a.fmu", "--unit", "arm=b.fmu"), "arm is given twice"),
         (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
         (("build", "TendonArms"), "did you mean TendonArm?"),
         (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
