@@ -68,8 +68,10 @@ class Outputs:
     """Where to go."""
 
     p_WG_goal: Vector3[Metre] = output("point of the path to move to, in the world")
-    q_ref: Vector3[Radian] = output("joint angles that put the tip of a rigid arm there, eqs. (2)-(4)")
-    qd_ref: Vector3[RadianPerSecond] = output("joint velocities on the way there, by the inverse Jacobian, eq. (8)")
+    q_ref: Vector3[Radian] = output("joint angles that put the tip of a rigid arm there, [Gandarias2020] eqs. (2)-(4)")
+    qd_ref: Vector3[RadianPerSecond] = output(
+        "joint velocities on the way there, by the inverse Jacobian, [Gandarias2020] eq. (8)"
+    )
     p_cmd: Vector2[Pascal] = output("pressure commands of links 2 and 3")
     segment: int = output("segment of the path, from 1; 0 before it begins")
     moving: bool = output("the tip is on its way along the path")
@@ -182,9 +184,9 @@ def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -
         fault = _fault_at_points(segment, p, kinematics) or _fault_between(segment, p, kinematics)
         if fault is not None:
             faults.append(
-                f"segment {i + 1} of {len(segments)}, {fault}; what can be "
-                f"reached is from |L_2 - L_3| = {kinematics.reach[0]:.4g} m to L_2 + L_3 = {kinematics.reach[1]:.4g} m "
-                f"from the shoulder (0, 0, {p.L_1:.4g}) m, {_MARGIN * 1000:.0f} mm off these limits and off its axis"
+                f"segment {i + 1} of {len(segments)}, {fault}; a path stays {_MARGIN * 1000:.0f} mm or more off "
+                f"joint 1's axis and off both limits of reach: |L_2 - L_3| = {kinematics.reach[0]:.4g} m and "
+                f"L_2 + L_3 = {kinematics.reach[1]:.4g} m from the shoulder (0, 0, {p.L_1:.4g}) m"
             )
     return faults
 
@@ -213,6 +215,6 @@ def _fault(x: Floats, kinematics: VslKinematics) -> str | None:
     try:
         kinematics.inverse(x)
     except Unreachable as e:
-        return f"out of reach: {e.fault}"
+        return e.fault
     fault = kinematics.singularity(x, _MARGIN)
     return fault and f"singular: {fault}"

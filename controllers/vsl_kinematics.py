@@ -68,17 +68,19 @@ class VslKinematics:
         On J1's axis, where any theta_1 would do, theta_1 is 0.
 
         Raises:
-            Unreachable: the point is nearer to the shoulder, or farther, than the links can reach.
+            Unreachable: the point is nearer to the shoulder, or farther, than the links can reach, or it is the
+                shoulder, where any theta_2 would do.
         """
         X, Y, Z = p_WG.tolist()
         r_1 = math.hypot(X, Y)
         r_2 = Z - self.L_1
         r_3 = math.hypot(r_1, r_2)
         least, greatest = self.reach
-        if not least - 1e-12 <= r_3 <= greatest + 1e-12 or r_3 == 0.0:
-            raise Unreachable(
-                p_WG, f"it is {r_3:.4g} m from the shoulder, and the links reach {least:.4g} .. {greatest:.4g} m"
-            )
+        if not least - 1e-12 <= r_3 <= greatest + 1e-12:
+            told = f"it is {r_3:.4g} m from the shoulder, and the links reach {least:.4g} .. {greatest:.4g} m"
+            raise Unreachable(p_WG, f"out of reach: {told}")
+        if r_3 == 0.0:
+            raise Unreachable(p_WG, "singular: it is the shoulder itself, where the elbow is folded")
         at_shoulder = (r_3**2 + self.L_2**2 - self.L_3**2) / (2.0 * r_3 * self.L_2)
         at_elbow = (self.L_2**2 + self.L_3**2 - r_3**2) / (2.0 * self.L_2 * self.L_3)
         sign = self.elbow.sign

@@ -42,21 +42,24 @@ def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
                 np.where(record[s][:, i] < reflex.distance_max, 1000 * record[s][:, i], np.nan)
                 for s in ("reflex.distance", "scene.range")
             )
-            above.plot(t, seen, color=_OF_FINGER[i], drawstyle="steps-post", label=finger)
+            above.plot(t, seen, color=_OF_FINGER[i], drawstyle="steps-post", label=f"{finger}, as seen")
             above.plot(t, true, color=_OF_FINGER[i], lw=0.8, ls=":")
         if not parameters.literal:
-            above.axhline(1000 * reflex.target, color="#4d5866", lw=0.8, ls="--")
+            above.axhline(1000 * reflex.target, color="#4d5866", lw=0.8, ls="--", label="target of thumb and ring")
+        above.plot([], [], color="#4d5866", lw=0.8, ls=":", label="true, along the beam")
         above.set(ylabel="distance (mm)", ylim=(0, 70), xlim=(t[0], t[-1]))
         above.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.08))
         below.semilogy(t, np.maximum(record["reflex.cost"] * 1e6, 0.1), color=COLOURS[3], drawstyle="steps-post")
-        below.axhline(1e6 * threshold, color="#4d5866", lw=0.8, ls="--")
+        below.axhline(1e6 * threshold, color="#4d5866", lw=0.8, ls="--", label="at which the hand closes")
+        below.legend(loc="best")
         below.set(xlabel="time (s)", ylabel="cost f (mm²)", xlim=(t[0], t[-1]))
         for axes, names in ((above, _GROUPS), (below, {})):
             shade_phases(axes, t, _grouped(record), names)
     caption = (
-        "Distances as the controller sees them, eq. (11), and along the beams in truth (dotted), where there are any "
-        "in the sensors' range, and the cost of thumb and ring, in which a finger that sees nothing counts with "
-        f"{1000 * reflex.distance_max:.0f} mm. Dashed: target distance, and cost at which the hand closes."
+        "Distances as the controller sees them, [Luberto] eq. (11), and along the beams in truth (dotted), where "
+        "there are any in the sensors' range, and the cost f of thumb and ring, [Luberto] eq. (4), in mm² (1e-6 m²), "
+        f"in which a finger that sees nothing counts with {1000 * reflex.distance_max:.0f} mm. Dashed: target "
+        "distance, and cost at which the hand closes."
     )
     return Figure("distances", caption)
 

@@ -19,7 +19,7 @@ class Parameters:
         Strategy.REFLEX, "correct the pre-grasp pose by the sensors, close there at once, or go forward and close"
     )
     forward: Metre = parameter(0.035, "how far forward, for that strategy", minimum=0.0, maximum=0.3)
-    literal: bool = parameter(False, "the correction's equations as printed: (4) and (9)")
+    literal: bool = parameter(False, "the correction's equations as printed: [Luberto] eqs. (4) and (9)")
     standoff: Metre = parameter(
         0.07, "gap between palm and object at the pre-grasp pose that vision asks for", minimum=0.0, maximum=0.3
     )

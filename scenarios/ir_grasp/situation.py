@@ -35,7 +35,7 @@ class Situation:
         shift = p.shift_least + (p.shift_most - p.shift_least) * distance
         angle = p.shift_spread * (2.0 * direction - 1.0)
         yaw = p.vision_yaw * float(miss[2])
-        pregrasp = _asked_for(p.thing, p.standoff) + p.vision_position * miss[:2]
+        pregrasp = asked_for(p.thing, p.standoff) + p.vision_position * miss[:2]
         return cls(
             p_WO=shift * np.array([math.cos(angle), math.sin(angle)]) if p.perturbed else np.zeros(2),
             turn=p.turn_most * (2.0 * float(turn) - 1.0) if p.perturbed else 0.0,
@@ -45,7 +45,7 @@ class Situation:
         )
 
 
-def _asked_for(thing: Thing, standoff: float) -> Floats:
+def asked_for(thing: Thing, standoff: float) -> Floats:
     """Return the wrist's place before the middle of the object's width, its palm a standoff from its nearest point."""
     yaw = SOLIDS[thing].yaw
     R_WO = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])

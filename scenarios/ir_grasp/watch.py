@@ -7,9 +7,11 @@ import numpy as np
 from controllers.reflex_parameters import Params as ReflexParams
 from cosim.ports import Floats
 from cosim.signals import Signals
+from plants.grasp_objects import SOLIDS
 from plants.grasp_scene import SEES_NOTHING
 from scenarios.experiment import Metric, Outcome, Watch
 from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.situation import asked_for
 
 _SETTLING = 0.3
 """How long the hand rests after the shake, s (assumed)."""
@@ -20,6 +22,8 @@ _BODIES = 2
 _LEFT_BEHIND = 0.04
 """How far an object that is held may have stayed behind the hand since the pull began, m (assumed): less than the
 object's and the fingers' width, so that it is still where they closed."""
+
+_COST = "cost f of thumb and ring, [Luberto] eq. (4), as the hand began to close (1e-06 m2: 1 mm²)"
 
 _AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
 _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
@@ -46,6 +50,7 @@ class GraspWatch(Watch):
         self._touching = 0
         self._touching_closed = 0
         self._lost_in = ""
+        self._at_start: dict[str, Metric] = {}
         self._at_closing: dict[str, Metric] = {}
         self._stop = ""
 
@@ -54,6 +59,7 @@ class GraspWatch(Watch):
         self._t, phase = t, signals.text("reflex.phase")
         if not self.moments:
             self.moments["start"], self._p_WO_start = t, signals["scene.p_WO"]
+            self._at_start = self._unknown_to_vision(signals)
         if phase != self._phase:
             self._enter(phase, signals)
         if phase in self._moves:
@@ -61,6 +67,23 @@ class GraspWatch(Watch):
         elif phase in _AFTER_CLOSING:
             self._look(signals)
             self._lost_in = "" if self._held else self._lost_in or phase
+
+    def _unknown_to_vision(self, signals: Signals) -> dict[str, Metric]:
+        """Return what vision did not see: it saw the object at W's origin in its reference pose, and asked for a pose.
+
+        The hand begins a run-up behind the pose that it was asked for, and with that pose's heading.
+        """
+        p, yaw = self.parameters, float(signals["scene.yaw"])
+        pregrasp = signals["scene.p_WH"] + p.run_up * np.array([math.cos(yaw), math.sin(yaw)])
+        turned = float(signals["scene.yaw_O"]) - SOLIDS[p.thing].yaw
+        off = float(np.linalg.norm(pregrasp - asked_for(p.thing, p.standoff)))
+        moved = float(np.linalg.norm(signals["scene.p_WO"]))
+        return {
+            "moved": Metric(moved, "m", "how far the object was moved after vision saw it"),
+            "turned": Metric(turned, "rad", "how far it was turned after vision saw it, counter-clockwise"),
+            "vision_position_error": Metric(off, "m", "how far off vision put the pre-grasp position"),
+            "vision_yaw_error": Metric(yaw, "rad", "how far off vision put the pre-grasp heading, counter-clockwise"),
+        }
 
     def _enter(self, phase: str, signals: Signals) -> None:
         self._phase = phase
@@ -84,18 +107,19 @@ class GraspWatch(Watch):
         began = min((self._entered[p] for p in _REFINING if p in self._entered), default=t)
         seen, true = signals["reflex.distance"], signals["scene.range"]
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
+        stop = int(signals["reflex.stop"])
         told = {
-            "final_cost": Metric(float(signals["reflex.cost"]), "m2", "f as the hand began to close"),
+            "final_cost": Metric(float(signals["reflex.cost"]), "m2", _COST),
             "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
             "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
-            "stop": Metric(int(signals["reflex.stop"]), "1", f"why the refinement ended: {self._stop}"),
+            "stop": Metric(stop, "1", f"number of why the refinement ended: {stop} is {self._stop}"),
         }
         for i, finger in enumerate(("thumb", "index", "ring")):
             whole = f"{finger} to object as the hand began to close"
             unseen = " (sees nothing)" if seen[i] >= ReflexParams().distance_max else ""
             unmet = " (meets nothing)" if true[i] >= SEES_NOTHING else ""
-            told[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by eq. (11){unseen}")
+            told[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by [Luberto] eq. (11){unseen}")
             told[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam{unmet}")
         self._at_closing = told
 
@@ -129,7 +153,7 @@ class GraspWatch(Watch):
 
     def outcome(self) -> Outcome:
         """Return whether the object came along and is still in the hand, why, and the figures."""
-        metrics = dict(self._at_closing)
+        metrics = {**self._at_closing, **self._at_start}
         for phase, what in (("PROBE", "probing"), ("RECOVER", "recovering"), ("APPROACH", "approaching")):
             metrics[f"{what}_moves"] = Metric(self._moves[phase], "1", f"{what} moves")
         if self._p_HO_closed is not None:

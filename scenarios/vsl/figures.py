@@ -19,6 +19,11 @@ _SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[
 _ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
 """The arm's lines at its three moments: where they lie over each other, all are seen."""
 
+_BY_SERVOS = "tip by the servos, links taken as rigid"
+
+_LINES = (("desired", ":"), ("commanded", "--"), ("measured", "-"))
+"""What the lines of joints and pressures are."""
+
 _DISTANCE = "horizontal distance from the base (mm)"
 
 _APART = 0.01
@@ -37,19 +42,24 @@ def _path(watch: PathWatch, folder: Path) -> Figure:
     points = watch.points
     lines: list[tuple[Sequence[Floats], dict[str, Any]]] = [
         (list(watch.path), {"color": _DESIRED, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
-        ([p.servo for p in points], {"color": _SERVO, "ls": "--", "lw": 1.3, "label": "servos, links taken as rigid"}),
-        ([p.tracked for p in points], {"color": _TIP, "lw": 1.3, "label": "tip, by the tracker"}),
+        (
+            [p.servo for p in points],
+            {"color": _SERVO, "ls": "--", "lw": 1.3, "label": _BY_SERVOS},
+        ),
+        ([p.tracked for p in points], {"color": _TIP, "lw": 1.3, "label": "tip by the tracker"}),
     ]
     if watch.hybrid:
-        label = "tip, estimated by the forward model"
+        label = "tip by the hybrid forward model"
         lines.append(([p.estimated for p in points], {"color": _ESTIMATE, "ls": ":", "lw": 1.8, "label": label}))
-    with figure(folder / "path", 1, size=(6.4, 5.6)) as (axes,):
-        for positions, style in lines:
-            axes.plot(*_in_plane(np.array(positions), watch), **style)
+    places = [_in_plane(np.array(positions), watch) for positions, _ in lines]
+    xlim, zlim = _limits(np.hstack([np.array(place) for place in places]))
+    size = (6.4, min(1.5 + 5.6 * (zlim[1] - zlim[0]) / (xlim[1] - xlim[0]), 7.6))
+    with figure(folder / "path", 1, size=size) as (axes,):
+        for place, (_, style) in zip(places, lines, strict=True):
+            axes.plot(*place, **style)
         axes.plot(*_in_plane(watch.path[:1], watch), "o", ms=6, color=_DESIRED, label="start")
-        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
-        axes.set(xlim=_widened(axes.get_xlim(), axes.get_ylim()), ylim=_widened(axes.get_ylim(), axes.get_xlim()))
-        axes.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.12))
+        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal", xlim=xlim, ylim=zlim)
+        axes.figure.legend(ncols=2, loc="outside lower center")
     return Figure("path", "The path: desired, by the servos' encoders, and of the tip. Equal scales.")
 
 
@@ -62,34 +72,37 @@ def _shapes(parameters: Parameters, watch: PathWatch, record: Record, folder: Pa
             axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
             if parameters.load > 0.0:
                 axes.plot(arm_x[-1], arm_z[-1] - 8.0, "s", ms=9, color=COLOURS[k])
+        if parameters.load > 0.0:
+            axes.plot([], [], "s", ms=9, color="#9aa3af", label=f"load, {parameters.load * 1000:.0f} g")
         axes.axhspan(-30.0, 0.0, color="#d8dde4", lw=0, zorder=0)
         axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
-        axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16))
-    load = f" with its load of {parameters.load * 1000:.0f} g" if parameters.load > 0.0 else ""
+        axes.figure.legend(ncols=5, loc="outside lower center", columnspacing=1.2, handlelength=1.6)
+    load = f" with its load of {parameters.load * 1000:.0f} g (squares)" if parameters.load > 0.0 else ""
     return Figure("shape", f"Centre line of the arm{load} at three moments, above the ground. Equal scales.")
 
 
 def _errors(watch: PathWatch, folder: Path) -> Figure:
     groups = {
-        "servos": [distance(p.servo, p.desired) for p in watch.points],
-        "tip": [p.error for p in watch.points],
-        "rigid model": [distance(p.servo, p.true) for p in watch.points],
+        "tip by servos,\nto desired": [distance(p.servo, p.desired) for p in watch.points],
+        "tip by tracker,\nto desired": [p.error for p in watch.points],
+        "tip by servos,\nto true tip": [distance(p.servo, p.true) for p in watch.points],
     }
     if watch.hybrid:
-        groups["hybrid model"] = [distance(p.estimated, p.true) for p in watch.points]
+        groups["hybrid model,\nto true tip"] = [distance(p.estimated, p.true) for p in watch.points]
     colours = (_SERVO, _TIP, COLOURS[4], _ESTIMATE)
     with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
         for k, (values, colour) in enumerate(zip(groups.values(), colours, strict=False)):
             _draw_box(boxes, k, np.array(values) * 1000, colour)
-        boxes.set_xticks(range(len(groups)), list(groups))
+        boxes.set_xticks(range(len(groups)), list(groups), fontsize="small")
         boxes.set(ylabel="error (mm)", ylim=(0.0, None))
         boxes.grid(visible=False, axis="x")
         where, label = _spread(watch)
         reach.plot(where, [p.error * 1000 for p in watch.points], ".", color=_TIP)
         reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
     caption = (
-        "Left: 25th to 75th percentile (box), range, median (line) and mean (dot); servos and tip against the desired "
-        "points, the models' estimates against the true tip. Right: error of the tip over the desired point's place."
+        "Left: 25th to 75th percentile (box), range, median (line) and mean (dot), of distances of the tip by the "
+        "servos' encoders and rigid links, by the tracker, or by the hybrid model, to the desired points or to the "
+        "true tip. Right: error of the tip over the desired point's place."
     )
     return Figure("errors", caption)
 
@@ -98,7 +111,10 @@ def _error_over_time(watch: PathWatch, record: Record, folder: Path) -> Figure:
     t = record.time
     goal, moving = record["planner.p_WG_goal"], record["planner.moving"]
     segments = {0: "before", **{n: f"segment {n}" for n in range(1, int(np.max(record["planner.segment"])) + 1)}}
-    curves = [("arm.p_WG_meas", _TIP, "tip, by the tracker"), ("kinematics.p_WG_model", _SERVO, "servos")]
+    curves = [
+        ("arm.p_WG_meas", _TIP, "tip by the tracker"),
+        ("kinematics.p_WG_model", _SERVO, _BY_SERVOS),
+    ]
     with figure(folder / "error", 1, size=(8.0, 3.8)) as (axes,):
         shade_phases(axes, t, record["planner.segment"], segments)
         for signal, colour, label in curves:
@@ -106,11 +122,13 @@ def _error_over_time(watch: PathWatch, record: Record, folder: Path) -> Figure:
             axes.plot(t[moving], error[moving], color=colour, lw=1.2, label=label)
         if watch.hybrid:
             error = np.linalg.norm(record["kinematics.p_WG_est"] - record["arm.p_WG"], axis=1) * 1000
-            label = "forward model's estimate, to the true tip"
+            label = "hybrid forward model, to the true tip"
             axes.plot(t[moving], error[moving], color=_ESTIMATE, lw=1.2, label=label)
-        axes.axhline(watch.parameters.tolerance * 1000, color="#4d5866", lw=0.8, ls="--")
-        axes.set(xlabel="time (s)", ylabel="distance (mm)", ylim=(0.0, None), xlim=(t[0], t[-1]))
-        axes.legend(ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.2))
+        axes.axhline(
+            watch.parameters.tolerance * 1000, color="#4d5866", lw=0.8, ls="--", label="tolerance for the mean"
+        )
+        axes.set(xlabel="time (s)", ylabel="distance to desired point (mm)", ylim=(0.0, None), xlim=(t[0], t[-1]))
+        axes.figure.legend(ncols=2, loc="outside lower center")
     return Figure("error", "Distance to the desired point over time, on the path. Dashed: the tolerance for its mean.")
 
 
@@ -127,13 +145,16 @@ def _signals(record: Record, folder: Path) -> Figure:
             colour, lw = COLOURS[k + 1], (2.6, 1.0)[k]  # equal pressures lie over each other
             pressures.plot(t, record["planner.p_cmd"][:, k] / 1e5, color=colour, ls="--", lw=lw)
             pressures.plot(t, record["arm.p_meas"][:, k] / 1e5, color=colour, lw=lw, label=f"link {k + 2}")
+        for axes, styles in ((joints, _LINES), (pressures, _LINES[1:])):
+            for name, style in styles:
+                axes.plot([], [], color=_DESIRED, ls=style, lw=1.2, label=name)
         joints.set(ylabel="joint angle (°)")
         currents.set(ylabel="current (A)")
         pressures.set(ylabel="pressure (bar)", xlabel="time (s)", ylim=(0.0, None))
         for axes in (joints, currents, pressures):
             axes.set_xlim(t[0], t[-1])
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    caption = "Joints (dotted: wanted by rigid kinematics; dashed: commanded; line: measured), currents, pressures."
+    caption = "Joints (desired: those of rigid links, the planner's), currents, pressures, over time."
     return Figure("signals", caption)
 
 
@@ -150,6 +171,14 @@ def _spread(watch: PathWatch) -> tuple[Floats, str]:
     """Return the points' reach, mm, and what it is; their height for a path that reaches equally far throughout."""
     r, z = (1000 * np.array(values) for values in zip(*((p.reach, p.desired[2]) for p in watch.points), strict=True))
     return (z, "z in W (mm)") if np.ptp(r) < 1000 * _APART else (r, _DISTANCE)
+
+
+def _limits(places: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return limits of both axes around points, shape (2, n), mm, with a margin."""
+    low, high = places.min(axis=1), places.max(axis=1)
+    margin = 0.06 * float(np.max(high - low))
+    x, z = ((float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True))
+    return _widened(x, z), _widened(z, x)
 
 
 def _widened(limits: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:

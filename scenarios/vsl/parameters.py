@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.trajectory_planner import Elbow, Path
+from controllers.vsl_kinematics import place
 from controllers.vsl_path import segments_of
 from cosim.ports import Floats, Vector3, parameter
 from cosim.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
@@ -34,9 +35,11 @@ class Parameters:
     )
     elbow: Elbow = parameter(Elbow.UP, "which way it points; down, it is below the ground on the paper's paths")
     x_0: Vector3[Metre] = parameter(
-        np.array([0.30, 0.0, 0.05]), "start of a custom path in W", minimum=-1.0, maximum=1.0
+        np.array([0.30, 0.0, 0.05]), "start of a custom path in W, z at least 0", minimum=-1.0, maximum=1.0
     )
-    x_g: Vector3[Metre] = parameter(np.array([0.40, 0.0, 0.15]), "end of a custom path in W", minimum=-1.0, maximum=1.0)
+    x_g: Vector3[Metre] = parameter(
+        np.array([0.40, 0.0, 0.15]), "end of a custom path in W, z at least 0", minimum=-1.0, maximum=1.0
+    )
     tolerance: Metre = parameter(
         0.06, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
     )
@@ -51,6 +54,22 @@ class Parameters:
         """Joint angles at which the arm starts, with the tip 0.3 m out, level with the shoulder, shape (3,), rad."""
         sign = 1.0 if self.elbow is Elbow.UP else -1.0
         return sign * np.array([0.0, 0.8411, -1.6821])
+
+    @property
+    def points_in_all(self) -> int:
+        """Points of all segments of the path together."""
+        return self.points * len(segments_of(self.path, self.x_0, self.x_g))
+
+    def path_faults(self) -> list[str]:
+        """Say which end of the path is below the ground, or is given for a path that does not have it."""
+        own, faults = type(self)(), list[str]()
+        for name, p_WG, p_WG_own in (("x_0", self.x_0, own.x_0), ("x_g", self.x_g, own.x_g)):
+            if self.path is not Path.CUSTOM and not np.array_equal(p_WG, p_WG_own):
+                path = self.path.name.lower()
+                faults.append(f"{name}: the path {path} has ends of its own; {name} is for path=custom only")
+            elif self.path is Path.CUSTOM and p_WG[2] < 0.0:
+                faults.append(f"{name}: {place(p_WG)} is below the ground, z = 0 in W; its z must be at least 0")
+        return faults
 
     @property
     def length(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
+from scenarios.parameters import BadParameter
 from scenarios.record import Record
 from scenarios.vsl.figures import draw_path_run
 from scenarios.vsl.parameters import Parameters
@@ -34,6 +35,8 @@ class PathExperiment(Experiment[PathWatch]):
         "model_error",
         "estimate_error",
         "outside",
+        "points_visited",
+        "lowest",
         "path_time",
         "cpu_per_cycle",
         "pace_arm",
@@ -46,8 +49,14 @@ class PathExperiment(Experiment[PathWatch]):
         return {}
 
     def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
-        """Wire planner, kinematics and arm."""
+        """Wire planner, kinematics and arm.
+
+        Raises:
+            BadParameter: an end of the path is below the ground, or is given for a path that does not have it.
+        """
         p = parameters
+        if faults := p.path_faults():
+            raise BadParameter(faults)
         arm_seed = int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1)
         s = System()
         planner = s.add(

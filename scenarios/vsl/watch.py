@@ -1,5 +1,6 @@
 """Judges how well the tip followed its path, by the tracker, which the arm's controller does not see."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -34,6 +35,7 @@ class PathWatch(Watch):
         self._segment = 0
         self._goal: Floats | None = None
         self._moving = False
+        self._lowest = math.inf
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow the planner; keep a point when it is left."""
@@ -46,6 +48,7 @@ class PathWatch(Watch):
         if bool(signals["planner.done"]) and self.completed is None:
             self.completed = t
         self._t, self._goal, self._moving = t, goal, moving
+        self._lowest = min(self._lowest, float(np.min(signals["arm.shape"][1:, 2])))  # without the base
         self._segment = int(signals["planner.segment"])
 
     @property
@@ -66,16 +69,25 @@ class PathWatch(Watch):
 
     def _reason(self, metrics: dict[str, Metric]) -> str:
         if self.completed is None:
-            where = "before it began" if self._began is None else f"in segment {self._segment}"
-            return f"the path was not completed: stopped {where} at {self._t:.1f} s, {len(self.points)} points passed"
+            if self._began is None:
+                return f"stopped at {self._t:.1f} s, before the path began"
+            passed = f"{len(self.points)} of the path's {self.parameters.points_in_all} points visited"
+            return f"stopped at {self._t:.1f} s in segment {self._segment} of the path, {passed}"
         if "mean_error" not in metrics:
             return f"the path was completed at {self.completed:.1f} s without a point on it"
         error, tolerance = metrics["mean_error"].value, self.parameters.tolerance
         verdict = "within" if error <= tolerance else "above"
         return (
             f"the path was completed at {self.completed:.1f} s; mean error of the tip {error * 1000:.1f} mm, "
-            f"{verdict} the tolerance of {tolerance * 1000:.1f} mm"
+            f"{verdict} the tolerance of {tolerance * 1000:.1f} mm{self._dip}"
         )
+
+    @property
+    def _dip(self) -> str:
+        """Say how far the arm was below the ground, which hinders nothing in the simulation."""
+        if self._lowest >= 0.0:
+            return ""
+        return f"; a real arm would have struck the ground: the links dipped {-self._lowest * 1000:.1f} mm below it"
 
     def _metrics(self) -> dict[str, Metric]:
         path = self.path
@@ -100,6 +112,11 @@ class PathWatch(Watch):
             metrics["outside"] = self._mean(
                 lambda p: float(p.outside), "share of points at which the model had to extrapolate", "1"
             )
+        visited = f"points visited of the path's {self.parameters.points_in_all}"
+        if self.completed is not None and len(self.points) < self.parameters.points_in_all:
+            visited += "; the others fell between two periods of the planner"
+        metrics["points_visited"] = Metric(len(self.points), "1", visited)
+        metrics["lowest"] = Metric(self._lowest, "m", "height of the links' lowest point above the ground, z in W")
         if self.completed is not None and self._began is not None:
             metrics["path_time"] = Metric(self.completed - self._began, "s", "time on the path")
         return metrics

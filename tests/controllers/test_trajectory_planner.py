@@ -181,7 +181,10 @@ def test_a_restored_state_goes_on_bit_for_bit(steps: int):
     ("changes", "told"),
     [
         ({"x_g": np.array([0.5, 0.0, 0.15])}, ["segment 1 of 1, point 75 of 100, (0.45, 0, 0.125) m", "0 .. 0.45 m"]),
-        ({"x_g": np.array([0.45, 0.0, 0.15])}, ["point 100 of 100", "stretched", "0 m to L_2 + L_3 = 0.45 m"]),
+        (
+            {"x_g": np.array([0.45, 0.0, 0.15])},
+            ["point 100 of 100", "stretched", "0 m and L_2 + L_3 = 0.45 m"],
+        ),
         ({"x_g": np.array([0.0, 0.0, 0.35])}, ["point 100 of 100", "axis of joint 1"]),
         ({"x_g": np.array([0.3, 0.0, 0.05])}, ["x_0 and x_g are the same point"]),
         ({"x_g": np.array([np.nan, 0.0, 0.05])}, ["not finite"]),
@@ -192,6 +195,10 @@ def test_a_restored_state_goes_on_bit_for_bit(steps: int):
         (
             {"L_3": 0.2, "x_0": np.array([0.2, 0.002, 0.15]), "x_g": np.array([-0.2, 0.002, 0.15]), "N": 3},
             ["between its points, at (0.025, 0.002, 0.15) m: singular", "folded"],
+        ),
+        (
+            {"x_0": np.array([0.4, 0.0, 0.15]), "x_g": np.array([-0.4, 0.0, 0.15])},
+            ["point 50 of 100, (0, 0, 0.15) m: singular: it is the shoulder itself, where the elbow is folded", "1 mm"],
         ),
         ({"L_2": 0.4, "L_3": 0.1, "x_g": np.array([0.2, 0.0, 0.15])}, ["|L_2 - L_3| = 0.3 m", "out of reach"]),
     ],

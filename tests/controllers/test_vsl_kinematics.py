@@ -72,6 +72,13 @@ def test_points_out_of_reach_are_told_with_what_is_in_reach(p_WG: list[float], t
     np.testing.assert_array_equal(caught.value.p_WG, p_WG)
 
 
+def test_the_shoulder_itself_is_not_said_to_be_out_of_reach():
+    with pytest.raises(Unreachable, match="singular: it is the shoulder itself, where the elbow is folded"):
+        ARM.inverse(np.array([0.0, 0.0, 0.15]))
+    with pytest.raises(Unreachable, match="out of reach: it is 0 m from the shoulder"):
+        UNEQUAL.inverse(np.array([0.0, 0.0, 0.1]))
+
+
 @pytest.mark.parametrize(
     ("p_WG", "told"),
     [

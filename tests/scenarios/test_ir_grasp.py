@@ -18,6 +18,7 @@ from scenarios.experiment import Outcome
 from scenarios.interruption import Interruption
 from scenarios.ir_grasp.ir_grasp import IrGrasp
 from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.situation import Situation, asked_for
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Task, carry_out
@@ -81,6 +82,12 @@ def test_the_summary_tells_what_the_record_shows(run: tuple[Path, dict[str, Any]
     assert metrics["refinement_time"]["value"] == pytest.approx(record.time[closing] - began)
     pushed = np.linalg.norm(record["scene.p_WO"][closing] - record["scene.p_WO"][0])
     assert metrics["displacement"]["value"] == pytest.approx(pushed)
+    drawn = Situation.draw(Parameters(), 0)
+    assert metrics["moved"]["value"] == pytest.approx(np.linalg.norm(drawn.p_WO))
+    assert metrics["turned"]["value"] == pytest.approx(drawn.turn)
+    off = drawn.p_WH_pregrasp - asked_for(Parameters().thing, Parameters().standoff)
+    assert metrics["vision_position_error"]["value"] == pytest.approx(np.linalg.norm(off))
+    assert metrics["vision_yaw_error"]["value"] == pytest.approx(drawn.yaw)
     stop = Stop(int(record["reflex.stop"][-1]))
     assert metrics["stop"]["value"] == stop
     assert stop.name.lower() in summary["reason"]

@@ -34,7 +34,7 @@ def signals(
             name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), shape=shape, **more
         )
 
-    for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0)):
+    for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0), ("yaw_O", 0.0)):
         show("scene", name, Kind.REAL, value)
     show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
     show("scene", "touching", Kind.INTEGER, touching)
@@ -95,9 +95,9 @@ def test_a_finger_that_sees_nothing_is_told_from_one_at_the_end_of_its_range():
         metrics = follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics
         return [metrics[f"{kind}_distance_index"].description for kind in ("final", "true")]
 
-    assert told(0.065, 0.2)[0].endswith("by eq. (11) (sees nothing)")
+    assert told(0.065, 0.2)[0].endswith("by [Luberto] eq. (11) (sees nothing)")
     assert told(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
-    assert told(0.06, 0.07)[0].endswith("by eq. (11)")
+    assert told(0.06, 0.07)[0].endswith("by [Luberto] eq. (11)")
     assert told(0.06, 0.07)[1].endswith("along the beam")
 
 

@@ -15,7 +15,7 @@ from cosim.recorder import Recorder
 from fmus.build import cached
 from scenarios.experiment import Outcome
 from scenarios.interruption import Interruption
-from scenarios.parameters import parse_parameters
+from scenarios.parameters import BadParameter, parse_parameters
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Ended, Task, carry_out
@@ -159,6 +159,26 @@ def test_a_point_out_of_reach_is_refused_and_named_before_anything_is_written(
 ):
     with pytest.raises(UnitRefused, match=r"segment 1 of 1, point \d+ of 100, \(0\.4\d+, 0, 0\.05\) m"):
         run(experiment, tmp_path / "r", "path=custom", "x_g=0.6,0,0.05")
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "told"),
+    [
+        (("path=custom", "x_0=0.3,0,-0.1", "x_g=0.35,0,0"), [r"x_0: (0.3, 0, -0.1) m is below the ground"]),
+        (("path=custom", "x_0=0.3,0,-0.1", "x_g=0.3,0,-0.05"), ["x_0: (0.3, 0, -0.1) m", "x_g: (0.3, 0, -0.05) m"]),
+        (("x_0=0.3,0,0.1",), ["x_0: the path curve has ends of its own", "path=custom only"]),
+        (("path=square", "x_0=0.3,0,0.1", "x_g=0.3,0,-0.2"), ["x_0: the path square", "x_g: the path square"]),
+    ],
+)
+@pytest.mark.parametrize("experiment", BOTH)
+def test_ends_below_the_ground_or_of_another_path_are_refused_and_named(
+    experiment: type[PathExperiment], parameters: tuple[str, ...], told: list[str], tmp_path: Path
+):
+    with pytest.raises(BadParameter) as caught:
+        run(experiment, tmp_path / "r", *parameters)
+    assert len(caught.value.faults) == sum(part.startswith("x_") for part in told)
+    assert all(part in str(caught.value) for part in told)
     assert not (tmp_path / "r").exists()
 
 

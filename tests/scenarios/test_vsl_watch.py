@@ -22,13 +22,14 @@ def signals(
     segment: int = 1,
     done: bool = False,
     outside: bool = False,
+    lowest: float = 0.04,
 ) -> Signals:
     """Return a goal at x = goal and a tip `below` the point at x = at; servos are 1 mm off, the tracker 0.5 mm."""
     told, reached = (np.array([x, 0.0, 0.1]) for x in (goal, goal if at is None else at))
     tip = reached - below * UP
     values: dict[str, dict[str, Any]] = {
         "planner": {"p_WG_goal": told, "moving": segment > 0 and not done, "done": done, "segment": segment},
-        "arm": {"p_WG": tip + 0.0005 * UP, "p_WG_meas": tip},
+        "arm": {"p_WG": tip + 0.0005 * UP, "p_WG_meas": tip, "shape": np.array([0.0 * UP, 0.15 * UP, lowest * UP])},
         "kinematics": {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.003 * UP, "outside": outside},
     }
     views: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
@@ -76,7 +77,8 @@ def test_errors_are_those_of_the_points():
     assert values["path_distance"] == pytest.approx(0.034, rel=0.3)
     assert values["path_time"] == pytest.approx(0.1)
     assert "estimate_error" not in values
-    assert all(m.unit == ("s" if name == "path_time" else "m") for name, m in metrics.items())
+    units = {"path_time": "s", "points_visited": "1"}
+    assert {name: m.unit for name, m in metrics.items()} == {name: units.get(name, "m") for name in metrics}
 
 
 def test_a_completed_path_within_the_tolerance_succeeds():
@@ -98,15 +100,32 @@ def test_a_path_that_was_cut_short_fails_and_says_how_far_it_came():
     assert not watch.over
     outcome = watch.outcome()
     assert not outcome.success
-    assert "stopped in segment 1 at 0.1 s, 2 points passed" in outcome.reason
+    assert "stopped at 0.1 s in segment 1 of the path, 2 of the path's 200 points visited" in outcome.reason
     assert "path_time" not in outcome.metrics
 
 
 def test_a_path_that_never_began_fails_without_errors():
     outcome = follow(PathWatch(Parameters(), hybrid=False), signals(0.3, segment=0)).outcome()
     assert not outcome.success
-    assert "stopped before it began" in outcome.reason
+    assert outcome.reason == "stopped at 0.0 s, before the path began"
     assert not outcome.metrics
+
+
+def test_points_that_fell_between_two_periods_are_told():
+    metrics = follow(PathWatch(Parameters(points=2), hybrid=False), *path(0.01, 0.02, 0.03)).outcome().metrics
+    assert metrics["points_visited"].value == 3
+    assert metrics["points_visited"].description.startswith("points visited of the path's 4; the others fell between")
+    metrics = follow(PathWatch(Parameters(points=1), hybrid=False), *path(0.01, 0.02)).outcome().metrics
+    assert metrics["points_visited"].description == "points visited of the path's 2"
+
+
+def test_links_below_the_ground_are_told():
+    above = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.02)).outcome()
+    assert above.metrics["lowest"].value == pytest.approx(0.04)
+    assert "ground" not in above.reason
+    below = follow(PathWatch(Parameters(), hybrid=False), signals(0.3, segment=0, lowest=-0.0421), *path(0.01, 0.02))
+    assert below.outcome().metrics["lowest"].value == pytest.approx(-0.0421)
+    assert below.outcome().reason.endswith("the links dipped 42.1 mm below it")
 
 
 def test_the_hybrid_tells_of_its_forward_model_and_of_extrapolation():
