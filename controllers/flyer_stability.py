@@ -7,7 +7,7 @@ from controllers.flyer_body import FlyerBody
 from controllers.sampled_loop import LinearController, SampledLoop, largest_stable
 from cosim.refusal import Refusal
 
-_LONGEST_DELAY = 1.0  # s, up to which a stable one is looked for
+_LONGEST_DELAY = 0.5  # s, up to which a stable one is looked for
 
 
 class UnusableController(Refusal):

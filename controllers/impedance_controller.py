@@ -40,7 +40,9 @@ _NAME = "ImpedanceController"
 class Params:
     """Gains of table 4.1 or custom ones, and what the robot knows of itself: public values of Astrobee, arm assumed."""
 
-    behaviour: Behaviour = parameter(Behaviour.RIGID, "gains of table 4.1, or CUSTOM for the four matrices below")
+    behaviour: Behaviour = parameter(
+        Behaviour.RIGID, "gains of [Fernandes2020] table 4.1, or CUSTOM for the four matrices below"
+    )
     stiffness_translation: Matrix3[NewtonPerMetre] = parameter(
         7.0 * MASS * np.eye(3), "CUSTOM: linear k_D, in the goal's axes"
     )
@@ -57,7 +59,7 @@ class Params:
     I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
     p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
     delay: Second = parameter(
-        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=2.0
+        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
     )
     lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
 

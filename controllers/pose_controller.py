@@ -66,7 +66,7 @@ class Params:
     I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
     p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
     delay: Second = parameter(
-        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=2.0
+        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
     )
     lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
 

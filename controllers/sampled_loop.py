@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import control as untyped_control
@@ -17,7 +17,7 @@ _LASTING = math.exp(-1.0)  # a pole nearer to zero, as those of a delay are, is 
 _WHOLE = 1e-9  # of a period: what a delay of whole periods may be off by rounding
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LinearPlant:
     """dx/dt = A x + B u + E d, y = C x: u is commanded, d comes from outside."""
 
@@ -105,7 +105,7 @@ class SampledLoop:
         return np.transpose(y)
 
 
-def largest_stable(radius: Callable[[float], float], upper: float, steps: int = 14) -> float:
+def largest_stable(radius: Callable[[float], float], upper: float, steps: int = 10) -> float:
     """Return about the largest x in [0, upper] with radius(x) < 1, by bisection; 0 if none is found."""
     low, high = 0.0, upper
     for _ in range(steps):
@@ -134,6 +134,7 @@ def _sampled(plant: LinearPlant, past: float, period: float) -> Any:
     return control.ss(whole.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])), period)
 
 
+@lru_cache(maxsize=16)
 def _discrete(plant: LinearPlant, time: float) -> Any:
     B = np.hstack([plant.B, plant.E])
     continuous = control.ss(plant.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])))

@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 STYLE: dict[Any, Any] = {
@@ -29,6 +30,11 @@ STYLE: dict[Any, Any] = {
 }
 
 COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#b58a1b", "#4d5866")
+
+
+_NAME = "#4d5866"
+_LETTER, _UPRIGHT = 5.2, 8.5
+"""Widths of a letter of a name over a phase, and of an upright name, in points."""
 
 
 @contextmanager
@@ -54,16 +60,56 @@ def figure(
 
 
 def shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64], names: Mapping[int, str]) -> None:
-    """Shade every second phase and write the names of those that last over the axes, where `names` has them."""
+    """Shade every second phase and write the names of phases, where `names` has them.
+
+    A name stands over its phase if it is narrower; else upright at the top of the axes, with a line to its phase.
+    """
     edges = np.flatnonzero(np.diff(phase)) + 1
     starts = [0, *edges.tolist()]
     ends = [*edges.tolist(), len(t) - 1]
+    per_point = float(t[-1] - t[0]) / _width(axes)
+    narrow: list[tuple[float, float, str]] = []
     for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
         if k % 2:
             axes.axvspan(t[a], t[b], color="#eef2f7", lw=0, zorder=0)
-        name = names.get(int(phase[a]), "").replace("_", " ").lower()
-        if t[b] - t[a] > 0.06 * (t[-1] - t[0]):
-            axes.text((t[a] + t[b]) / 2, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color="#4d5866")
+        name, wide = names.get(int(phase[a]), "").replace("_", " ").lower(), float(t[b] - t[a])
+        if _LETTER * len(name) * per_point < wide:
+            axes.text((t[a] + t[b]) / 2, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color=_NAME)
+        elif name:
+            narrow.append((wide, float(t[a] + t[b]) / 2, name))
+    _upright(axes, narrow, float(t[0]), float(t[-1]), _UPRIGHT * per_point)
+
+
+def leave_room(axes: Axes) -> None:
+    """Let axes with upright names of phases reach beyond what is drawn, so that the names stand above it."""
+    if not any(text.get_rotation() for text in axes.texts):
+        return
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.55 * (high - low))
+
+
+def _width(axes: Axes) -> float:
+    """Return about how wide the axes are, in points."""
+    inches: float = axes.figure.get_figure(root=True).get_size_inches()[0]  # pyright: ignore
+    return 72.0 * 0.88 * inches
+
+
+def _upright(axes: Axes, labels: Sequence[tuple[float, float, str]], low: float, high: float, apart: float) -> None:
+    """Write names upright at places, given with widths, at least so far apart; the narrowest go if there is no room."""
+    room = max(int((high - low) / apart), 1)
+    kept = sorted(sorted(labels, reverse=True)[:room], key=lambda label: label[1])
+    placed: list[float] = []
+    for _, x, _ in kept:
+        placed.append(max(x, low + apart / 2, placed[-1] + apart if placed else low))
+    for n in reversed(range(len(placed))):
+        placed[n] = min(placed[n], high - apart * (len(placed) - n - 0.5))
+    across = axes.get_xaxis_transform()
+    for (_, x, name), at in zip(kept, placed, strict=True):
+        top = 0.98 if abs(at - x) < apart / 4 else 0.93
+        if top < 0.98:
+            axes.plot([x, at], [1.0, top + 0.01], transform=across, color=_NAME, lw=0.5)
+        text = axes.text(at, top, name, transform=across, rotation=90, ha="center", va="top", size=7, color=_NAME)
+        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
 
 
 def _save(canvas: Canvas, path: Path) -> None:

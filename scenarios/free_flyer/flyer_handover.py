@@ -44,7 +44,7 @@ class FlyerHandover(Experiment[HandoverWatch]):
         "failed_receptions",
         "arrival_error",
         "saturated_share",
-        "pole_radius_impedance",
+        "pole_margin_impedance",
         "damping_ratio_impedance",
         "slowest_decay_pose",
         "damping_ratio_pose",

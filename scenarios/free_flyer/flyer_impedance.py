@@ -36,7 +36,7 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         "disagreement_position",
         "disagreement_orientation",
         "saturated_share",
-        "pole_radius_impedance",
+        "pole_margin_impedance",
         "damping_ratio_impedance",
         "frequency_impedance",
         "cpu_per_cycle",

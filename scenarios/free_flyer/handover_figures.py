@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from scipy.spatial.transform import Rotation
 
 from cosim.ports import Floats
@@ -14,7 +15,7 @@ from scenarios.free_flyer.handover_watch import HandoverWatch
 from scenarios.free_flyer.scene import draw_near, draw_scene, person_at, robot_at
 from scenarios.free_flyer.thrust_figure import draw_thrust
 from scenarios.paper import paper_values
-from scenarios.plotting import COLOURS, figure, shade_phases
+from scenarios.plotting import COLOURS, figure, leave_room, shade_phases
 from scenarios.record import Record
 
 _FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
@@ -38,19 +39,20 @@ def draw_handover(parameters: Parameters, watch: HandoverWatch, record: Record, 
         _paths(record, "p", lambda p: 1000 * p, "{} (mm)", ("x", "y", "z"), folder / "positions"),
         _paths(record, "q", _angles, "{} (rad)", ("roll", "pitch", "yaw"), folder / "orientations"),
         _gripper(parameters, watch, record, folder),
-        draw_thrust(record, ("impedance", "pose"), folder),
+        draw_thrust(record, ("impedance", "pose"), folder, _phases(record)),
     ]
 
 
 def _paths(
     record: Record, quantity: str, of: Callable[[Floats], Floats], axis_told: str, names: tuple[str, ...], path: Path
 ) -> Figure:
-    with figure(path, 3, size=(9.0, 6.0)) as axes:
+    with figure(path, 3, size=(9.0, 6.8), heights=(1.6, 1.0, 1.0)) as axes:
         for i, (axis, name) in enumerate(zip(axes, names, strict=True)):
             shade_phases(axis, record.time, record["decision.phase"], _phase_names(record) if i == 0 else {})
             for signal, label, style in _FOLLOWED:
                 axis.plot(record.time, of(record[signal.format(quantity)])[:, i], label=label, **style)
             axis.set(ylabel=axis_told.format(name), xlim=(record.time[0], record.time[-1]))
+        leave_room(axes[0])
         axes[-1].set_xlabel("time (s)")
         axes[-1].legend(ncols=3, loc="upper right", bbox_to_anchor=(1.0, -0.25))
     what = "Positions" if quantity == "p" else "Orientations"
@@ -63,6 +65,12 @@ def _angles(q: Floats) -> Floats:
     return np.unwrap(yaw_pitch_roll[:, ::-1], axis=0)
 
 
+def _phases(record: Record) -> Callable[[Axes, bool], None]:
+    """Return what shades the phases of a run."""
+    names = _phase_names(record)
+    return lambda axes, named: shade_phases(axes, record.time, record["decision.phase"], names if named else {})
+
+
 def _phase_names(record: Record) -> dict[int, str]:
     return record.items("decision.phase")
 
@@ -71,19 +79,24 @@ def _gripper(parameters: Parameters, watch: HandoverWatch, record: Record, folde
     published = paper_values("free_flyer", "published")
     t, names_of = record.time, _phase_names(record)
     watching = np.isin(record["decision.phase"], [code for code, name in names_of.items() if name in _WATCHING])
-    with figure(folder / "gripper", 2, size=(9.0, 5.2)) as (angle, speed):
-        for axis, names in ((angle, names_of), (speed, {})):
-            shade_phases(axis, t, record["decision.phase"], names)
+    with figure(folder / "gripper", 2, size=(9.0, 6.0), heights=(1.4, 1.0)) as (angle, speed):
+        for axis in (angle, speed):
+            _phases(record)(axis, axis is angle)
             axis.set(xlim=(t[0], t[-1]))
-        angle.plot(t, record["person.gripper_angle"], color=COLOURS[0])
-        angle.axhline(published["angle_threshold"], color="#4d5866", lw=0.8, ls="--")
+        threshold: float = published["angle_threshold"]
+        told = f"above {threshold:g} rad it counts as full"
+        angle.plot(t, record["person.gripper_angle"], color=COLOURS[0], label="gripper's angle, speed")
+        angle.axhline(threshold, color="#4d5866", lw=0.8, ls="--", label=told)
         angle.set(ylabel="gripper angle (rad)", ylim=(0, None))
+        leave_room(angle)
         speed.plot(t, record["decision.speed_G"], color=COLOURS[0])
         for transfer in watch.transfers:
             threshold = published[f"velocity_{transfer.receiver.lower()}"][parameters.behaviour]
             until = t[-1] if transfer.felt is None else transfer.felt
             shown = watching & (t >= transfer.signalled) & (t <= until)
-            speed.plot(t, np.where(shown, threshold, np.nan), color=COLOURS[1], lw=1.4)
+            speed.plot(t, np.where(shown, threshold, np.nan), color=COLOURS[1], lw=2.0)
+        angle.plot([], [], color=COLOURS[1], lw=2.0, label="speed at which the robot acts, while it counts")
+        angle.figure.legend(*angle.get_legend_handles_labels(), ncols=3, loc="outside lower center")
         speed.set(ylabel="gripper speed (m/s)", xlabel="time (s)", ylim=(0, None))
     caption = (
         "Angle of the gripper, dashed: above it it counts as full; its speed, orange: at which the robot would act."
@@ -92,11 +105,14 @@ def _gripper(parameters: Parameters, watch: HandoverWatch, record: Record, folde
 
 
 def _moments(watch: HandoverWatch, record: Record) -> dict[str, int]:
-    """Return the rows of the start, of when the robot felt the person, and of the end, by their titles."""
+    """Return the rows of start, end, and when the robot felt the person or signalled in vain, by their titles."""
     times = [(0.0, "start")]
     for name, transfer in zip(("transfer", "return"), watch.transfers, strict=False):
         times += [(t, "failed reception") for t in transfer.in_vain]
-        times += [] if transfer.felt is None else [(transfer.felt, name)]
+        times.append((transfer.asked, f"{name}: signal") if transfer.felt is None else (transfer.felt, name))
+    if len(times) == 1 and len(watch.phases) > 1:
+        phase, began = watch.phases[-1]
+        times.append((began, phase.replace("_", " ").lower()))
     times.append((float(record.time[-1]), "end"))
     return {f"{t:.1f} s, {title}": int(np.searchsorted(record.time, t)) for t, title in times}
 

@@ -13,13 +13,13 @@ from scenarios.free_flyer.behaviour import Behaviour
 class Parameters:
     """One handover. Bounds of the place keep it within the person's and the robot's part of the cabin (assumed)."""
 
-    behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, table 4.1")
+    behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1")
     p_WG_handover: Vector3[Metre] = parameter(
         np.array([0.0, -0.07, 0.0]), "where the gripper waits for the person, in W", minimum=-1.0, maximum=1.0
     )
     strength: Newton = parameter(4.0, "force with which the person pulls and pushes at most", minimum=0.1, maximum=20.0)
     ideal: bool = parameter(False, "whether the thrusters have neither limits nor lag")
-    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=1.0)
+    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
     )

@@ -126,16 +126,24 @@ class HandoverWatch(Watch):
         told: dict[str, Metric] = {}
         for prefix, transfer in zip(("transfer", "return"), self.transfers, strict=False):
             told |= transfer.metrics(prefix)
-        told["failed_receptions"] = Metric(self._failed, "1", "receptions after which the gripper was found empty")
+        if "GRIPPER" in self.receivers:
+            empty = "receptions after which the robot found its gripper empty"
+            told["failed_receptions"] = Metric(self._failed, "1", empty)
         if self._arrival is not None:
-            told["arrival_error"] = Metric(self._arrival[0], "m", "gripper to its place when it began to yield")
-            told["arrival_speed"] = Metric(self._arrival[1], "m/s", "gripper's speed when it began to yield")
+            told["arrival_error"] = Metric(
+                self._arrival[0], "m", "gripper to its handover place when it arrived and began to yield"
+            )
+            told["arrival_speed"] = Metric(
+                self._arrival[1], "m/s", "gripper's speed when it arrived there and began to yield"
+            )
         share = self._saturated / max(self._steps, 1)
         told["saturated_share"] = Metric(share, "1", "share of the time for which the thrusters were at their limits")
         told |= self._stability
         for phase, t in self.phases:
             words = phase.replace("_", " ").lower()
-            told.setdefault(f"phase_{phase.lower()}", Metric(t, "s", f"when the robot's phase {words!r} first began"))
+            told.setdefault(
+                f"phase_{phase.lower()}", Metric(t, "s", f"time at which the robot first entered its phase {words!r}")
+            )
         return told
 
     def _reason(self, success: bool) -> str:

@@ -1,8 +1,10 @@
 """Figures of a push: errors as in [Fernandes2020] figs. 4.5-4.16, thrust, and the scene at three moments."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from scenarios.experiment import Figure
 from scenarios.free_flyer.impedance_model import Errors
@@ -14,6 +16,7 @@ from scenarios.plotting import COLOURS, figure
 from scenarios.record import Record
 
 _PUSH_COLOUR = "#fbe3cf"
+_CALCULATED = "calculated, [Fernandes2020] eq. (4.4)"
 
 
 def draw_push(parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
@@ -24,35 +27,43 @@ def draw_push(parameters: Parameters, watch: ImpedanceWatch, record: Record, fol
     return [
         _errors(parameters, errors, folder),
         _scene(errors, parameters, record, folder),
-        draw_thrust(record, ("impedance",), folder),
+        draw_thrust(record, ("impedance",), folder, _push(parameters)),
     ]
 
 
 def _errors(parameters: Parameters, errors: Errors, folder: Path) -> Figure:
     p = parameters
-    shown = errors.t <= max(p.end + 15.0, 1.5 * p.end)
-    t = errors.t[shown]
+    t = errors.t
     columns = (
-        ("error (mm)", 1000 * errors.p[shown], 1000 * errors.p_model[shown], "position"),
-        ("error (rad)", errors.R[shown], errors.R_model[shown], "orientation"),
+        ("rest - actual (mm)", 1000 * errors.p, 1000 * errors.p_model, "error of position"),
+        ("rest - actual (rad)", *errors.without_jumps, "error of orientation"),
     )
     with figure(folder / "errors", 3, 2, size=(10.0, 7.0)) as axes:
         for column, (unit, actual, calculated, what) in enumerate(columns):
-            limit = 1.1 * max(float(np.abs(actual).max()), float(np.abs(calculated).max()), 1e-3)
+            limit = 1.1 * max(float(np.nanmax(np.abs(actual))), float(np.nanmax(np.abs(calculated))), 1e-3)
             for i, name in enumerate("xyz"):
                 axis = axes[2 * i + column]
                 axis.axvspan(p.begin, p.end, color=_PUSH_COLOUR, lw=0, zorder=0, label=_told(p))
-                axis.plot(t, calculated[:, i], color=COLOURS[1], lw=2.6, alpha=0.55, label="calculated, eq. (4.4)")
-                axis.plot(t, actual[:, i], color=COLOURS[0], lw=1.2, label="actual")
+                axis.plot(t, calculated[:, i], color=COLOURS[1], lw=1.0, alpha=0.75, label=_CALCULATED)
+                axis.plot(t, actual[:, i], color=COLOURS[0], lw=1.5, label="actual")
                 axis.set(xlim=(0, t[-1]), ylim=(-limit, limit), ylabel=f"{name}: {unit}")
             axes[column].set_title(what)
             axes[4 + column].set_xlabel("time (s)")
         axes[0].figure.legend(*axes[0].get_legend_handles_labels(), ncols=3, loc="outside lower center")
-    return Figure("errors", f"Error of the gripper's pose, rest minus actual, around {_told(p)}.")
+    return Figure("errors", f"Error of the gripper's pose, rest minus actual, in the whole run; {_told(p)}.")
+
+
+def _push(p: Parameters) -> Callable[[Axes, bool], None]:
+    """Return what shades the time of the push."""
+
+    def shade(axes: Axes, named: bool) -> None:
+        axes.axvspan(p.begin, p.end, color=_PUSH_COLOUR, lw=0, zorder=0, label=_told(p) if named else None)
+
+    return shade
 
 
 def _told(p: Parameters) -> str:
-    what = f"{p.force:g} N along" if p.kind is Wrench.FORCE else f"{p.torque:g} N m about"
+    what = f"pushed with {p.force:g} N along" if p.kind is Wrench.FORCE else f"twisted with {p.torque:g} N m about"
     return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
 
 

@@ -40,7 +40,7 @@ class Errors:
     Attributes:
         t: time, s.
         p, p_model: position error as it was and as the model calls for, shape (rows, 3), in W, m.
-        R, R_model: orientation error likewise, as a rotation vector in W, rad.
+        R, R_model: orientation error likewise, as a rotation vector in W, rad; whole turns more or less do not count.
     """
 
     t: Floats
@@ -51,8 +51,18 @@ class Errors:
 
     @property
     def disagreement(self) -> tuple[float, float]:
-        """Greatest difference along any axis, m and rad."""
-        return float(np.abs(self.p - self.p_model).max()), float(np.abs(self.R - self.R_model).max())
+        """Greatest difference along any axis, m and rad; of orientations, the turn from one to the other."""
+        apart: Rotation = Rotation.from_rotvec(-self.R) * Rotation.from_rotvec(self.R_model)
+        turn: Floats = np.array(apart.as_rotvec())
+        return float(np.max(np.abs(self.p - self.p_model))), float(np.max(np.abs(turn)))
+
+    @property
+    def without_jumps(self) -> tuple[Floats, Floats]:
+        """R, and of the rotation vectors that mean R_model the ones nearest to R; not a number where they turn over."""
+        both = np.array(self.R), _nearest(self.R_model, self.R)
+        for turns in both:
+            turns[1:][np.linalg.norm(np.diff(turns, axis=0), axis=1) > np.pi] = np.nan
+        return both
 
 
 def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors:
@@ -93,6 +103,14 @@ def _propulsion(motion: Motion, R_WB: Rotation, r_W: Floats, m: float, I_B: Floa
     torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - motion.tau_G[1:]
     half_turn = Rotation.from_rotvec((motion.w_WB[:-1] + motion.w_WB[1:]) * dt / 4)
     return half_turn.apply(force, inverse=True), half_turn.apply(torque, inverse=True)
+
+
+def _nearest(turns: Floats, to: Floats) -> Floats:
+    """Return vectors of the same rotations, whole turns more or less about their own axes, nearest to others."""
+    angle = np.linalg.norm(turns, axis=1, keepdims=True)
+    axis = turns / np.maximum(angle, 1e-12)
+    whole: Floats = np.rint((np.sum(axis * to, axis=1, keepdims=True) - angle) / (2 * np.pi))
+    return turns + 2 * np.pi * whole * axis
 
 
 def _times(M: Floats, v: Floats) -> Floats:

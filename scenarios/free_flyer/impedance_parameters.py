@@ -28,7 +28,7 @@ class Wrench(enum.IntEnum):
 class Parameters:
     """One push."""
 
-    behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, table 4.1")
+    behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1")
     kind: Wrench = parameter(Wrench.FORCE, "whether the gripper is pushed or twisted")
     axis: Axis = parameter(Axis.X, "axis of W of the push")
     force: Newton = parameter(5.0, "force of a push", minimum=-50.0, maximum=50.0)
@@ -36,7 +36,7 @@ class Parameters:
     begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0)
     duration: Second = parameter(0.5, "how long the push lasts", minimum=0.0, maximum=60.0)
     ideal: bool = parameter(True, "whether the thrusters have neither limits nor lag, as the published plots need")
-    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=1.0)
+    delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     delay_known: bool = parameter(True, "whether the controller is told the delay, and refuses one it is unstable with")
     patience: Second = parameter(60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0)
 

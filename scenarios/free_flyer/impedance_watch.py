@@ -17,6 +17,9 @@ _SEEN = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "pu
 _REST_POSITION, _REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
 
+_BAND = f"{1000 * _REST_POSITION:.0f} mm and {_REST_ANGLE:g} rad"
+_MODEL = "[Fernandes2020] eq. (4.4)"
+
 _RESTING = 5.0
 """How long it must stay within them, s (assumed)."""
 
@@ -88,32 +91,40 @@ class ImpedanceWatch(Watch):
         metrics = {
             "greatest_position_error": Metric(self._greatest[0], "m", "gripper from its place of rest at most"),
             "greatest_orientation_error": Metric(self._greatest[1], "rad", "gripper from its rest orientation at most"),
-            "disagreement_position": Metric(by[0], "m", "actual against calculated position error at most, eq. (4.4)"),
-            "disagreement_orientation": Metric(by[1], "rad", "actual against calculated orientation error at most"),
+            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error at most, {_MODEL}"),
+            "disagreement_orientation": Metric(
+                by[1], "rad", f"actual against calculated orientation error at most, {_MODEL}"
+            ),
             "saturated_share": Metric(share, "1", "share of the time for which the thrusters were at their limits"),
             **self._stability,
         }
         if self._at_rest:
-            told = "from the end of the push until the gripper stays at rest"
+            told = f"from the end of the push until the gripper stays within {_BAND} of its rest"
             metrics["settling_time"] = Metric(self._settled, "s", told)
         return Outcome(success=self._at_rest and agrees, reason=self._reason(agrees, by, share), metrics=metrics)
 
     def _reason(self, agrees: bool, by: tuple[float, float], share: float) -> str:
-        p = self.parameters
-        thrust = f"; thrusters at their limits for {100 * share:.0f} % of the time" if share else ""
+        far = f"{1000 * by[0]:.1f} mm" if by[0] < 1.0 else f"{by[0]:.1f} m"
+        apart = f"{far} and {by[1]:.3f} rad"
         model = (
-            f"{'agreed with' if agrees else 'departed from'} the impedance model "
-            f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
+            f"agreed with the impedance model within {apart}"
+            if agrees
+            else f"departed from the impedance model by {apart}"
         )
+        joined = "and" if agrees is self._at_rest else "but"
+        thrust = f"; thrusters at their limits for {100 * share:.0f} % of the time" if share else ""
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}"
+
+    def _back(self) -> str:
+        """Tell whether the gripper came back to rest."""
+        p = self.parameters
         if self._at_rest:
-            back = f"the gripper was back at rest {self._settled:.1f} s after the push"
-        elif self._spins:
-            back = f"the robot was out of control at {self._t:.1f} s, turning by more than {_SPINNING:.0f} rad/s,"
-        elif self._t < float(p.stop) - 0.02:
-            back = f"stopped at {self._t:.1f} s, before the robot could come to rest"
-        else:
-            back = (
-                f"the robot did not come back to rest within {p.patience:.0f} s: {self._last[0]:.2f} m and "
-                f"{self._last[1]:.2f} rad away at the end"
-            )
-        return f"{back} and {model}{thrust}"
+            return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after the push"
+        if self._spins:
+            return f"the robot was out of control at {self._t:.1f} s, turning by more than {_SPINNING:.0f} rad/s"
+        if self._t < float(p.stop) - 0.02:
+            return f"stopped at {self._t:.1f} s, before the robot could come to rest"
+        return (
+            f"the gripper did not come back to rest, within {_BAND}, in {p.patience:.0f} s: {self._last[0]:.2f} m and "
+            f"{self._last[1]:.2f} rad away at the end"
+        )

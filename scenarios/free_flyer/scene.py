@@ -38,6 +38,9 @@ _ROOTS = (
 _NEAR = np.array([0.20, 0.20, 0.20])
 """Half the sides of a window for pictures from near, m."""
 
+_MARGIN, _WIDEST = 0.05, 3.0
+"""Room around a scene, and its greatest side that is shown as a whole, m."""
+
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _FACES = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
 
@@ -97,16 +100,30 @@ def person_at(record: Record, row: int) -> list[Solid]:
 
 def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Path) -> Figure:
     """Draw moments beside each other, by their titles, from the side and from above; the caption tells what is seen."""
-    corners = np.concatenate([s.corners for solids in moments.values() for s in solids])
-    low, high = corners.min(axis=0) - 0.05, corners.max(axis=0) + 0.05
-    heights = [float((high - low)[view.axes[1]]) for view in _VIEWS]
-    size = (3.6 * len(moments), 2.95 * sum(heights) / float(high[0] - low[0]) + 1.5)
+    windows = _windows(moments)
+    sides = windows[0][1] - windows[0][0]
+    heights = [float(sides[view.axes[1]]) for view in _VIEWS]
+    size = (3.6 * len(moments), 2.95 * sum(heights) / float(sides[0]) + 1.8)
     with figure(folder / "scene", 2, len(moments), size=size, heights=heights) as canvas:
         for column, (title, solids) in enumerate(moments.items()):
             for row, view in enumerate(_VIEWS):
-                _draw(canvas[row * len(moments) + column], solids, view, low, high)
-            canvas[column].set_title(title)
+                axes = canvas[row * len(moments) + column]
+                _draw(axes, solids, view, *windows[column])
+                axes.set_title(f"{title}\n{view.told}" if row == 0 else view.told)
     return Figure("scene", f"The scene in W, from the side (above) and from above (below). {caption}")
+
+
+def _windows(moments: Mapping[str, Sequence[Solid]]) -> list[tuple[Floats, Floats]]:
+    """Return the least and greatest corner of what each moment's pictures show, of the same sides for all.
+
+    It is the same part of the cabin if that is not too large, else a part of it around what is there.
+    """
+    corners = [np.concatenate([s.corners for s in solids]) for solids in moments.values()]
+    lows, highs = np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
+    if np.all(highs.max(axis=0) - lows.min(axis=0) < _WIDEST):
+        return [(lows.min(axis=0) - _MARGIN, highs.max(axis=0) + _MARGIN)] * len(corners)
+    half = (highs - lows).max(axis=0) / 2 + _MARGIN
+    return [((low + high) / 2 - half, (low + high) / 2 + half) for low, high in zip(lows, highs, strict=True)]
 
 
 def draw_near(moments: Mapping[str, Sequence[Solid]], middles: Mapping[str, Floats], folder: Path) -> Figure:
@@ -117,7 +134,7 @@ def draw_near(moments: Mapping[str, Sequence[Solid]], middles: Mapping[str, Floa
                 axes = canvas[2 * row + column]
                 _draw(axes, solids, view, middles[title] - _NEAR, middles[title] + _NEAR)
                 axes.set_title(f"{title}, {view.told}")
-    return Figure("transfer", "The gripper at the moments at which the robot felt the person.")
+    return Figure("transfer", "The gripper from near, at the moments between start and end of the scene.")
 
 
 def _fingers(palm: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:

@@ -52,20 +52,21 @@ class Transfer:
     def metrics(self, prefix: str) -> dict[str, Metric]:
         """Return its figures under names with a prefix."""
         whom = "person" if self.receiver == "HAND" else "robot"
+        touch = "pull" if self.receiver == "HAND" else "push"
         act = "let go" if self.receiver == "HAND" else "closed"
         told = {
             "displacement": Metric(
-                self.farthest, "m", f"gripper from its place at most, from the signal on, object to {whom}"
+                self.farthest, "m", f"gripper from its handover place at most, while the {whom} takes the object"
             ),
             **{
                 f"displacement_{axis}": Metric(
-                    away, "m", f"gripper from its place along {axis} at most, object to {whom}"
+                    away, "m", f"the same along {axis} of W, while the {whom} takes the object"
                 )
                 for axis, away in zip("xyz", self.farthest_along, strict=True)
             },
         }
         if self.felt is not None:
-            told["speed"] = Metric(self.speed, "m/s", f"gripper's speed at which the robot {act}")
+            told["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
         if self.done is not None:
             since = f"from the {'first ' if self.in_vain else ''}signal until the {whom} has the object"
             told["time"] = Metric(self.done - self.signalled, "s", since)

@@ -46,7 +46,7 @@ def test_the_robot_gives_an_object_to_a_person(tmp_path: Path):
     assert holders(record) == [FREE, GRIPPER, BOTH, HAND]
     assert record["person.gripper_angle"][0] == pytest.approx(0.60)  # "initiates the handover with a closed gripper"
     assert record["person.gripper_angle"][record.time > 1.1][0] == pytest.approx(1.20)
-    assert metric(ended, "failed_receptions") == 0
+    assert "failed_receptions" not in ended.summary["metrics"]
     assert metric(ended, "arrival_error") < 0.05
     assert metric(ended, "transfer_speed") > 0.059
     assert metric(ended, "transfer_displacement") >= metric(ended, "transfer_displacement_z") > 0.01

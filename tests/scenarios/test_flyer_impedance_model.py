@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from cosim.ports import Floats
 from scenarios.free_flyer.behaviour import Behaviour
-from scenarios.free_flyer.impedance_model import Motion, errors_of
+from scenarios.free_flyer.impedance_model import Errors, Motion, errors_of
 
 MASS, INERTIA, ARM = 9.584, np.array([0.1534, 0.1427, 0.1623]), np.array([-0.30, 0.0, 0.0])
 GOAL = np.array([0.0, -0.07, 0.0])
@@ -69,3 +69,22 @@ def test_disagreement_is_the_greatest_along_any_axis():
     held = np.tile(GOAL - ARM + np.array([0.03, 0.0, -0.04]), (6, 1))
     errors = errors_of(moving(held, NOTHING, NOTHING, NOTHING), GOAL, Behaviour.RIGID)
     assert errors.disagreement == pytest.approx((0.04, 0.0), abs=1e-12)
+
+
+def turned(actual: Floats, model: Floats) -> Errors:
+    n = len(actual)
+    return Errors(t=TIMES[:n], p=np.zeros((n, 3)), p_model=np.zeros((n, 3)), R=actual, R_model=model)
+
+
+def test_orientations_beyond_half_a_turn_are_compared_by_the_turn_between_them():
+    actual, model = np.array([[3.1, 0.0, 0.0]]), np.array([[-3.1, 0.0, 0.0]])
+    _, apart = turned(actual, model).disagreement
+    assert apart == pytest.approx(2.0 * np.pi - 6.2)
+
+
+def test_errors_that_turn_over_leave_a_gap_instead_of_a_jump():
+    actual = np.array([[2.9, 0.0, 0.0], [3.1, 0.0, 0.0], [-3.0, 0.0, 0.0], [-2.8, 0.0, 0.0]])
+    model = np.array([[2.9, 0.0, 0.0], [-3.18, 0.0, 0.0], [-3.0, 0.0, 0.0], [-2.8, 0.0, 0.0]])
+    R, R_model = turned(actual, model).without_jumps
+    assert R[:, 0] == pytest.approx([2.9, 3.1, np.nan, -2.8], nan_ok=True)
+    assert R_model[:, 0] == pytest.approx([2.9, 2.0 * np.pi - 3.18, np.nan, -2.8], nan_ok=True)
