@@ -10,28 +10,25 @@ import numpy as np
 from controllers.flyer_astrobee import ARM, INERTIA, MASS
 from controllers.flyer_behaviour import Behaviour
 from controllers.flyer_body import FlyerBody
+from controllers.flyer_control_ports import Inputs, Outputs
 from controllers.flyer_gains import ImpedanceGains, published_gains
 from controllers.flyer_rotation import rotation_vector, rows_of, seen_from, unit_quaternion
 from controllers.flyer_stability import UnusableController, stability_faults
 from controllers.sampled_loop import SampledLoop
 from cosim.plain_rotation import ZERO, cross, norm, rows, triple, turned, turned_back
-from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from cosim.ports import Matrix3, Vector3, parameter
 from cosim.units import (
     Kilogram,
     KilogramMetre2,
     Metre,
-    MetrePerSecond,
-    Newton,
-    NewtonMetre,
     NewtonMetrePerRadian,
     NewtonMetreSecondPerRadian,
     NewtonPerMetre,
     NewtonSecondPerMetre,
-    Number,
-    Radian,
-    RadianPerSecond,
     Second,
 )
+
+__all__ = ["Behaviour", "ImpedanceController", "Inputs", "Outputs", "Params", "UnusableController"]
 
 _NAME = "ImpedanceController"
 
@@ -77,32 +74,6 @@ class Params:
             stiffness_rotation=self.stiffness_rotation,
             damping_rotation=self.damping_rotation,
         )
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    """The navigation's estimate of the base, the gripper's goal, and whether to act."""
-
-    p_WB_meas: Vector3[Metre] = port(np.zeros(3), "estimated position of the centre of mass")
-    q_WB_meas: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "estimated attitude")
-    v_WB_meas: Vector3[MetrePerSecond] = port(np.zeros(3), "estimated velocity of the centre of mass, in the world")
-    w_WB_meas: Vector3[RadianPerSecond] = port(np.zeros(3), "estimated angular velocity, in the world")
-    p_WG_goal: Vector3[Metre] = port(np.array([0.0, -0.07, 0.0]), "where the gripper is to rest")
-    q_WG_goal: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "orientation in which it is to rest")
-    active: bool = port(False, "the controller is on")
-
-
-@dataclass(kw_only=True)
-class Outputs:
-    """Command in B at the centre of mass, zero when not active; the gripper's error; what linear theory says."""
-
-    f_cmd: Vector3[Newton] = output("commanded force, in B")
-    tau_cmd: Vector3[NewtonMetre] = output("commanded torque about the centre of mass, in B")
-    error_p: Metre = output("distance of the gripper from its goal", minimum=0.0)
-    error_R: Radian = output("angle between the gripper and its goal", minimum=0.0)
-    pole_radius: Number = output("largest |z| of the linearised loop", minimum=0.0)
-    damping_ratio: Number = output("least damping ratio of the linearised loop")
-    pole_frequency: RadianPerSecond = output("frequency of the pole with that ratio", minimum=0.0)
 
 
 class ImpedanceController:

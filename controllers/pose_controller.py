@@ -10,13 +10,14 @@ import numpy as np
 
 from controllers.flyer_astrobee import ARM, INERTIA, MASS
 from controllers.flyer_body import FlyerBody
+from controllers.flyer_control_ports import Inputs, Outputs
 from controllers.flyer_pid import PidGains, pid_law
 from controllers.flyer_profile import Bounds, Profile, Reference, profile_between
 from controllers.flyer_rotation import angle_between, rotation_vector, rows_of, seen_from, unit_quaternion
 from controllers.flyer_stability import UnusableController, stability_faults
 from controllers.sampled_loop import SampledLoop
 from cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, norm, rows, triple, turned, turned_back
-from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from cosim.ports import Matrix3, Vector3, parameter
 from cosim.units import (
     Kilogram,
     KilogramMetre2,
@@ -25,15 +26,15 @@ from cosim.units import (
     MetrePerSecond2,
     Newton,
     NewtonMetre,
-    Number,
     PerSecond,
     PerSecond2,
     PerSecond3,
-    Radian,
     RadianPerSecond,
     RadianPerSecond2,
     Second,
 )
+
+__all__ = ["Inputs", "Outputs", "Params", "PoseController", "UnusableController"]
 
 _NAME = "PoseController"
 
@@ -98,32 +99,6 @@ class Params:
                 f"{self.tau_max.tolist()} N m; at most {self.turning * np.min(self.tau_max) / torque:.3g} rad/s2"
             )
         return faults
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    """The navigation's estimate of the base, the gripper's goal, and whether to act."""
-
-    p_WB_meas: Vector3[Metre] = port(np.zeros(3), "estimated position of the centre of mass")
-    q_WB_meas: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "estimated attitude")
-    v_WB_meas: Vector3[MetrePerSecond] = port(np.zeros(3), "estimated velocity of the centre of mass, in the world")
-    w_WB_meas: Vector3[RadianPerSecond] = port(np.zeros(3), "estimated angular velocity, in the world")
-    p_WG_goal: Vector3[Metre] = port(np.array([0.0, -0.07, 0.0]), "where the gripper is to go")
-    q_WG_goal: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "orientation in which it is to arrive")
-    active: bool = port(False, "the controller is on")
-
-
-@dataclass(kw_only=True)
-class Outputs:
-    """Command in B at the centre of mass, zero when not active; the gripper's error; what linear theory says."""
-
-    f_cmd: Vector3[Newton] = output("commanded force, in B")
-    tau_cmd: Vector3[NewtonMetre] = output("commanded torque about the centre of mass, in B")
-    error_p: Metre = output("distance of the gripper from its goal", minimum=0.0)
-    error_R: Radian = output("angle between the gripper and its goal", minimum=0.0)
-    pole_radius: Number = output("largest |z| of the linearised loop", minimum=0.0)
-    damping_ratio: Number = output("least damping ratio of the linearised loop")
-    pole_frequency: RadianPerSecond = output("frequency of the pole with that ratio", minimum=0.0)
 
 
 class PoseController:

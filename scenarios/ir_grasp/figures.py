@@ -47,7 +47,7 @@ def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
         if not parameters.literal:
             above.axhline(1000 * reflex.target, color="#4d5866", lw=0.8, ls="--", label="target of thumb and ring")
         above.plot([], [], color="#4d5866", lw=0.8, ls=":", label="true, along the beam")
-        above.set(ylabel="distance (mm)", ylim=(0, 70), xlim=(t[0], t[-1]))
+        above.set(ylabel="distance (mm)", ylim=(0, 82), xlim=(t[0], t[-1]))
         above.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.08))
         below.semilogy(t, np.maximum(record["reflex.cost"] * 1e6, 0.1), color=COLOURS[3], drawstyle="steps-post")
         below.axhline(1e6 * threshold, color="#4d5866", lw=0.8, ls="--", label="at which the hand closes")

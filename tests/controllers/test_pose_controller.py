@@ -230,7 +230,7 @@ def test_linear_prediction_holds_for_a_small_push():
 
 def test_delay_too_long_is_refused_with_what_would_be_right():
     with pytest.raises(UnusableController, match=r"delay of 0\.5 s.*\|z\| = 1\.0.*at most about 0\.33"):
-        PoseController(Params(delay=0.2))
+        PoseController(Params(delay=0.5))
     PoseController(Params(delay=0.1))
 
 
