@@ -51,7 +51,7 @@ def told(metric: Mapping[str, Any]) -> str:
         return "undefined"
     if unit == "m" and abs(value) < 1:
         return f"{value * 1000:.1f} mm"
-    if unit == "s" and abs(value) < 0.1:
+    if unit == "s" and 0 < abs(value) < 0.1:
         return f"{value * 1000:.2f} ms"
     if unit == "B":
         return f"{value / 1e6:.0f} MB"

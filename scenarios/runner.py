@@ -165,7 +165,9 @@ def _parameter_rows(task: Task) -> list[tuple[str, str, str]]:
     rows: list[tuple[str, str, str]] = []
     for v in task.experiment.parameters():
         value = _plain(getattr(task.parameters, v.name))
-        told = value.lower() if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
+        told = (
+            f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
+        )
         unit = "" if v.unit.symbol == "1" else f" {v.unit.symbol}"
         rows.append((v.name, told + unit, v.description))
     return rows

@@ -60,7 +60,9 @@ class Transfer:
             ),
             **{
                 f"displacement_{axis}": Metric(
-                    away, "m", f"the same along {axis} of W, while the {whom} takes the object"
+                    away,
+                    "m",
+                    f"gripper from its handover place at most along {axis} of W, while the {whom} takes the object",
                 )
                 for axis, away in zip("xyz", self.farthest_along, strict=True)
             },

@@ -1,5 +1,6 @@
 """What the free-flyer's code has as defaults is what its `paper.toml` tells the origin of."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ from controllers.flyer_handover_parameters import Params as DecisionParams
 from controllers.impedance_controller import Behaviour
 from controllers.impedance_controller import Params as ImpedanceParams
 from controllers.pose_controller import Params as PoseParams
-from cosim.block import Causality, declared_variables
 from plants.flyer_hand_parameters import Params as PersonParams
 from plants.free_flyer import Params as RobotParams
 from plants.push import Params as PushParams
@@ -20,6 +20,10 @@ from plants.thrusters import Params as ThrustersParams
 from scenarios.free_flyer import scene
 from scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
 from scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters
+
+sys.path.insert(0, str(Path(__file__).parent))  # origins
+
+from origins import assert_every_default_has_its_origin
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -44,14 +48,7 @@ def paper() -> Paper:
 
 @pytest.mark.parametrize("group", CODE)
 def test_every_default_has_its_origin(paper: Paper, group: str):
-    told = paper[group]
-    declared = {v.name: v for v in declared_variables(CODE[group], Causality.PARAMETER)}
-    assert set(told) == set(declared) - {"seed"}
-    for name, entry in told.items():
-        default: Any = getattr(CODE[group](), name)
-        value = default.name.lower() if declared[name].items else default
-        assert np.array_equal(value, entry["value"]), name
-        assert entry["unit"] == declared[name].unit.symbol, name
+    assert_every_default_has_its_origin(paper[group], CODE[group])
 
 
 @pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])

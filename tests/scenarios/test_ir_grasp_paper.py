@@ -1,5 +1,6 @@
 """What the grasp's code has as defaults is what its `paper.toml` tells the origin of."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,13 @@ import tomli
 
 import scenarios.ir_grasp
 from controllers.reflex_parameters import Params as ReflexParams
-from cosim.block import Causality, declared_variables
 from plants.grasp_objects import Thing
 from plants.grasp_parameters import Params as SceneParams
 from scenarios.ir_grasp.parameters import Parameters
+
+sys.path.insert(0, str(Path(__file__).parent))  # origins
+
+from origins import assert_every_default_has_its_origin
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -27,14 +31,7 @@ def paper() -> Paper:
 
 @pytest.mark.parametrize("group", CODE)
 def test_every_default_has_its_origin(paper: Paper, group: str):
-    told = paper[group]
-    declared = {v.name: v for v in declared_variables(CODE[group], Causality.PARAMETER)}
-    assert set(told) == set(declared) - {"seed"}
-    for name, entry in told.items():
-        default: Any = getattr(CODE[group](), name)
-        value = default.name.lower() if declared[name].items else default
-        assert np.array_equal(value, entry["value"]), name
-        assert entry["unit"] == declared[name].unit.symbol, name
+    assert_every_default_has_its_origin(paper[group], CODE[group])
 
 
 def test_the_published_totals_are_the_sums_over_the_things(paper: Paper):

@@ -1,0 +1,18 @@
+"""Compares the defaults of declared parameters with the group of a `paper.toml` that tells their origin."""
+
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Causality, declared_variables
+
+
+def assert_every_default_has_its_origin(told: dict[str, dict[str, Any]], params: type[Any]) -> None:
+    """All parameters but the seed are told, with the code's values and units."""
+    declared = {v.name: v for v in declared_variables(params, Causality.PARAMETER)}
+    assert set(told) == set(declared) - {"seed"}
+    for name, entry in told.items():
+        default: Any = getattr(params(), name)
+        value = default.name.lower() if declared[name].items else default
+        assert np.array_equal(value, entry["value"]), name
+        assert entry["unit"] == declared[name].unit.symbol, name
