@@ -81,6 +81,30 @@ class Slot:
         return slice(self.offset, self.offset + self.variable.size)
 
 
+class Type(enum.IntEnum):
+    """Type of a variable in FMI 3; the numbers are those of `Type` in runtime/instance.h."""
+
+    FLOAT64 = 1
+    FLOAT32 = 2
+    INT8 = 3
+    UINT8 = 4
+    INT16 = 5
+    UINT16 = 6
+    INT32 = 7
+    UINT32 = 8
+    INT64 = 9
+    UINT64 = 10
+    ENUMERATION = 11
+    BOOLEAN = 12
+    STRING = 13
+    BINARY = 14
+
+
+def type_of(variable: Variable) -> Type:
+    """Return a variable's type in FMI 3."""
+    return Type[variable.width.name if variable.width else variable.kind.name]
+
+
 @dataclass(frozen=True)
 class HostVariable:
     """A variable as a host sees it: one of the block's, or one entry of an array.
