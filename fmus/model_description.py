@@ -12,9 +12,9 @@ from fmus.layout import Form, Layout
 GENERATOR = "handover-cosim"
 
 LOG_CATEGORIES = {
-    "logStatusError": "refused calls and failures, with the traceback of an exception",
+    "logStatusError": "refused calls and failures, with the traceback of an exception; told even while logging is off",
     "logStatusWarning": "calls that are answered, but perhaps not as expected",
-    "logAll": "beginning and end of a run, besides the others",
+    "logAll": "all the others, and the beginning and end of a run",
 }
 
 
