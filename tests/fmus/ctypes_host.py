@@ -35,7 +35,7 @@ class CtypesHost:
     Attributes:
         log: messages so far, as the host gets them.
         categories: their categories.
-        names: the instance's name with each, which only FMI 2 hands over.
+        names: the instance's name with each, in FMI 2.
         logging: whether the next instance is made with logging on.
         references: value references by variable's name; of an array in FMI 2 that of its first entry.
     """
@@ -59,8 +59,8 @@ class CtypesHost:
         self.categories: list[str] = []
         self.names: list[str] = []
         self.logging = False
-        self._log2 = Log2(lambda _environment, name, _status, *told: self._take(*told, name))
-        self.logger3 = Log3(lambda _environment, _status, *told: self._take(*told))
+        self._log2 = Log2(self._take_2)
+        self.logger3 = Log3(self._take_3)
         self._callbacks = Callbacks(logger=self._log2)
 
     def instantiate(self, token: str | None = None, *, event_mode: bool = False) -> bool:
@@ -88,8 +88,11 @@ class CtypesHost:
         self.instance = make(*arguments)
         return self.instance is not None
 
-    def _take(self, category: bytes, message: bytes, name: bytes = b"") -> None:
+    def _take_2(self, _environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         self.names.append(name.decode())
+        self._take_3(_environment, status, category, message)
+
+    def _take_3(self, _environment: object, _status: int, category: bytes, message: bytes) -> None:
         self.categories.append(category.decode())
         self.log.append(message.decode())
 
