@@ -99,6 +99,12 @@ class Declared:
         """Number of entries; 1 for a scalar."""
         return math.prod(self.shape)
 
+    @property
+    def type_name(self) -> str:
+        """Kind, with the width of numbers where it is not the usual one, as in `integer (Int16)`."""
+        usual = self.width in (None, Width.FLOAT64, Width.INT64)
+        return self.kind.value if usual or self.width is None else f"{self.kind.value} ({self.width.value})"
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Variable(Declared):
