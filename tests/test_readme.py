@@ -136,7 +136,7 @@ def block_with(part: str) -> str:
 
 def shell(script: str, folder: Path) -> str:
     call = ["sh", "-e", "-c", script]
-    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

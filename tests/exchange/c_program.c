@@ -88,7 +88,8 @@ static void step(double t, double size) {
     }
 }
 
-/* `types` begins the name of the type in the standard; values are doubles here, which hold what the units have. */
+/* Hand over N values under one value reference (FMI 2: one value) and take them back. Here all are doubles, which hold
+ * every number that the units have. */
 #define TRANSFER(is_set, reference, n, values, type2, Type2, type3, Type3)                                             \
     if (is_fmi2) {                                                                                                     \
         LOAD(fmi2Set##Type2);                                                                                          \

@@ -59,7 +59,7 @@ class Ecos:
             env={**self.environment, "TMPDIR": str(folder)},
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=300,
             check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr

@@ -74,7 +74,7 @@ def run(program: Path, unit: str, fmi: int, folder: Path) -> Record:
         env={"PATH": "/nonexistent", "TMPDIR": str(folder)},  # the FMU itself must know its Python
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
