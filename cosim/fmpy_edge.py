@@ -10,6 +10,8 @@ from typing import Any, Protocol, cast
 import fmpy
 import fmpy.fmi2
 import fmpy.fmi3
+from fmpy.model_description import ValidationError
+from fmpy.validation import validate_model_description
 
 from cosim.exceptions import InvalidFmu
 from cosim.fmu_archive import DESCRIPTION, FmuArchive
@@ -104,6 +106,33 @@ def version_of(path: Path, root: XmlElement) -> int:
     if version != "2.0" and not version.startswith("3."):
         raise InvalidFmu(path, f"an FMU of FMI {version[:80]}; versions 2.0 and 3.0 can be used")
     return int(version[0])
+
+
+def problems_of(path: Path) -> tuple[list[str], str]:
+    """Return what FMPy's validation has to say of an FMU that passed `checked_xml`, and why it stopped, if it did.
+
+    Where the schema is not kept, the rules beyond it are tried nonetheless, as far as the reader gets.
+    """
+    try:
+        fmpy.read_model_description(str(path), validate_variable_names=True, validate_model_structure=True)
+    except ValidationError as e:
+        problems = [str(p) for p in cast(list[Any], e.problems)]
+    except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... where it does not understand a description
+        return [], f"{type(e).__name__}: {_one_line(e)}"
+    else:
+        return [], ""
+    try:
+        md: Any = fmpy.read_model_description(str(path), validate=False)
+        problems += validate_model_description(md, validate_variable_names=True, validate_model_structure=True)
+    except Exception as e:
+        return problems, f"{type(e).__name__}: {_one_line(e)}"
+    return problems, ""
+
+
+def required_functions(fmi: int) -> list[str]:
+    """Return the functions that FMPy loads of a co-simulation FMU: it refuses a library that lacks any of them."""
+    slave = fmpy.fmi2.FMU2Slave if fmi == 2 else fmpy.fmi3.FMU3Slave
+    return sorted(name for name in dir(slave) if name.startswith(f"fmi{fmi}"))
 
 
 def mime_types(path: Path) -> dict[str, str]:

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 
 class Level(enum.IntEnum):
-    """How much a finding matters: a note is good to know, a warning can spoil a run, a fault is against the standard
-    or stops a run."""
+    """How much a finding matters.
+
+    A note is good to know, a warning can spoil a run, a fault is against the standard or stops a run.
+    """
 
     OK = 0
     NOTE = 1

@@ -10,7 +10,7 @@ _FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "Initia
 
 
 def structure_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
-    """Yield references in ModelStructure and of derivatives that lead to no variable, and outputs that are not listed."""
+    """Yield references in ModelStructure and of derivatives that lead to no variable, and unlisted outputs."""
     if fmi == 2:
         valid: Collection[str] = {str(i + 1) for i in range(len(list(root.named("ModelVariables", "ScalarVariable"))))}
         unknowns = [

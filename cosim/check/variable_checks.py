@@ -1,4 +1,4 @@
-"""What a model description says of its variables, as far as it matters in a co-simulation and FMPy does not look at it."""
+"""What a model description says of its variables, as far as it matters in a run and FMPy does not look at it."""
 
 import math
 from collections import defaultdict
@@ -125,7 +125,7 @@ def _unit_findings(
 
 
 def _shared_references(variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
-    """Yield what FMI 2 forbids of aliases: value references are shared within a type, by at most one that can be set."""
+    """Yield what FMI 2 forbids of aliases: value references are shared within a type, and one at most can be set."""
     groups: dict[tuple[str, str], list[DescribedVariable]] = defaultdict(list)
     for v in variables:
         groups[_CLASSES[v.type], v.reference].append(v)
