@@ -90,14 +90,24 @@ def _print_section(section: Section) -> None:
             _print_finding(finding, named=wanted is not section.level)
         if len(findings) > _MOST_FINDINGS:
             more = f"and {len(findings) - _MOST_FINDINGS} more; --json shows all"
-            open_console().print(Padding(Text(more), (0, 0, 0, 11)))
+            _print_indented(Text(more), 11)
 
 
 def _print_finding(finding: Finding, *, named: bool) -> None:
     level = f"{finding.level.name.lower()}: " if named else ""
-    open_console().print(Padding(Text(f"{level}{finding.line}"), (0, 0, 0, 11)))
+    _print_indented(Text(f"{level}{finding.line}"), 11)
     for line in finding.log:
-        open_console().print(Padding(Text(f"| {line}", style="dim"), (0, 0, 0, 13)))
+        _print_indented(Text(f"| {line}", style="dim"), 13)
+
+
+def _print_indented(text: Text, width: int) -> None:
+    """Print a text, wrapped beside its indent in a terminal and in one line where other programs read it."""
+    shown = open_console()
+    if shown.is_terminal:
+        text.justify = "left"
+        shown.print(Padding(text, (0, 0, 0, width), expand=False))
+    else:
+        shown.print(Text(" " * width) + text, soft_wrap=True)
 
 
 def _verdict(report: CheckReport) -> Text:

@@ -87,11 +87,12 @@ class _Check:
         self.interface = interface or self.root
         self.identifier = self.interface.get("modelIdentifier")
         step = default_step(self.root)
-        return f"co-simulation, {'steps of ' + f'{step:g} s' if step else 'no step size given'}", findings
+        told = f"co-simulation, {'steps of ' + f'{step:g} s' if step else 'no step size given'}"
+        return told if interface else "", findings
 
     def _binaries(self) -> tuple[str, list[Finding]]:
         findings = list(binary_findings(self.archive, self.fmi, self.identifier))
-        self.goes_on = library_path(self.fmi, self.identifier) in self.archive.names
+        self.goes_on = all(f.level is not Level.FAULT for f in findings)
         return ", ".join(platforms_in(self.archive)), findings
 
     def _loading(self) -> tuple[str, list[Finding]]:

@@ -61,7 +61,9 @@ def says(element: XmlElement, flag: str) -> bool:
 
 def _capabilities(co_simulation: XmlElement, fmi: int) -> Iterator[Finding]:
     if says(co_simulation, "needsExecutionTool"):
-        yield note("needs the tool that it was exported from, with its licence, on each machine that runs it")
+        yield note(
+            "needs other software on each machine that runs it: the tool that it was exported from, or an interpreter"
+        )
     if says(co_simulation, "canBeInstantiatedOnlyOncePerProcess"):
         yield note("can be in a system only once: it allows one instance in a process")
     if not says(co_simulation, f"canGetAndSetFMU{'state' if fmi == 2 else 'State'}"):

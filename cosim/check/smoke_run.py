@@ -1,7 +1,7 @@
 """A short run of one unit through the calls that a master makes."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,7 @@ class SmokeRun:
     keeps_state: bool
     serialises: bool
     allows_two: bool
+    _told: set[str] = field(default_factory=set[str])
 
     def carry_out(self) -> None:
         """Do it all, until a call fails; tell the journal what is found."""
@@ -64,14 +65,19 @@ class SmokeRun:
         self._tell_values(unit)
         for _ in range(STEPS - _REPEATED):
             unit.advance(self.step)
+            self._tell_values(unit)
         steps = self._steps_from_a_state(unit) if self.keeps_state else self._steps(unit)
-        self._tell_values(unit)
         self.journal.tells(steps=STEPS, step=self.step)
         if self.allows_two:
             self._beside(unit, at_start, steps)
         unit.reset()
         unit.start(self.start)
-        self._compare(at_start, unit.seen(), "fmi{}Reset", "a reset unit starts with other outputs than a new one")
+        self._compare(
+            at_start,
+            unit.seen(),
+            f"fmi{self.description.fmi}Reset",
+            "a reset unit starts with other outputs than a new one",
+        )
         unit.advance(self.step)
         unit.end()
         self.journal.tells(ended=True)
@@ -83,6 +89,7 @@ class SmokeRun:
         seen: list[dict[str, bytes]] = []
         for _ in range(_REPEATED):
             unit.advance(self.step)
+            self._tell_values(unit)
             seen.append(unit.seen())
         return seen
 
@@ -91,21 +98,25 @@ class SmokeRun:
         t, before = unit.time, unit.seen()
         state = unit.keep_state()
         seen = self._steps(unit)
-        self._again(unit, state, t, [before, *seen], "fmi{}SetFMUState")
-        if self.serialises:
+        two = self.description.fmi == 2
+        same = self._again(unit, state, t, [before, *seen], f"fmi{'2SetFMUstate' if two else '3SetFMUState'}")
+        if self.serialises and same:
             made = unit.deserialised(unit.serialised(state))
-            self._again(unit, made, t, [before, *seen], "fmi{}DeserializeFMUState")
+            call = "fmi2DeSerializeFMUstate" if two else "fmi3DeserializeFMUState"
+            self._again(unit, made, t, [before, *seen], call)
             unit.drop_state(made)
         unit.drop_state(state)
         return seen
 
-    def _again(self, unit: ProbedInstance, state: Any, t: float, expected: list[dict[str, bytes]], call: str) -> None:
+    def _again(self, unit: ProbedInstance, state: Any, t: float, expected: list[dict[str, bytes]], call: str) -> bool:
+        """Go back, do the steps again, and tell whether the outputs are the same."""
         unit.restore(state, t)
         after = unit.seen()
         for first, second in zip(expected, [after, *self._steps(unit)], strict=True):
             what = f"steps from a restored state (t = {t:.6g} s) give other outputs than the first time"
             if self._compare(first, second, call, what, tell=fault, cure="the state must hold all that changes"):
-                return
+                return False
+        return True
 
     def _beside(self, unit: ProbedInstance, at_start: dict[str, bytes], steps: list[dict[str, bytes]]) -> None:
         """Run a second instance beside the first: it does the same, and the first does not notice."""
@@ -138,19 +149,23 @@ class SmokeRun:
         different = [name for name, content in a.items() if b[name] != content]
         if different:
             names = ", ".join(different[:5]) + (f" and {len(different) - 5} more" if len(different) > 5 else "")
-            self.journal.found(tell(f"{what}: {names}", where=where.format(self.description.fmi), cure=cure))
+            self.journal.found(tell(f"{what}: {names}", where=where, cure=cure))
         return bool(different)
 
     def _tell_values(self, unit: ProbedInstance) -> None:
+        """Tell of outputs with values that cannot be, of each the first time."""
         for name, views in unit.y.items():
-            for finding in _value_findings(self.description.outputs[name], views[0], unit.time):
+            for finding in (
+                () if name in self._told else _value_findings(self.description.outputs[name], views[0], unit.time)
+            ):
+                self._told.add(name)
                 self.journal.found(finding)
 
 
 def failure(e: UnitFailure) -> Finding:
     """Return a failed call as a finding, with the unit's log."""
     lines = tuple(line for entry in e.log for line in entry.splitlines() if line.strip())
-    return fault(f"{e.call} answered {e.status}", where=f"t = {e.t:.6g} s", log=lines[-12:])
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=lines[-12:])
 
 
 def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
@@ -162,10 +177,7 @@ def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
         out = [x for x in values.tolist() if (low is not None and x < low) or (high is not None and x > high)]
         if out:
             yield warning(f"{out[0]:g} is out of its declared range", where=where)
-    elif port.kind is Kind.ENUMERATION and (wrong := [x for x in values.tolist() if x not in dict_of_items(port)]):
+    elif port.kind is Kind.ENUMERATION and (
+        wrong := [x for x in values.tolist() if x not in [value for _, value in port.items]]
+    ):
         yield warning(f"{wrong[0]} is no item of its type", where=where)
-
-
-def dict_of_items(port: FmuPort) -> Mapping[int, str]:
-    """Return an enumeration's item names by value."""
-    return {value: name for name, value in port.items}
