@@ -6,7 +6,7 @@ from pathlib import Path
 
 import fmpy
 
-from fmus.compile import zig_cc
+from fmus.compile import TARGETS, host_platform, zig_cc
 
 MODES: tuple[str, ...] = (
     "sound",
@@ -55,9 +55,14 @@ def compiled(folder: Path, *flags: str) -> bytes:
     """Compile decay.c."""
     made = folder / "Decay.so"
     source = Path(__file__).with_name("decay.c")
-    done = zig_cc(["-shared", "-fPIC", "-O1", "-w", "-I", str(HEADERS), str(source), "-lm", "-o", str(made), *flags])
-    assert done.returncode == 0, done.stdout
+    compile_c(["-shared", "-fPIC", "-O1", "-w", "-I", str(HEADERS), str(source), "-lm", "-o", str(made), *flags])
     return made.read_bytes()
+
+
+def compile_c(arguments: Sequence[str]) -> None:
+    """Compile for the platform that the runtime is compiled for, so that the compiler makes one C library ready."""
+    done = zig_cc(["-target", TARGETS[host_platform()][0], *arguments])
+    assert done.returncode == 0, done.stdout
 
 
 def pack(file: Path, library: bytes, description: str = DESCRIPTION, others: Mapping[str, bytes] | None = None) -> Path:
