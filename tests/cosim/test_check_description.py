@@ -150,7 +150,7 @@ ODD = st.sampled_from(
 )
 def test_whatever_a_description_says_it_is_checked(tmp_path: Path, edits: list[tuple[int, str]]):
     head, mark, body = decay.DESCRIPTION.partition("?>")
-    parts = body.split('"')
+    parts = [str(part) for part in body.split('"')]
     for at, value in edits:
         parts[2 * at + 1] = value
     report = checked(tmp_path / "a.fmu", head + mark + '"'.join(parts))
