@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from rich.padding import Padding
+from rich.table import Table
 from rich.text import Text
 
 from cosim.check.check_fmu import check_fmu
@@ -18,12 +18,24 @@ _FAULTS, _BAD_CALL = 1, 2
 _MOST_FINDINGS = 20  # of one level in one section
 _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAULT: "bold red"}
 
+_HELP = """Tell what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
+
+The archive, its model description, by the standard's schema and rules, and its library for this machine are looked at;
+then the unit is loaded and run for ten steps in a process of its own, which may crash.
+
+\b
+Exit status
+  0  no faults; there may be notes and warnings
+  1  faults were found
+  2  bad call: a FILE is not there or cannot be read
+"""
+
 
 class _BadCall(click.ClickException):
     exit_code = _BAD_CALL
 
 
-@click.command("check")
+@click.command("check", help=_HELP)
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @click.option(
     "--timeout",
@@ -35,17 +47,7 @@ class _BadCall(click.ClickException):
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
-    r"""Tell what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
-
-    The archive, its model description, by the standard's schema and rules, and its library for this machine are
-    looked at; then the unit is loaded and run for ten steps in a process of its own, which may crash.
-
-    \b
-    Exit status
-      0  no faults; there may be notes and warnings
-      1  faults were found
-      2  bad call: a FILE is not there or cannot be read
-    """
+    """Tell what is wrong with files that should be co-simulation FMUs."""
     _refuse_what_is_not_there(files)
     reports: list[CheckReport] = []
     for file in files:
@@ -73,7 +75,7 @@ def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
 
 def _print_report(report: CheckReport) -> None:
     shown = open_console()
-    shown.print(str(report.path), style="bold", markup=False, soft_wrap=True)
+    shown.print(Text(_visible(str(report.path)), style="bold"), soft_wrap=True)
     for section in report.sections:
         _print_section(section)
     shown.print(_verdict(report), soft_wrap=True)
@@ -82,7 +84,7 @@ def _print_report(report: CheckReport) -> None:
 def _print_section(section: Section) -> None:
     level = section.level.name.lower() if section.reached else "-"
     style = _STYLES[section.level] if section.reached else "dim"
-    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), section.told)
+    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.told))
     open_console().print(line, soft_wrap=True)
     for wanted in sorted(Level, reverse=True):
         findings = [f for f in section.findings if f.level is wanted]
@@ -90,24 +92,30 @@ def _print_section(section: Section) -> None:
             _print_finding(finding, named=wanted is not section.level)
         if len(findings) > _MOST_FINDINGS:
             more = f"and {len(findings) - _MOST_FINDINGS} more; --json shows all"
-            _print_indented(Text(more), 11)
+            _print_indented("", Text(more), 11)
 
 
 def _print_finding(finding: Finding, *, named: bool) -> None:
     level = f"{finding.level.name.lower()}: " if named else ""
-    _print_indented(Text(f"{level}{finding.line}"), 11)
+    _print_indented("- ", Text(_visible(level + finding.line)), 11)
     for line in finding.log:
-        _print_indented(Text(f"| {line}", style="dim"), 13)
+        _print_indented("| ", Text(_visible(line), style="dim"), 13)
 
 
-def _print_indented(text: Text, width: int) -> None:
-    """Print a text, wrapped beside its indent in a terminal and in one line where other programs read it."""
+def _print_indented(mark: str, text: Text, width: int) -> None:
+    """Print a text behind a mark, wrapped beside both in a terminal and in one line where other programs read it."""
     shown = open_console()
     if shown.is_terminal:
-        text.justify = "left"
-        shown.print(Padding(text, (0, 0, 0, width), expand=False))
+        row = Table.grid()
+        row.add_row(" " * width + mark, text)
+        shown.print(row)
     else:
-        shown.print(Text(" " * width) + text, soft_wrap=True)
+        shown.print(Text(" " * width + mark) + text, soft_wrap=True)
+
+
+def _visible(text: str) -> str:
+    """Return a text without what would steer a terminal: it comes from files that others made."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text.replace("\t", " "))
 
 
 def _verdict(report: CheckReport) -> Text:

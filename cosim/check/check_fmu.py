@@ -69,7 +69,7 @@ class _Check:
             for name in self.archive.outdated_methods
         ]
         size = self.path.stat().st_size
-        return f"{len(self.archive.names)} files in {size / 1e6:.3g} MB", findings
+        return f"{len(self.archive.names)} files in {size / 1000:.0f} kB", findings
 
     def _description(self) -> tuple[str, list[Finding]]:
         self.root = checked_xml(self.archive)
@@ -123,7 +123,7 @@ class _Check:
         if "ended" in watched.facts:
             done = ("state restored", capabilities["keeps_state"]), ("second instance", capabilities["allows_two"])
             parts += [what for what, was_done in (*done, ("reset", True)) if was_done]
-        return ", ".join(parts), watched.findings
+        return ", ".join(parts) or "stopped", watched.findings
 
 
 def _capabilities(interface: XmlElement, fmi: int) -> Iterator[tuple[str, bool]]:

@@ -60,7 +60,7 @@ def test_a_fault_is_told_with_status_1(broken: Path):
     assert lines[0] == str(broken)
     assert lines[1].split() == ["fault", "archive"]
     assert lines[2] == " " * 11 + (
-        "the archive holds paths that lead out of it; they must be relative, with slashes: ../../escaped"
+        "- the archive holds paths that lead out of it; they must be relative, with slashes: ../../escaped"
     )
     assert "  -        description  not reached: see archive" in lines
     assert lines[-1] == "not usable as it is (1 fault)"
@@ -105,6 +105,15 @@ def test_any_file_is_told_without_a_traceback(tmp_path: Path):
         result = check(file)
         assert (result.exit_code, result.exception.__class__) == (1, SystemExit)
         assert "fault    " in result.output
+
+
+def test_what_a_file_says_does_not_steer_the_terminal(tmp_path: Path):
+    file = tmp_path / "x.fmu"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("modelDescription.xml", '<fmiModelDescription fmiVersion="\u009b31m\u202e[bold]"/>')
+    result = check(file)
+    assert result.exit_code == 1
+    assert "an FMU of FMI \ufffd31m\ufffd[bold]" in result.output
 
 
 def test_a_reader_who_leaves_does_not_change_the_status(broken: Path, tmp_path: Path):
