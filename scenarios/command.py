@@ -16,6 +16,7 @@ from fmus.catalog import UNITS
 from fmus.compile import CompilationError
 from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SCENARIOS
+from scenarios.check_command import check
 from scenarios.experiment import Experiment
 from scenarios.interruption import Interruption
 from scenarios.listing import print_catalog, print_scenario, print_summary, print_unit
@@ -44,6 +45,7 @@ handover list helix_handover           a scenario's parameters, with ranges
 handover list VslArm                   a unit's parameters, inputs and outputs
 handover run helix_handover            one run; leaves a folder with a report
 handover build TendonArm --fmi both    units for other tools
+handover check Their.fmu               what is wrong with an FMU, whoever made it
 handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -109,6 +111,7 @@ def build_(units: Sequence[str], fmi: str, out: Path, *, scalar: bool) -> None:
             click.echo(line)
 
 
+main.add_command(check)
 main.add_command(vsl_train)
 
 
