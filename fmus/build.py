@@ -6,7 +6,7 @@ import importlib.util
 import json
 import os
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
@@ -74,14 +74,22 @@ def build_block(
     return build(Entry(name or block.rpartition(":")[2], block, step, summary), fmi, out_dir)
 
 
-def build(entry: Entry, fmi: int, out_dir: Path) -> Path:
+def build(entry: Entry, fmi: int, out_dir: Path, *, platforms: Sequence[str] | None = None) -> Path:
     """Build a unit's FMU. The same sources, packages and interpreter give the same bytes.
+
+    Args:
+        entry: the catalog's row.
+        fmi: 2 or 3.
+        out_dir: folder of the FMU.
+        platforms: those to have the runtime for, such as `x86_64-windows`, or `host`, or `all`; without it all that
+            it is compiled for.
 
     Raises:
         UnknownBlock: the entry's block does not exist.
         UnknownVersion, UnusableName: the standard's version or the name is not one that can be.
         DeclarationError, DuplicateName: the block's declarations are not in order.
         NoFmi2Form: FMI 2 and the block has binary ports.
+        UnknownPlatform: the runtime is not made for a platform.
         NotCompiled: there is no runtime and no compiler.
     """
     if fmi not in (2, 3):
@@ -108,7 +116,7 @@ def build(entry: Entry, fmi: int, out_dir: Path) -> Path:
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
         "resources/python.txt": os.fsencode(interpreter.describe()),
         **{f"resources/sources/{path}": content for path, content in sources.items()},
-        **binaries(entry.name, fmi),
+        **binaries(entry.name, fmi, platforms),
     }
     return write_archive(out_dir / file_name(entry.name, fmi), files)
 
