@@ -1,5 +1,6 @@
 """Which platforms are compiled, when, and where their libraries go."""
 
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -27,7 +28,7 @@ from fmus.compile import (
 )
 from scenarios.command import main
 
-LOG = r"""
+COMPILE = r"""
 from pathlib import Path
 import sys
 sys.path.insert(0, sys.argv[1])
@@ -43,6 +44,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a copy of the runtime's sources that nothing is compiled of, and that is compiled from."""
     copy = tmp_path / "runtime"
     shutil.copytree(RUNTIME, copy, ignore=shutil.ignore_patterns("bin"))
+    (copy / "unused.h").write_text(f"/* {copy} */")  # so that no cache has libraries of these sources
     monkeypatch.setattr(fmus.compile, "RUNTIME", copy)
     return copy
 
@@ -63,10 +65,12 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    find: Callable[..., object] = fmus.compile.importlib.util.find_spec
-    monkeypatch.setattr(
-        fmus.compile.importlib.util, "find_spec", lambda name, *more: None if name == "ziglang" else find(name, *more)
-    )
+    find: Callable[..., object] = importlib.util.find_spec
+
+    def find_all_but_zig(name: str, package: str | None = None) -> object:
+        return None if name == "ziglang" else find(name, package)
+
+    monkeypatch.setattr(importlib.util, "find_spec", find_all_but_zig)
 
 
 def test_platforms_are_named_singly_in_lists_and_together(monkeypatch: pytest.MonkeyPatch):
@@ -144,7 +148,7 @@ def test_a_compiler_that_fails_leaves_nothing(sources: Path):
 @pytest.mark.slow
 def test_two_processes_compile_at_once(sources: Path):
     root = str(RUNTIME.parents[1])
-    call = [sys.executable, "-c", LOG, root, str(sources)]
+    call = [sys.executable, "-c", COMPILE, root, str(sources)]
     both = [subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for _ in range(2)]
     told = {process.communicate(timeout=150)[0].strip() for process in both}
     assert [process.returncode for process in both] == [0, 0]
