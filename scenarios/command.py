@@ -2,8 +2,9 @@
 
 import sys
 import time
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import click
 from cosim.exceptions import CosimError, nearest
 from fmus.binaries import NotCompiled
 from fmus.build import build, cached
-from fmus.catalog import UNITS
+from fmus.catalog import UNITS, Entry
 from fmus.compile import (
     TARGETS,
     CompilationError,
@@ -92,6 +93,11 @@ def list_(name: str | None) -> None:
 @click.argument("units", nargs=-1, metavar="[UNIT]...")
 @click.option("--fmi", type=click.Choice(["2", "3", "both"]), default="both", show_default=True, help="FMI version.")
 @click.option(
+    "--scalar",
+    is_flag=True,
+    help="FMI 3 with a variable for every entry of an array, for tools that know no arrays. FMI 2 is always so.",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path("fmus-built"),
@@ -106,7 +112,7 @@ def list_(name: str | None) -> None:
     help="Platforms to run on: " + ", ".join(TARGETS) + ", `host` or `all`; missing ones are compiled, which takes a "
     "minute the first time  [default: all that are compiled]",
 )
-def build_(units: Sequence[str], fmi: str, out: Path, platforms: Sequence[str]) -> None:
+def build_(units: Sequence[str], fmi: str, out: Path, platforms: Sequence[str], *, scalar: bool) -> None:
     """Build UNITs (all by default) as FMUs for other tools.
 
     A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
@@ -117,7 +123,8 @@ def build_(units: Sequence[str], fmi: str, out: Path, platforms: Sequence[str]) 
     with Interruption(), _told_in_one_line():
         check_place(out)
         _compile_missing(platforms)
-        for line in _build_all(units or list(UNITS), fmi, out, platforms or None, named=bool(units)):
+        make = partial(build, out_dir=out, scalar=scalar, platforms=platforms or None)
+        for line in _build_all(units or list(UNITS), fmi, make, named=bool(units)):
             click.echo(line)
 
 
@@ -189,13 +196,11 @@ def _compile_missing(platforms: Sequence[str]) -> None:
         compile_runtime([target])
 
 
-def _build_all(
-    units: Sequence[str], fmi: str, out: Path, platforms: Sequence[str] | None, *, named: bool
-) -> Iterator[str]:
+def _build_all(units: Sequence[str], fmi: str, make: Callable[[Entry, int], Path], *, named: bool) -> Iterator[str]:
     for name in units:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
             try:
-                yield str(build(UNITS[name], version, out, platforms=platforms))
+                yield str(make(UNITS[name], version))
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise BadCall(str(e)) from e
