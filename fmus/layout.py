@@ -13,6 +13,9 @@ from cosim.block import Causality, Description, Kind, Variable
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""
 
+SAMPLE_CLOCK = "sample_clock"
+"""Name of a sampled unit's clock in FMI 3; it has no place in the buffers."""
+
 BYTES_CAPACITY = 1 << 16
 """Most bytes in a binary variable that is not a picture."""
 
@@ -40,7 +43,7 @@ CAUSALITIES = (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
 
 
 class DuplicateName(ValueError):
-    """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables."""
+    """A parameter, an input, an output and the clock must not share a name: an FMU has one list of variables."""
 
     def __init__(self, block: str, names: list[str]) -> None:
         super().__init__(f"{block}: more than one variable is named {', '.join(names)}; rename all but one")
@@ -65,12 +68,13 @@ class Layout:
     """The places of all variables of a block.
 
     Raises:
-        DuplicateName: two variables share a name.
+        DuplicateName: two variables share a name, or one has that of a sampled block's clock.
     """
 
     def __init__(self, description: Description) -> None:
         names = [v.name for v in description.variables]
-        duplicates = sorted({name for name in names if names.count(name) > 1})
+        taken = names if description.period is None else [*names, SAMPLE_CLOCK]
+        duplicates = sorted({name for name in taken if taken.count(name) > 1})
         if duplicates:
             raise DuplicateName(description.name, duplicates)
         self.description = description
