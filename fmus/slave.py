@@ -12,6 +12,7 @@ from fmus.layout import Layout
 from fmus.parameters import read_parameters
 from fmus.table import table
 
+
 class Slave:
     """One instance: a block, its buffers, and the way between them.
 

@@ -27,22 +27,26 @@ static double tick_tolerance(const Instance *instance, double dt) {
     return fmin(STEP_TOLERANCE * passed, dt / 4.0);
 }
 
-static Status tick(Instance *instance, const char *function) {
+/* The block is given the tick's own time, not the host's, which may be off by rounding: a run is then the same in all
+ * hosts, with event mode and without. */
+static void set_clock(Instance *instance) {
+    instance->floats[0] = next_tick(instance);
     instance->floats[1] = period(instance);
-    if (slave_step(instance, function) != STATUS_OK) return STATUS_ERROR;
-    instance->events.ticks++;
-    return STATUS_OK;
+}
+
+static Status tick(Instance *instance, const char *function) {
+    double t = instance->floats[0];
+    set_clock(instance);
+    Status status = slave_step(instance, function);
+    instance->floats[0] = t;
+    if (status == STATUS_OK) instance->events.ticks++;
+    return status;
 }
 
 static Status tick_by_itself(Instance *instance, const char *function, double t, double dt) {
-    double before = instance->floats[0];
     bool ticked = false;
-    for (;;) {
-        double due = next_tick(instance), tolerance = tick_tolerance(instance, dt);
-        if (!(due < t + dt - tolerance)) break;
-        instance->floats[0] = due <= t + tolerance ? t : due;
+    while (next_tick(instance) < t + dt - tick_tolerance(instance, dt)) {
         if (tick(instance, function) != STATUS_OK) {
-            instance->floats[0] = before;
             if (ticked) instance->mode = FAILED; /* something has changed, whatever the exception says */
             return STATUS_ERROR;
         }
@@ -90,8 +94,11 @@ Status sampling_activate(Instance *instance, const char *function) {
 /* For hosts that read the outputs of an active clock, and perhaps set inputs after that, before they settle the tick. */
 Status sampling_evaluate(Instance *instance, const char *function) {
     if (!inputs_finite(instance, function)) return STATUS_ERROR;
-    instance->floats[1] = period(instance);
-    if (slave_call(instance, function, "evaluate") != STATUS_OK) return STATUS_ERROR;
+    double t = instance->floats[0];
+    set_clock(instance);
+    Status status = slave_call(instance, function, "evaluate");
+    instance->floats[0] = t;
+    if (status != STATUS_OK) return STATUS_ERROR;
     instance->events.evaluated = true;
     instance->outputs_stale = false;
     return check_outputs(instance, function);
