@@ -64,7 +64,9 @@ typedef struct {
     uint8_t evaluated;     /* the active clock's tick was worked out for a reader of outputs */
     uint8_t tick_told;     /* a step returned early because of the tick that is due */
     uint8_t event_pending; /* a step stopped at an event that is not yet handled */
-    uint8_t unused[4];
+    uint8_t clock_used;    /* the host has activated the clock once */
+    uint8_t ticks_alone;   /* it has not, and left out a tick: the unit ticks by itself, as without event mode */
+    uint8_t unused[2];
 } Events;
 
 /* How a step ended. */

@@ -1,7 +1,8 @@
 /* A sampled block's ticks: at start + k * period, k = 0, 1, 2, ...
  *
  * Without event mode a step runs the ticks in [t, t + dt) by itself. With event mode the host activates the clock at each
- * tick, and steps only pass the time between. Either way the block is stepped by its period with the inputs as they
+ * tick, and steps only pass the time between. There are hosts that use event mode wherever it is offered, yet know no
+ * clocks: when one leaves out the first tick, the unit ticks by itself, after a warning. Either way the block is stepped by its period with the inputs as they
  * are at the tick, and its outputs hold until the next one.
  */
 #include <math.h>
@@ -56,6 +57,21 @@ static Status tick_by_itself(Instance *instance, const char *function, double t,
     return ticked ? check_outputs(instance, function) : STATUS_OK;
 }
 
+static Status miss_tick(Instance *instance, const char *function, double t, double dt) {
+    double due = next_tick(instance);
+    if (instance->events.clock_used)
+        return refuse(instance, function,
+                      "the clock ticks at t = %.17g s, which is within this step from %.17g s to %.17g s: end a step "
+                      "there, and activate the clock in event mode with fmi3SetClock",
+                      due, t, t + dt);
+    warn(instance, function,
+         "event mode is used, but the clock was not activated with fmi3SetClock at its tick at t = %.17g s: the unit "
+         "ticks by itself, until the clock is activated",
+         due);
+    instance->events.ticks_alone = true;
+    return tick_by_itself(instance, function, t, dt);
+}
+
 static Status hold_until_tick(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
     double due = next_tick(instance), tolerance = tick_tolerance(instance, dt);
     if (!(due < t + dt - tolerance)) {
@@ -64,12 +80,8 @@ static Status hold_until_tick(Instance *instance, const char *function, double t
         return STATUS_OK;
     }
     bool now = due <= t + tolerance;
-    /* Told once more and again, a host that knows no clocks would come back forever. */
     if (!instance->early_return_allowed || (now && instance->events.tick_told))
-        return refuse(instance, function,
-                      "the clock ticks at t = %.17g s, which is within this step from %.17g s to %.17g s: end a step "
-                      "there, and activate the clock in event mode with fmi3SetClock",
-                      due, t, t + dt);
+        return miss_tick(instance, function, t, dt);
     instance->floats[0] = now ? t : due;
     instance->events.tick_told = true;
     end->early = end->event_needed = true;
@@ -77,7 +89,8 @@ static Status hold_until_tick(Instance *instance, const char *function, double t
 }
 
 Status sampling_step(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
-    if (instance->event_mode_used) return hold_until_tick(instance, function, t, dt, end);
+    if (instance->event_mode_used && !instance->events.ticks_alone)
+        return hold_until_tick(instance, function, t, dt, end);
     return tick_by_itself(instance, function, t, dt);
 }
 
@@ -86,7 +99,8 @@ Status sampling_activate(Instance *instance, const char *function) {
     double due = next_tick(instance), t = instance->floats[0];
     if (!(fabs(due - t) <= tick_tolerance(instance, period(instance))))
         return refuse(instance, function, "the clock ticks next at t = %.17g s; the instance is at %.17g s", due, t);
-    instance->events.clock_active = true;
+    instance->events.clock_active = instance->events.clock_used = true;
+    instance->events.ticks_alone = false;
     instance->outputs_stale = true;
     return STATUS_OK;
 }

@@ -5,6 +5,7 @@ import dataclasses
 import xml.etree.ElementTree as ET
 from fractions import Fraction
 
+import fmpy
 import numpy as np
 import pytest
 from ctypes_host import BOOL, DOUBLE, ERROR, OK, SIZE, CtypesHost
@@ -148,17 +149,51 @@ def test_a_step_past_a_tick_is_refused_where_it_must_not_return_early(workshop: 
     assert host.step(0.0, P) == OK
 
 
-def test_a_host_that_never_activates_the_clock_is_told_once_and_then_refused(workshop: Workshop):
+def test_a_host_that_has_activated_the_clock_is_told_of_a_tick_once_and_then_refused(workshop: Workshop):
     host = started(workshop, early_return=True)
-    assert host.update() == OK
-    assert host.call("EnterStepMode") == OK
-    assert host.step(0.0, 0.01) == OK
-    assert (host.early, host.event_needed, host.last_time) == (True, True, 0.0)
-    assert host.step(0.0, 0.01) == ERROR
+    tick(host)
+    assert host.step(0.0, P) == OK
+    assert host.step(P, 0.01) == OK
+    assert (host.early, host.event_needed, host.last_time) == (True, True, P)
+    assert host.step(P, 0.01) == ERROR
     assert "activate the clock in event mode with fmi3SetClock" in host.log[-1]
     assert host.call("EnterEventMode") == OK
     tick(host)
-    assert host.step(0.0, 0.01) == OK
+    assert host.step(P, 0.01) == OK
+
+
+@pytest.mark.parametrize("early_return", [False, True])
+def test_for_a_host_that_knows_no_clocks_the_unit_ticks_by_itself_after_a_warning(
+    workshop: Workshop, early_return: bool
+):
+    host = started(workshop, early_return=early_return)
+    assert host.update() == OK
+    assert host.call("EnterStepMode") == OK
+    if early_return:
+        assert host.step(0.0, P / 2) == OK
+        assert (host.early, host.event_needed, host.last_time) == (True, True, 0.0)
+    for k in range(20):
+        assert host.step(k * P / 2, P / 2) == OK
+        assert (host.early, host.event_needed) == (False, False)
+        assert host.get("ticks") == [k // 2 + 1]
+    warnings = [line for line in host.log if "the unit ticks by itself, until the clock is activated" in line]
+    assert len(warnings) == len(host.log) == 1
+    assert host.call("EnterEventMode") == OK
+    tick(host)
+    assert host.get("ticks") == [11.0]
+    assert not early_return or (host.step(10 * P, 2 * P) == OK and host.early)
+    assert early_return or host.step(10 * P, 2 * P) == ERROR
+
+
+def test_fmpys_own_simulation_which_knows_no_clocks_is_the_same_with_event_mode(workshop: Workshop):
+    runs = [
+        fmpy.simulate_fmu(
+            str(workshop.fmu(SAMPLED, 3)), stop_time=1.0, output_interval=P, use_event_mode=mode, output=["y", "ticks"]
+        )
+        for mode in (False, True)
+    ]
+    assert runs[0]["ticks"].tolist() == list(range(31))
+    assert np.array_equal(*runs)
 
 
 def test_the_clock_is_refused_at_a_wrong_time_and_what_is_right_is_told(workshop: Workshop):
