@@ -8,7 +8,7 @@ from cosim.eventful_block import UnfitAdvance
 from fmus.buffers import Buffers, UnfitState, join, split
 from fmus.derivatives import derivative_reader
 from fmus.exchange import input_reader, output_writer
-from fmus.layout import Layout
+from fmus.layout import Form, Layout
 from fmus.parameters import read_parameters
 from fmus.table import table
 
@@ -20,14 +20,14 @@ class Slave:
 
     Args:
         block: the block's class.
-        fmi: version of the standard, 2 or 3; it decides what a value reference stands for.
+        form: a value of `Form`; it decides what a value reference stands for.
     """
 
     _block: Any  # a cosim.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
 
-    def __init__(self, block: type[Any], fmi: int) -> None:
+    def __init__(self, block: type[Any], form: str) -> None:
         self._type = block
-        self._fmi = fmi
+        self._form = Form(form)
         description = describe(block)
         self._buffers = Buffers(Layout(description))
         self._clock = self._buffers.floats[:2]
@@ -41,7 +41,7 @@ class Slave:
 
     def table(self) -> bytes:
         """Return what the C runtime must know of the buffers."""
-        return table(self._buffers, self._fmi)
+        return table(self._buffers, self._form)
 
     def initialise(self) -> None:
         """Work out the outputs at the start.

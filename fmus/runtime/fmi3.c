@@ -5,8 +5,13 @@
 #include "instance.h"
 #include "platform.h"
 
+/* The callback does not say whose message it is, so the message begins with the instance's name. */
 static void log_message(const Instance *instance, Status status, const char *category, const char *message) {
-    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category, message);
+    Text named = {0};
+    text_add(&named, *instance->name ? "%s: %s" : "%s%s", instance->name, message);
+    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category,
+                                                    named.chars ? named.chars : message);
+    text_clear(&named);
 }
 
 #define BEGIN(modes)             \
@@ -22,7 +27,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance handle, fmi3Boolean on, size_t n, co
 /* The standard wants this error. The reverse it puts on the host: to use event mode where there is a clock. A host that
  * does not is served nonetheless, the unit then ticks by itself. */
 static bool may_use_event_mode(const Instance *instance, const char *function) {
-    if (!instance->event_mode_used || is_sampled(instance) || has_events(instance)) return true;
+    if (!instance->event_mode_used || has_clock(instance) || has_events(instance)) return true;
     refuse(instance, function, "eventModeUsed is true, but the unit has no event mode (hasEventMode is false)");
     return false;
 }

@@ -11,7 +11,7 @@
 /* Whether the references are all the clock's, and the function may be called now. */
 static bool clocks(const Instance *instance, const char *function, unsigned modes, REFERENCES, const void *values) {
     if (!instance) return false;
-    if (!is_sampled(instance)) {
+    if (!has_clock(instance)) {
         refuse_unsupported(instance, function, NO_CLOCKS);
         return false;
     }
@@ -96,7 +96,7 @@ fmi3Status fmi3GetShiftFraction(fmi3Instance handle, REFERENCES, fmi3UInt64 coun
 
 static fmi3Status refuse_change(const Instance *instance, const char *function, const char *what) {
     if (!instance) return fmi3Error;
-    if (!is_sampled(instance)) return (fmi3Status)refuse_unsupported(instance, function, NO_CLOCKS);
+    if (!has_clock(instance)) return (fmi3Status)refuse_unsupported(instance, function, NO_CLOCKS);
     return (fmi3Status)refuse(instance, function, "the clock's %s is constant (intervalVariability), it cannot be set",
                               what);
 }
