@@ -211,7 +211,7 @@ def test_fmpys_own_simulation_which_knows_no_clocks_is_the_same_with_event_mode(
         for mode in (False, True)
     ]
     assert runs[0]["ticks"].tolist() == list(range(31))
-    assert np.array_equal(*runs)
+    assert np.array_equal(runs[0], runs[1])
 
 
 def test_the_clock_is_refused_at_a_wrong_time_and_what_is_right_is_told(workshop: Workshop):
