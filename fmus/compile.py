@@ -18,17 +18,23 @@ from pathlib import Path
 RUNTIME = Path(__file__).with_name("runtime")
 
 SHARED_SOURCES = (
+    "derivatives.c",
+    "events.c",
     "instance.c",
     "log.c",
     "platform.c",
     "process_lock.c",
     "python_api.c",
+    "sampling.c",
     "slave.c",
     "state.c",
     "text.c",
     "variables.c",
 )
-SOURCES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_unsupported.c", "fmi3_values.c")}
+SOURCES = {
+    2: ("fmi2.c",),
+    3: ("fmi3.c", "fmi3_clocks.c", "fmi3_derivatives.c", "fmi3_events.c", "fmi3_unsupported.c", "fmi3_values.c"),
+}
 
 # by FMI 3.0's name of the platform: zig's name, the suffix of a shared library
 TARGETS = {
