@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cosim.block import Causality, Kind, Variable
+from fmus.layout import Form, HostVariable
 from fmus.model_description import (
     GENERATOR,
     Model,
@@ -20,7 +21,6 @@ from fmus.model_description import (
     text,
     variability,
 )
-from fmus.table import element_names
 
 
 class NoFmi2Form(ValueError):
@@ -65,7 +65,7 @@ def fmi2_description(model: Model) -> bytes:
     add_log_categories(root)
     add_default_experiment(root, model)
     variables = ET.SubElement(root, "ModelVariables")
-    for v in model.description.variables:
+    for v in model.layout.shown(Form.FMI2):
         _add_variable(variables, model, v)
     _add_structure(root, model)
     return text(root)
@@ -83,23 +83,22 @@ def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
             ET.SubElement(items, "Item", name=item.name, value=str(int(item)))
 
 
-def _add_variable(variables: ET.Element, model: Model, v: Variable) -> None:
-    first = model.layout.references(2)[v.name]
+def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> None:
+    v = shown.variable
     is_parameter, is_output = v.causality is Causality.PARAMETER, v.causality is Causality.OUTPUT
-    for i, name in enumerate(element_names(v)):
-        scalar = ET.SubElement(
-            variables,
-            "ScalarVariable",
-            name=name,
-            valueReference=str(first + i),
-            description=v.description,
-            causality=v.causality.value,
-            variability="fixed" if is_parameter else variability(model, v),
-            attrib={"initial": "exact"} if is_parameter else {"initial": "calculated"} if is_output else {},
-        )
-        tag, facts = _type(v)
-        start = {} if is_output else {"start": _start(v, i)}
-        ET.SubElement(scalar, tag, {**facts, **start})
+    scalar = ET.SubElement(
+        variables,
+        "ScalarVariable",
+        name=shown.name,
+        valueReference=str(shown.reference),
+        description=v.description,
+        causality=v.causality.value,
+        variability="fixed" if is_parameter else variability(model, v),
+        attrib={"initial": "exact"} if is_parameter else {"initial": "calculated"} if is_output else {},
+    )
+    tag, facts = _type(v)
+    start = {} if is_output else {"start": _start(v, shown.entries.start)}
+    ET.SubElement(scalar, tag, {**facts, **start})
 
 
 def _type(v: Variable) -> tuple[str, dict[str, str]]:
@@ -122,11 +121,10 @@ def _start(v: Variable, i: int) -> str:
 
 def _add_structure(root: ET.Element, model: Model) -> None:
     """Indices here count the scalar variables from 1."""
-    sizes = {v.name: v.size for v in model.description.variables}
-    references = model.layout.references(2)
+    references = model.layout.references(Form.FMI2)
 
     def indices(names: Iterable[str]) -> list[int]:
-        return [references[name] + i + 1 for name in names for i in range(sizes[name])]
+        return [reference + 1 for name in names for reference in references[name]]
 
     structure = ET.SubElement(root, "ModelStructure")
     outputs = ET.SubElement(structure, "Outputs")

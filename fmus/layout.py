@@ -5,6 +5,7 @@ parameters, the inputs and the outputs. Scalars stand before arrays, so that all
 """
 
 import enum
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -36,6 +37,25 @@ BUFFER_OF = {
     Kind.BINARY: Buffer.BINARY,
 }
 
+
+class Form(enum.Enum):
+    """How an FMU shows a block's variables to its host; the values are part of files' names."""
+
+    FMI2 = "fmi2"
+    FMI3 = "fmi3"
+    FMI3_SCALAR = "fmi3-scalar"
+
+    @property
+    def fmi(self) -> int:
+        """Version of the standard."""
+        return 2 if self is Form.FMI2 else 3
+
+    @property
+    def has_arrays(self) -> bool:
+        """Whether an array is one variable; else each of its entries is one."""
+        return self is Form.FMI3
+
+
 CAUSALITIES = (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
 
 
@@ -59,6 +79,28 @@ class Slot:
     def entries(self) -> slice:
         """The place as a slice of the buffer."""
         return slice(self.offset, self.offset + self.variable.size)
+
+
+@dataclass(frozen=True)
+class HostVariable:
+    """A variable as a host sees it: one of the block's, or one entry of an array.
+
+    Attributes:
+        variable: the block's variable.
+        name: `p_WG`, or an entry's `p_WG[1]`, `cov_O[1,1]`.
+        reference: the value reference.
+        buffer, offset: where its first value lies.
+        entries: which of the block's variable's entries it has, in row-major order.
+        shape: empty for a scalar.
+    """
+
+    variable: Variable
+    name: str
+    reference: int
+    buffer: Buffer
+    offset: int
+    entries: range
+    shape: tuple[int, ...]
 
 
 class Layout:
@@ -95,19 +137,35 @@ class Layout:
         slots = self.of(causality, buffer)
         return slice(slots[0].offset, slots[-1].entries.stop) if slots else slice(0, 0)
 
-    def references(self, fmi: int) -> dict[str, int]:
-        """Return each variable's value reference; in FMI 2 that of its first entry, the others follow.
-
-        FMI 3's value reference 0 is the time.
-        """
-        if fmi == 3:
-            return {name: 1 + i for i, name in enumerate(self.slots)}
-        references: dict[str, int] = {}
-        following = 0
+    def shown(self, form: Form) -> list[HostVariable]:
+        """Return the variables as a host sees them, by value reference. FMI 3's value reference 0 is the time."""
+        made: list[HostVariable] = []
+        first = 0 if form is Form.FMI2 else 1
         for name, slot in self.slots.items():
-            references[name] = following
-            following += slot.variable.size
+            v = slot.variable
+            if form.has_arrays:
+                made.append(HostVariable(v, name, first + len(made), slot.buffer, slot.offset, range(v.size), v.shape))
+                continue
+            for i, element in enumerate(element_names(v)):
+                reference, offset = first + len(made), slot.offset + i
+                made.append(HostVariable(v, element, reference, slot.buffer, offset, range(i, i + 1), ()))
+        return made
+
+    def references(self, form: Form) -> dict[str, tuple[int, ...]]:
+        """Return the value references by the block's variables: one each, or one for each entry of an array."""
+        references: dict[str, tuple[int, ...]] = {}
+        for shown in self.shown(form):
+            name = shown.variable.name
+            references[name] = (*references.get(name, ()), shown.reference)
         return references
+
+
+def element_names(variable: Variable) -> list[str]:
+    """Return the names of a variable's entries, `p_WG[1]` or `cov_O[1,1]`, in row-major order; a scalar's own name."""
+    if not variable.shape:
+        return [variable.name]
+    indices = itertools.product(*(range(1, extent + 1) for extent in variable.shape))
+    return [f"{variable.name}[{','.join(map(str, index))}]" for index in indices]
 
 
 def capacity(variable: Variable) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from cosim.block import Description, Variable
-from fmus.layout import Layout
+from fmus.layout import Form, Layout
 
 GENERATOR = "handover-cosim"
 
@@ -27,7 +27,8 @@ class Model:
         step: the communication step that suits the unit, in seconds.
         token: GUID of FMI 2, instantiation token of FMI 3.
         description: the block's declarations.
-        layout: its variables' places, which give the value references.
+        layout: its variables' places.
+        form: how the variables are shown; with the layout it gives the value references.
         variable_step: whether a step may have any size.
     """
 
@@ -37,6 +38,7 @@ class Model:
     token: str
     description: Description
     layout: Layout
+    form: Form
     variable_step: bool
 
 
