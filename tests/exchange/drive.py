@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.block import Description, Kind, Variable
-from fmus.table import element_names
+from fmus.layout import element_names
 from plants.stereo_camera import Inputs, Params, StereoCamera
 
 STEPS = 10
@@ -36,13 +36,13 @@ def inputs(d: Description, k: int) -> Values:
     return {v.name: _picture(v.name, k) if v.kind is Kind.BINARY else _varied(v, rng) for v in d.inputs}
 
 
-def scalars(variables: Mapping[str, Variable], values: Mapping[str, Any]) -> dict[str, float]:
+def scalars(variables: Mapping[str, Variable], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values by the names of their scalars, `p_WG[1]` and so on; texts and pictures are left out."""
-    made: dict[str, float] = {}
+    made: dict[str, Any] = {}
     for name, value in values.items():
         v = variables[name]
         if v.kind not in (Kind.STRING, Kind.BINARY):
-            made |= zip(element_names(v), np.ravel(value).astype(float).tolist(), strict=True)
+            made |= zip(element_names(v), np.ravel(value).tolist(), strict=True)
     return made
 
 
