@@ -1,6 +1,6 @@
-"""Runs a system in libcosim: `python libcosim_host.py JOB RESULT`, both JSON; see `libcosim_job.Job` for what they hold.
+"""Runs a system in libcosim: `python libcosim_host.py JOB RESULT`, both files in JSON, written and read by `Job`.
 
-A process of its own, which cannot take the tests with it; it knows of this project what the files say.
+A process of its own, which cannot take the tests with it; it knows of this project no more than the files say.
 """
 
 import json
@@ -10,16 +10,16 @@ from typing import Any
 
 from libcosimpy._internal import get_last_error_message
 from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
-
-KINDS = ("real", "integer", "boolean", "string")
 
 
 def main(job_file: str, result_file: str) -> None:
     """Run a job."""
     job = json.loads(Path(job_file).read_text())
+    log_output_level(CosimLogLevel.ERROR)
     execution = CosimExecution.from_step_size(job["step"])
     slaves = [CosimLocalSlave(unit["fmu"], unit["name"]) for unit in job["units"]]
     for slave in slaves:
@@ -31,7 +31,7 @@ def main(job_file: str, result_file: str) -> None:
             for reference, value in values:
                 check(getattr(execution, f"{kind}_initial_value")(i, reference, value))
     for kind, *ends in job["connections"]:
-        check(getattr(execution, f"connect_{kind}_variables")(*ends))
+        check(getattr(execution, f"connect_{kind}_variables")(*ends) == 0)
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     check(execution.add_observer(observer))
     check(execution.add_manipulator(manipulator))

@@ -11,35 +11,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from own_master import Connections, Placed
+from reference import Record
 
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu, indices_of
 
 LIMIT = 120.0
 """Seconds after which a run is ended."""
 
-KINDS = {"Real": "real", "Integer": "integer", "Enumeration": "integer", "Boolean": "boolean", "String": "string"}
-"""libcosim's words for FMI 2's types."""
+KINDS = {"Real": "real", "Integer": "integer", "Boolean": "boolean", "String": "string"}
+"""libcosim's words for FMI 2's types; it leaves out enumerations, saying so in its log."""
 
 Row = dict[str, float]
 
 
 @dataclass
-class Placed:
-    """A unit in a system: its FMU, the values that it starts with, and those that it is given at every step."""
-
-    fmu: Path
-    initial: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    driven: Sequence[Mapping[str, Any]] = ()
-
-
-@dataclass
 class Job:
-    """Units by name, connections between ports written `unit.port`, and how far to go."""
+    """Units by name, how they are connected, how far to go, and by unit the values that are set before each step."""
 
     units: Mapping[str, Placed]
     step: Fraction
     steps: int
-    connections: Sequence[tuple[str, str]] = ()
+    connections: Connections = ()
+    driven: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict[str, Any])
 
     def run(self, folder: Path) -> dict[str, list[Row]]:
         """Run in a process of its own; return each unit's scalar outputs at every step's end.
@@ -79,16 +73,17 @@ class Job:
         d = self.description(name)
         ports = {**d.parameters, **d.inputs}
         outputs: dict[str, list[int]] = defaultdict(list)
-        for port in d.outputs.values():
+        for port in known(d.outputs):
             outputs[KINDS[port.fmi_type]] += port.references
-        driven = [_by_kind(ports, values) for values in placed.driven] or [{}] * self.steps
-        initial = _by_kind(ports, placed.initial)
+        values_by_step = self.driven[name] if name in self.driven else [dict[str, Any]()] * self.steps
+        driven = [_by_kind(ports, values) for values in values_by_step]
+        initial = _by_kind(ports, placed.start)
         return {"name": name, "fmu": str(placed.fmu), "initial": initial, "driven": driven, "outputs": outputs}
 
     def _row(self, unit: str, by_kind: Mapping[str, Sequence[Any]]) -> Row:
         values = {kind: iter(numbers) for kind, numbers in by_kind.items()}
         row: Row = {}
-        for port in self.description(unit).outputs.values():
+        for port in known(self.description(unit).outputs):
             for index in indices_of(port.shape):
                 value = next(values[KINDS[port.fmi_type]])
                 if port.fmi_type != "String":
@@ -96,10 +91,23 @@ class Job:
         return row
 
 
+def known(ports: Mapping[str, FmuPort]) -> list[FmuPort]:
+    """Return the ports of types that libcosim knows."""
+    return [port for port in ports.values() if port.fmi_type in KINDS]
+
+
+def without_enumerations(record: Record, d: FmuDescription) -> Record:
+    """Return a unit's record with only the outputs that libcosim knows."""
+    left_out = {name for name, port in d.outputs.items() if port not in known(d.outputs)}
+    return Record([{n: x for n, x in row.items() if n not in left_out} for row in record.rows], [])
+
+
 def _by_kind(ports: Mapping[str, FmuPort], values: Mapping[str, Any]) -> dict[str, list[tuple[int, Any]]]:
     made: dict[str, list[tuple[int, Any]]] = defaultdict(list)
     for name, value in values.items():
         port = ports[name]
+        if port.fmi_type == "Enumeration":
+            continue
         entries = [value] if isinstance(value, str) else np.ravel(value).tolist()
         made[KINDS[port.fmi_type]] += zip(port.references, entries, strict=True)
     return made
