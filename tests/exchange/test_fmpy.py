@@ -15,6 +15,7 @@ from fmus.build import cached
 from fmus.catalog import UNITS
 from fmus.layout import element_names
 
+HOST: Any = fmpy
 LIGHT = ("HandoverPartner", "Thrusters")
 """Units whose tests are quick."""
 
@@ -56,11 +57,10 @@ def simulated(unit: str, fmu: Path) -> list[Mapping[str, float]]:
     times = [k * step for k in range(STEPS + 1)]
     signals = None
     if rows[0]:
-        columns = [("time", float), *((name, type(value)) for name, value in rows[0].items())]
+        columns: list[tuple[str, Any]] = [("time", float), *((name, type(value)) for name, value in rows[0].items())]
         signals = np.array([(t, *row.values()) for t, row in zip(times, rows, strict=True)], dtype=columns)
     outputs = [name for v in d.outputs for name in element_names(v)]
-    simulate: Any = fmpy.simulate_fmu
-    result = simulate(
+    result = HOST.simulate_fmu(
         str(fmu),
         stop_time=times[-1],
         output_interval=step,
@@ -74,10 +74,9 @@ def simulated(unit: str, fmu: Path) -> list[Mapping[str, float]]:
 
 def called(unit: str, fmu: Path, folder: Path) -> Record:
     """Drive an FMI 3 unit through FMPy's class, arrays and pictures whole."""
-    extract: Any = fmpy.extract
-    extract(str(fmu), str(folder))
-    told: Any = fmpy.read_model_description(str(folder))
-    slave: Any = fmpy.instantiate_fmu(str(folder), told, "CoSimulation")
+    HOST.extract(str(fmu), str(folder))
+    told = HOST.read_model_description(str(folder))
+    slave = HOST.instantiate_fmu(str(folder), told, "CoSimulation")
     references = {v.name: v.valueReference for v in told.modelVariables}
     d, step = description(unit), float(UNITS[unit].step)
     known = variables(unit)
