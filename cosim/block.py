@@ -18,6 +18,7 @@ import numpy as np
 
 from cosim.ports import Declaration, Raster, Shape
 from cosim.units import ONE, Unit
+from cosim.width import Width
 
 
 class Block(Protocol):
@@ -77,7 +78,10 @@ class DeclarationError(TypeError):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Declared:
-    """What is known of a parameter, input or output, be it a block's or an FMU's. `items` are an enumeration's."""
+    """What is known of a parameter, input or output, be it a block's or an FMU's.
+
+    `items` are an enumeration's; reals and integers have a `width`.
+    """
 
     name: str
     kind: Kind
@@ -88,6 +92,7 @@ class Declared:
     minimum: float | None = None
     maximum: float | None = None
     items: tuple[tuple[str, int], ...] = ()
+    width: Width | None = None
 
     @property
     def size(self) -> int:
@@ -131,7 +136,7 @@ def describe(block: type[Any]) -> Description:
 
     Raises:
         DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
-            declaration, or a type that is no port's.
+            declaration, or a type that is no port's, or a start value or bound that its type cannot hold.
     """
     for name in ("feedthrough", "period", "step"):
         if not hasattr(block, name):
@@ -195,24 +200,42 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
         maximum=declaration.maximum,
         **facts,
     )
+    made = _with_width(owner, made)
     return dataclasses.replace(made, start=_start(made))
+
+
+def _with_width(owner: str, made: Variable) -> Variable:
+    """Return a declaration with its width, its start and bounds rounded to it as a host will see them."""
+    width = made.width or {Kind.REAL: Width.FLOAT64, Kind.INTEGER: Width.INT64}.get(made.kind)
+    if width is None:
+        return made
+    if made.kind is not (Kind.REAL if width.is_real else Kind.INTEGER):
+        raise DeclarationError(owner, made.name, f"{width.value} is not the type of {made.kind.value} values")
+    if width is Width.FLOAT64:
+        return dataclasses.replace(made, width=width)
+    rounded: dict[str, Any] = {}
+    for what, value in (("minimum", made.minimum), ("maximum", made.maximum), ("start", made.start)):
+        if value is None:
+            continue
+        for entry in np.ravel(value).tolist():
+            if not width.holds(entry):
+                raise DeclarationError(owner, made.name, f"{what} {entry!r} does not fit {width.told}")
+        rounded[what] = np.float32(value).astype(float) if np.ndim(value) else width.rounded(value)
+    return dataclasses.replace(made, width=width, **rounded)
 
 
 def _facts(owner: str, name: str, hint: Any) -> tuple[Kind, dict[str, Any]]:
     alias = typing.get_origin(hint)
     if hasattr(alias, "__value__"):  # Vector3[Metre]: the alias carries the shape, its argument the unit
-        _, facts = _facts(owner, name, alias.__value__)
+        notes = _notes(alias.__value__)
         (entry,) = typing.get_args(hint)
-        _, unit = _facts(owner, name, entry)
-        return Kind.REAL, facts | unit
-    facts: dict[str, Any] = {}
-    for note in getattr(hint, "__metadata__", ()):
-        if isinstance(note, Unit):
-            facts["unit"] = note
-        elif isinstance(note, Shape):
-            facts["shape"] = note.extents
-        elif isinstance(note, Raster):
-            return Kind.BINARY, {"raster": note}
+        kind, facts = _facts(owner, name, entry)
+        if "shape" in notes and kind is not Kind.REAL:
+            raise DeclarationError(owner, name, f"an array of {kind.value} entries; arrays have real entries")
+        return kind, facts | notes
+    facts = _notes(hint)
+    if "raster" in facts:
+        return Kind.BINARY, facts
     plain = typing.get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
     if isinstance(plain, type) and issubclass(plain, enum.IntEnum):
         return Kind.ENUMERATION, {"enumeration": plain, "items": tuple((e.name, int(e)) for e in plain)}
@@ -222,6 +245,21 @@ def _facts(owner: str, name: str, hint: Any) -> tuple[Kind, dict[str, Any]]:
     if plain not in kinds:
         raise DeclarationError(owner, name, f"{plain!r} is not the type of a port")
     return kinds[plain], facts
+
+
+def _notes(hint: Any) -> dict[str, Any]:
+    """Return what a type is annotated with."""
+    facts: dict[str, Any] = {}
+    for note in getattr(hint, "__metadata__", ()):
+        if isinstance(note, Unit):
+            facts["unit"] = note
+        elif isinstance(note, Shape):
+            facts["shape"] = note.extents
+        elif isinstance(note, Raster):
+            facts["raster"] = note
+        elif isinstance(note, Width):
+            facts["width"] = note
+    return facts
 
 
 def _start(v: Variable) -> Any:

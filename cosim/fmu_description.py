@@ -16,6 +16,7 @@ from typing import Any
 from cosim.block import Causality, Declared, Kind
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
 from cosim.units import UNKNOWN, BaseExponents, Unit
+from cosim.width import Width
 
 _KINDS = {
     "Real": Kind.REAL,
@@ -28,6 +29,7 @@ _KINDS = {
     "String": Kind.STRING,
     "Binary": Kind.BINARY,
 }
+_WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
 _ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 
 
@@ -143,6 +145,7 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         maximum=float(high) if high is not None else None,
         items=tuple((i.name, int(i.value)) for i in items),
         mime=mimes.get(v.name),
+        width=_WIDTHS.get(v.type),
         description=v.description or "",
     )
 

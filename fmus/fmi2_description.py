@@ -6,6 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cosim.block import Causality, Kind, Variable
+from cosim.width import Width
 from fmus.layout import Form, HostVariable
 from fmus.model_description import (
     GENERATOR,
@@ -24,10 +25,10 @@ from fmus.model_description import (
 
 
 class NoFmi2Form(ValueError):
-    """A unit has binary ports, for which FMI 2 has no type."""
+    """A unit has ports for which FMI 2 has no type; `reason` says why."""
 
-    def __init__(self, unit: str, ports: list[str]) -> None:
-        super().__init__(f"{unit} has no FMI 2 form: FMI 2 knows no binary variables ({', '.join(ports)}); use FMI 3")
+    def __init__(self, unit: str, reason: str, ports: list[str]) -> None:
+        super().__init__(f"{unit} has no FMI 2 form: {reason} ({', '.join(ports)}); use FMI 3")
         self.unit, self.ports = unit, ports
 
 
@@ -35,11 +36,9 @@ def fmi2_description(model: Model) -> bytes:
     """Return the model description as XML.
 
     Raises:
-        NoFmi2Form: the block has binary ports.
+        NoFmi2Form: the block has binary ports, or an integer starts beyond 32 bits.
     """
-    binaries = [v.name for v in model.description.variables if v.kind is Kind.BINARY]
-    if binaries:
-        raise NoFmi2Form(model.name, binaries)
+    _check_form(model)
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -69,6 +68,16 @@ def fmi2_description(model: Model) -> bytes:
         _add_variable(variables, model, v)
     _add_structure(root, model)
     return text(root)
+
+
+def _check_form(model: Model) -> None:
+    shown = model.description.variables
+    binaries = [v.name for v in shown if v.kind is Kind.BINARY]
+    if binaries:
+        raise NoFmi2Form(model.name, "FMI 2 knows no binary variables", binaries)
+    long = [v.name for v in shown if v.kind is Kind.INTEGER and not Width.INT32.holds(v.start)]
+    if long:
+        raise NoFmi2Form(model.name, "FMI 2's integers have 32 bits, too few for start values", long)
 
 
 def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
@@ -103,12 +112,18 @@ def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> N
 
 def _type(v: Variable) -> tuple[str, dict[str, str]]:
     if v.kind is Kind.REAL:
-        return "Real", {"unit": v.unit.symbol, **bounds(v, as_integer=False)}
+        return "Real", {"unit": v.unit.symbol, **bounds(v)}
     if v.kind is Kind.INTEGER:
-        return "Integer", bounds(v, as_integer=True)
+        return "Integer", _integer_bounds(v)
     if v.enumeration is not None:
         return "Enumeration", {"declaredType": v.enumeration.__name__}
     return {Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}[v.kind], {}
+
+
+def _integer_bounds(v: Variable) -> dict[str, str]:
+    """Return `min` and `max`, those of the width where none are declared; what 32 bits cannot pass is no bound."""
+    limits = {} if v.width in (None, Width.INT32) else {"min": str(v.width.lowest), "max": str(v.width.highest)}
+    return {name: bound for name, bound in {**limits, **bounds(v)}.items() if Width.INT32.holds(int(bound))}
 
 
 def _start(v: Variable, i: int) -> str:

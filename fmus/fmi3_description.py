@@ -107,10 +107,9 @@ def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> N
 
 
 def _type(v: Variable) -> tuple[str, dict[str, str]]:
-    if v.kind is Kind.REAL:
-        return "Float64", {"unit": v.unit.symbol, **bounds(v, as_integer=False)}
-    if v.kind is Kind.INTEGER:
-        return "Int64", bounds(v, as_integer=True)
+    if v.width is not None:
+        unit = {"unit": v.unit.symbol} if v.kind is Kind.REAL else {}
+        return v.width.value, {**unit, **bounds(v)}
     if v.enumeration is not None:
         return "Enumeration", {"declaredType": v.enumeration.__name__}
     if v.kind is Kind.BINARY:

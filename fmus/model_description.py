@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.block import Description, Variable
+from cosim.block import Description, Kind, Variable
 from fmus.layout import Form, Layout
 
 GENERATOR = "handover-cosim"
@@ -58,11 +58,13 @@ def boolean(value: object) -> str:
     return "true" if value else "false"
 
 
-def bounds(variable: Variable, *, as_integer: bool) -> dict[str, str]:
+def bounds(variable: Variable) -> dict[str, str]:
     """Return the attributes `min` and `max` as far as they are declared."""
     pairs = {"min": variable.minimum, "max": variable.maximum}
     return {
-        name: str(int(value)) if as_integer else number(value) for name, value in pairs.items() if value is not None
+        name: number(value) if variable.kind is Kind.REAL else str(int(value))
+        for name, value in pairs.items()
+        if value is not None
     }
 
 

@@ -7,7 +7,7 @@ import struct
 
 from cosim.block import Causality
 from fmus.buffers import Buffers
-from fmus.layout import Buffer, Form
+from fmus.layout import Buffer, Form, Type, type_of
 
 HEADER = struct.Struct("=11Q")
 BINARY_BUFFER = struct.Struct("=3Q")
@@ -23,14 +23,14 @@ def table(buffers: Buffers, form: Form) -> bytes:
     names = bytearray()
     rows: list[bytes] = []
 
-    def add(buffer: Buffer, causality: int, count: int, offset: int, name: str) -> None:
-        rows.append(VARIABLE.pack(buffer, causality, 0, count, offset, len(names)))
+    def add(buffer: Buffer, kind: Type, causality: int, count: int, offset: int, name: str) -> None:
+        rows.append(VARIABLE.pack(buffer, causality, kind, count, offset, len(names)))
         names.extend(name.encode() + b"\0")
 
     if form.fmi == 3:
-        add(Buffer.FLOAT64, INDEPENDENT, 1, 0, "time")
+        add(Buffer.FLOAT64, Type.FLOAT64, INDEPENDENT, 1, 0, "time")
     for v in layout.shown(form):
-        add(v.buffer, CAUSALITIES[v.variable.causality], len(v.entries), v.offset, v.name)
+        add(v.buffer, type_of(v.variable), CAUSALITIES[v.variable.causality], len(v.entries), v.offset, v.name)
     binaries = [
         BINARY_BUFFER.pack(buffer.ctypes.data, buffer.nbytes, v.raster is not None)
         for v, buffer in zip(buffers.binary_variables, buffers.binaries, strict=True)

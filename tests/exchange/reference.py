@@ -43,6 +43,10 @@ class Record:
         """Rows as an array, columns in order of their names."""
         return np.array([[row[name] for name in sorted(row)] for row in self.rows])
 
+    def without(self, names: Sequence[str]) -> "Record":
+        """Return the record without some scalar outputs."""
+        return Record([{n: value for n, value in row.items() if n not in names} for row in self.rows], self.pictures)
+
     def is_like(self, other: "Record") -> bool:
         """Tell whether two records agree within TOLERANCE, and their pictures byte by byte."""
         a, b = self.table, other.table
