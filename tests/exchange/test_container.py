@@ -63,3 +63,16 @@ def test_arrays_and_pictures_in_a_container_are_the_same_as_without(system: str,
     for name, record in wanted.items():
         assert record.rows[1] != record.rows[-1] or not record.rows[0]
         expect_same(outputs_of(name, found), record)
+
+
+@pytest.mark.slow
+def test_two_containers_and_the_units_themselves_run_beside_each_other(tmp_path: Path):
+    wired = systems.free_flyer(2)
+    container = Placed(put_into_container(wired, 2, tmp_path, ["-mt"]))
+    alone = run_in_our_own(wired.units, wired.connections, wired.step, STEPS)
+    together = {"one": container, **wired.units, "two": container}
+    found = run_in_our_own(together, wired.connections, wired.step, STEPS)
+    for name, record in alone.items():
+        expect_same(found[name].rows, record)
+        expect_same(outputs_of(name, found["one"].rows), record)
+        expect_same(outputs_of(name, found["two"].rows), record)

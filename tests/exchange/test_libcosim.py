@@ -30,7 +30,7 @@ def test_a_unit_driven_by_libcosim_is_the_same_as_in_our_own_master(unit: str, r
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wire", [systems.free_flyer, systems.vsl])
+@pytest.mark.parametrize("wire", [systems.free_flyer, systems.grasp, systems.vsl])
 def test_a_closed_loop_in_libcosim_is_the_same_as_in_our_own_master(
     wire: Callable[[int], systems.Wired], tmp_path: Path
 ):
