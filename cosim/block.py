@@ -99,6 +99,12 @@ class Declared:
         """Number of entries; 1 for a scalar."""
         return math.prod(self.shape)
 
+    @property
+    def type_name(self) -> str:
+        """Kind, with the width of numbers where it is not the usual one, as in `integer (Int16)`."""
+        usual = self.width in (None, Width.FLOAT64, Width.INT64)
+        return self.kind.value if usual or self.width is None else f"{self.kind.value} ({self.width.value})"
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Variable(Declared):
@@ -189,6 +195,8 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
     declaration = field.metadata.get("declaration")
     if not isinstance(declaration, Declaration):
         raise DeclarationError(owner, field.name, "declare it with parameter(...), port(...) or output(...)")
+    if not field.name.isascii():
+        raise DeclarationError(owner, field.name, "a name has ASCII letters, digits and underscores; so FMI wants it")
     kind, facts = _facts(owner, field.name, hint)
     made = Variable(
         name=field.name,
@@ -201,7 +209,20 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
         **facts,
     )
     made = _with_width(owner, made)
-    return dataclasses.replace(made, start=_start(made))
+    made = dataclasses.replace(made, start=_start(made))
+    _check_range(owner, made)
+    return made
+
+
+def _check_range(owner: str, v: Variable) -> None:
+    """A start value lies within the bounds: hosts take both from a unit as they are."""
+    if v.kind not in (Kind.REAL, Kind.INTEGER, Kind.ENUMERATION) or v.causality is Causality.OUTPUT:
+        return
+    low = -math.inf if v.minimum is None else v.minimum
+    high = math.inf if v.maximum is None else v.maximum
+    outside = [x for x in np.ravel(v.start).tolist() if not low <= x <= high]
+    if outside:
+        raise DeclarationError(owner, v.name, f"start {outside[0]!r} is not between {low:g} and {high:g}, its bounds")
 
 
 def _with_width(owner: str, made: Variable) -> Variable:

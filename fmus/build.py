@@ -95,8 +95,8 @@ def build(entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False) -> Pat
     Raises:
         UnknownBlock: the entry's block does not exist.
         UnknownVersion, UnusableName: the standard's version or the name is not one that can be.
-        DeclarationError, DuplicateName: the block's declarations are not in order.
-        NoFmi2Form: FMI 2 and the block has binary ports.
+        DeclarationError, DuplicateName, AmbiguousName, UnusableText: the block's declarations are not in order.
+        NoFmi2Form: FMI 2 and the block has binary ports, or integers that start beyond 32 bits.
         NotCompiled: there is no runtime and no compiler.
     """
     form = _form(fmi, scalar=scalar)

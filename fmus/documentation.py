@@ -7,7 +7,6 @@ import jinja2
 import numpy as np
 
 from cosim.block import Kind, Variable
-from cosim.width import Width
 from fmus.model_description import Model
 from fmus.sources import Package
 
@@ -45,23 +44,13 @@ def page(model: Model, packages: list[Package]) -> bytes:
 def _row(v: Variable) -> Row:
     return Row(
         name=v.name,
-        kind=_kind(v),
+        kind=v.raster.mime if v.raster else v.enumeration.__name__ if v.enumeration else v.type_name,
         shape=" × ".join(map(str, v.shape)),
         unit=v.unit.symbol if v.kind is Kind.REAL else "",
         start="" if v.causality.value == "output" or v.kind is Kind.BINARY else _start(v),
         range=_range(v),
         description=v.description,
     )
-
-
-def _kind(v: Variable) -> str:
-    """Return a variable's type, with its width where it is not the usual one."""
-    if v.raster:
-        return v.raster.mime
-    if v.enumeration:
-        return v.enumeration.__name__
-    usual = v.width in (None, Width.FLOAT64, Width.INT64)
-    return v.kind.value if usual or v.width is None else f"{v.kind.value} ({v.width.value})"
 
 
 def _start(v: Variable) -> str:

@@ -116,7 +116,7 @@ def _type(v: Variable) -> tuple[str, dict[str, str]]:
     if v.kind is Kind.INTEGER:
         return "Integer", _integer_bounds(v)
     if v.enumeration is not None:
-        return "Enumeration", {"declaredType": v.enumeration.__name__}
+        return "Enumeration", {"declaredType": v.enumeration.__name__, **bounds(v)}
     return {Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}[v.kind], {}
 
 

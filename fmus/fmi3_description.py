@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cosim.block import Causality, Kind, Variable
-from fmus.layout import HostVariable, capacity
+from fmus.layout import TIME, HostVariable, capacity
 from fmus.model_description import (
     GENERATOR,
     Model,
@@ -58,7 +58,7 @@ def fmi3_description(model: Model) -> bytes:
     ET.SubElement(
         variables,
         "Float64",
-        name="time",
+        name=TIME,
         valueReference="0",
         description="time",
         causality="independent",
@@ -111,7 +111,7 @@ def _type(v: Variable) -> tuple[str, dict[str, str]]:
         unit = {"unit": v.unit.symbol} if v.kind is Kind.REAL else {}
         return v.width.value, {**unit, **bounds(v)}
     if v.enumeration is not None:
-        return "Enumeration", {"declaredType": v.enumeration.__name__}
+        return "Enumeration", {"declaredType": v.enumeration.__name__, **bounds(v)}
     if v.kind is Kind.BINARY:
         mime = v.raster.mime if v.raster else BYTES_MIME_TYPE
         return "Binary", {"mimeType": mime, "maxSize": str(capacity(v))}

@@ -16,6 +16,9 @@ from cosim.width import Width
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""
 
+TIME = "time"
+"""Name of the independent variable in FMI 3."""
+
 BYTES_CAPACITY = 1 << 16
 """Most bytes in a binary variable that is not a picture."""
 
@@ -62,7 +65,10 @@ CAUSALITIES = (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
 
 
 class DuplicateName(ValueError):
-    """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables."""
+    """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables.
+
+    FMI 3 has the time among them.
+    """
 
     def __init__(self, block: str, names: list[str]) -> None:
         super().__init__(f"{block}: more than one variable is named {', '.join(names)}; rename all but one")
@@ -133,12 +139,13 @@ class Layout:
     """The places of all variables of a block.
 
     Raises:
-        DuplicateName: two variables share a name.
+        DuplicateName: two variables share a name, or one is called `time`.
     """
 
     def __init__(self, description: Description) -> None:
         names = [v.name for v in description.variables]
-        duplicates = sorted({name for name in names if names.count(name) > 1})
+        taken = [TIME, *names]
+        duplicates = sorted({name for name in taken if taken.count(name) > 1})
         if duplicates:
             raise DuplicateName(description.name, duplicates)
         self.description = description

@@ -7,7 +7,7 @@ import struct
 
 from cosim.block import Causality
 from fmus.buffers import Buffers
-from fmus.layout import Buffer, Form, Type, type_of
+from fmus.layout import TIME, Buffer, Form, Type, type_of
 
 HEADER = struct.Struct("=11Q")
 BINARY_BUFFER = struct.Struct("=3Q")
@@ -28,7 +28,7 @@ def table(buffers: Buffers, form: Form) -> bytes:
         names.extend(name.encode() + b"\0")
 
     if form.fmi == 3:
-        add(Buffer.FLOAT64, Type.FLOAT64, INDEPENDENT, 1, 0, "time")
+        add(Buffer.FLOAT64, Type.FLOAT64, INDEPENDENT, 1, 0, TIME)
     for v in layout.shown(form):
         add(v.buffer, type_of(v.variable), CAUSALITIES[v.variable.causality], len(v.entries), v.offset, v.name)
     binaries = [

@@ -80,7 +80,7 @@ struct Instance {
     Logger *log;
     void (*host_logger)(void); /* the host's own function, called by `log` */
     void *host_environment;
-    bool logging; /* messages beyond errors and warnings are wanted */
+    unsigned logged; /* the LOG_... that the host wants; errors are always told */
 
     Mode mode;
     bool event_mode_used;
@@ -105,6 +105,8 @@ struct Instance {
 };
 
 /* log.c */
+
+enum { LOG_WARNINGS = 1, LOG_NOTES = 2, LOG_EVERYTHING = 3 };
 
 #define CATEGORY_ERROR "logStatusError"
 #define CATEGORY_WARNING "logStatusWarning"

@@ -90,6 +90,12 @@ def test_a_field_without_declaration_is_refused():
         describe(Careless)
 
 
+def test_a_name_that_fmi_does_not_know_is_refused():
+    made = dataclasses.make_dataclass("Made", [("größe", Metre, port(0.0, "size"))])
+    with pytest.raises(DeclarationError, match=r"Made\.größe: a name has ASCII letters"):
+        declared_variables(made, Causality.INPUT)
+
+
 def test_feedthrough_names_ports():
     class Wrong(Gripper):
         feedthrough = {"phase": ("f_X",)}
@@ -136,6 +142,9 @@ def test_start_and_bounds_of_a_single_are_what_a_host_sees_of_them():
         (int, port(2**63, "x"), "start 9223372036854775808 does not fit Int64"),
         (Single[Metre], port(0.0, "x", maximum=1e39), r"maximum 1e\+39 does not fit Float32"),
         (Single[Vector3[Metre]], port(np.array([0.0, -1e39, 0.0]), "x"), r"start -1e\+39 does not fit Float32"),
+        (Metre, port(3.0, "x", maximum=2.0), r"Made\.x: start 3\.0 is not between -inf and 2, its bounds"),
+        (Vector3[Metre], port(np.array([1.0, -1.0, 1.0]), "x", minimum=0.0), r"start -1\.0 is not between 0 and inf"),
+        (Phase, port(Phase.CLOSED, "x", maximum=0), "start 1 is not between"),
         (Single[int], port(0, "x"), "Float32 is not the type of integer values"),
         (Single[bool], port(start=False, description="x"), "Float32 is not the type of boolean values"),
         (Vector3[Int8], port(np.zeros(3), "x"), "arrays have real entries"),
