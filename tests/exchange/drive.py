@@ -17,10 +17,15 @@ STEPS = 10
 
 CHOSEN: Mapping[str, Mapping[str, Any]] = {
     "TendonArm": {"internal_step": 0.004},  # a step must be a multiple of it
-    "Push": {"start": 0.05, "duration": 0.06},  # else nothing happens within the run
+    "HandoverPartner": {"guide_stiffness": 50.0},
+    "TrajectoryPlanner": {"settle": 0.06},
     "HybridKinematics": {"L_1": 0.15, "L_2": 0.225, "L_3": 0.225},  # the model that ships is trained for these
+    "Push": {"start": 0.05, "duration": 0.06},
 }
-"""Parameters whose values are not near those that they start with."""
+"""Parameters whose values are not near those that they start with, most so that inputs act within the short run."""
+
+CENTRES: Mapping[str, Mapping[str, float]] = {"IrReflex": {"ticks": 400.0}}
+"""Where inputs lie whose start values say nothing: sensors that see nothing."""
 
 Values = dict[str, Any]
 
@@ -33,7 +38,7 @@ def parameters(d: Description) -> Values:
 def inputs(d: Description, k: int) -> Values:
     """Return the inputs that hold during step k."""
     rng = np.random.default_rng([zlib.crc32(d.name.encode()), k])
-    return {v.name: _picture(v.name, k) if v.kind is Kind.BINARY else _varied(v, rng) for v in d.inputs}
+    return {v.name: _picture(v.name, k) if v.kind is Kind.BINARY else _varied(d.name, v, rng) for v in d.inputs}
 
 
 def scalars(variables: Mapping[str, Variable], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -57,10 +62,10 @@ def _moved(unit: str, v: Variable) -> Any:
     return _within(v, np.asarray(v.start) * (1.0 + 0.02 * share))  # one factor keeps matrices symmetric
 
 
-def _varied(v: Variable, rng: np.random.Generator) -> Any:
+def _varied(unit: str, v: Variable, rng: np.random.Generator) -> Any:
     if v.kind is Kind.REAL:
         span = 0.02 if v.maximum is None or v.minimum is None else 0.02 * (v.maximum - v.minimum)
-        moved = np.asarray(v.start) + rng.normal(0.0, span, v.shape)
+        moved = np.asarray(v.start) + CENTRES.get(unit, {}).get(v.name, 0.0) + rng.normal(0.0, span, v.shape)
         return _unit(moved) if v.name.startswith("q_") and v.shape == (4,) else _within(v, moved)
     if v.kind is Kind.BOOLEAN:
         return bool(rng.integers(4) > 0)

@@ -46,6 +46,17 @@ def test_scalar_fmi3_gives_the_same(references: References, ecos: Ecos, notary: 
     expect_same(found, references.varying(unit, 3).without(enumerations(unit)))
 
 
+def test_arrays_shift_what_ecos_reads(ecos: Ecos, tmp_path: Path):
+    """This is why there is a scalar form; if it fails, Ecos has learnt arrays and the README may say so."""
+    last = [
+        ecos.simulate(tmp_path, fmu, 0.016, 0.5)[-1] for fmu in (cached(LIGHT[1], 3), cached(LIGHT[1], 3, scalar=True))
+    ]
+    assert all(float(cells["time"]) > 0.4 for cells in last)
+    whole, scalar = (float(cells["instance::time[REAL]"]) for cells in last)
+    assert scalar == float(last[1]["time"])
+    assert whole != float(last[0]["time"])
+
+
 def enumerations(unit: str) -> list[str]:
     """Return the names of a unit's enumerations, which Ecos leaves out of both standards."""
     return [name for name, v in variables(unit).items() if v.kind is Kind.ENUMERATION]

@@ -1,7 +1,7 @@
 """What foreign hosts are compared with shows that parameters and inputs act."""
 
 import pytest
-from reference import FMI2_UNITS, References
+from reference import FMI2_UNITS, References, description
 
 from fmus.catalog import UNITS
 
@@ -16,3 +16,4 @@ def test_outputs_differ_from_those_of_a_unit_that_is_left_alone(references: Refe
     varying, held, untouched = (f(unit, fmi) for f in (references.varying, references.held, references.untouched))
     assert not varying.is_like(untouched)
     assert not held.is_like(untouched)
+    assert varying.is_like(held) is not bool(description(unit).inputs)
