@@ -15,11 +15,16 @@ from pathlib import Path
 RUNTIME = Path(__file__).with_name("runtime")
 
 SHARED_SOURCES = (
+    "embedded.c",
     "instance.c",
     "log.c",
     "platform.c",
     "process_lock.c",
+    "process_posix.c",
+    "process_windows.c",
     "python_api.c",
+    "remote.c",
+    "shared_memory.c",
     "slave.c",
     "state.c",
     "text.c",

@@ -1,5 +1,6 @@
 """The Python side of an FMU's instance: what the C runtime calls (runtime/slave.c)."""
 
+from collections.abc import Callable
 from typing import Any
 
 from cosim.block import Block, describe
@@ -31,16 +32,17 @@ class Slave:
     Args:
         block: the block's class.
         fmi: version of the standard, 2 or 3; it decides what a value reference stands for.
+        memory: where the variables lie, see `Buffers`.
     """
 
     _block: Block
 
-    def __init__(self, block: type[Any], fmi: int) -> None:
+    def __init__(self, block: type[Any], fmi: int, memory: Callable[[int], Any] | None = None) -> None:
         self._type = block
         self._fmi = fmi
         description = describe(block)
         self._period = None if description.period is None else float(description.period)
-        self._buffers = Buffers(Layout(description))
+        self._buffers = Buffers(Layout(description), memory)
         self._clock = self._buffers.floats[:2]
         self._read = input_reader(self._buffers)
         self._write = output_writer(self._buffers)
