@@ -12,7 +12,6 @@ from cosim.block import Causality, Variable
 from cosim.ports import Floats, Raster
 from fmus.layout import Buffer, Layout, Slot, capacity
 
-
 ALIGNMENT = 64
 """Bytes: arrays begin at multiples of a cache line in their memory."""
 

@@ -11,6 +11,7 @@ import signal
 import struct
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -84,7 +85,7 @@ class Server:
         self._channel = channel
         self._file = _descriptor(memory)
         self._memory = mmap.mmap(-1, 1)
-        self._explain: Callable[[BaseException], str] = repr
+        self._explain: Callable[[BaseException], str] = _trace
         self._methods: dict[bytes, Callable[..., Any]] = {}
         self._slave: Any = None
 
@@ -131,6 +132,10 @@ class Server:
             os.posix_fallocate(self._file, 0, size)
         self._memory = mmap.mmap(self._file, size)
         return self._memory
+
+
+def _trace(error: BaseException) -> str:
+    return "".join(traceback.format_exception(type(error), error, error.__traceback__))
 
 
 def _descriptor(number: int) -> int:

@@ -17,7 +17,8 @@ typedef enum {
 } Transfer;
 
 /* Starts `interpreter arguments... CHANNEL MEMORY`: the last two, numbers, are its ends of the channel and of the shared
- * memory (descriptors; on Windows handles). It inherits nothing else but standard output and standard error. On failure
+ * memory (descriptors; on Windows handles). It inherits nothing else but, on
+ * POSIX, standard output and standard error. On failure
  * returns NULL and adds why to `fault`. */
 Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault);
 
@@ -27,6 +28,8 @@ double process_clock(void);
 /* All of `size` bytes, or what kept them; `deadline` is of the clock above, infinity is none. */
 Transfer process_send(Process *process, const void *bytes, size_t size, double deadline);
 Transfer process_receive(Process *process, void *bytes, size_t size, double deadline);
+
+bool process_runs(const Process *process);
 
 /* Closes the channel, at which the process ends by itself; after `patience` seconds it is killed. Frees `process` and
  * says how it ended; returns its exit status, or -1 if it was ended by something else. */

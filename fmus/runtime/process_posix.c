@@ -134,6 +134,8 @@ static Life life_of(const Process *process) {
     return info.si_pid == process->id ? IS_OVER : RUNS;
 }
 
+bool process_runs(const Process *process) { return life_of(process) == RUNS; }
+
 /* Waits until the channel is ready for what `events` says. */
 static Transfer await_channel(const Process *process, short events, double deadline) {
     for (;;) {

@@ -122,6 +122,8 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
     return process;
 }
 
+bool process_runs(const Process *process) { return WaitForSingleObject(process->process, 0) == WAIT_TIMEOUT; }
+
 static Transfer transfer(Process *process, bool sends, char *bytes, size_t size, double deadline) {
     while (size > 0) {
         OVERLAPPED under_way = {.hEvent = process->done};

@@ -49,7 +49,8 @@ static bool load_functions(void *library, const char *from, Text *tried) {
         py = found;
         return true;
     }
-    text_add(tried, "\n  %s: Python %.6s is too old, 3.%d or later is needed", from, version, OLDEST_MINOR);
+    text_add(tried, "\n  %s: Python %.*s is too old, 3.%d or later is needed", from, (int)strcspn(version, " "), version,
+             OLDEST_MINOR);
     return false;
 }
 

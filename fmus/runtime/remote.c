@@ -2,7 +2,8 @@
  *
  * Calls and their answers go through a channel; the variables' buffers lie in shared memory, so setting and getting
  * stay copies in memory. FMU_PYTHON is the path of the interpreter, else that of resources/python.txt is taken, else
- * `python3` on the PATH. FMU_PYTHON_TIMEOUT is how long a call may take, in seconds; 0 is without limit.
+ * `python3` on the PATH. FMU_PYTHON_TIMEOUT is how long a call may take, in seconds; 0 is without limit. Starting, which
+ * imports packages, may always take a minute.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +14,8 @@
 #include "python_api.h"
 #include "side.h"
 
-#define TIMEOUT 300.0 /* s */
+#define TIMEOUT 300.0 /* s: for a call, if FMU_PYTHON_TIMEOUT is not set */
+#define STARTING 60.0 /* s: at least, for starting */
 #define PATIENCE 5.0  /* s: for ending by itself */
 #define TOO_OLD 86    /* exit status, below */
 
@@ -21,6 +23,12 @@
 #define BEGINNING                                                               \
     "import sys; del sys.path[0]; sys.version_info < (3, 10) and sys.exit(86);" \
     "import runpy; runpy.run_path(sys.argv[1], run_name='__main__')"
+
+#ifdef _WIN32
+#define ON_THE_PATH "python" /* python.org's installer makes no python3.exe */
+#else
+#define ON_THE_PATH "python3"
+#endif
 
 #define CURE_ENDED "Cure: reset the instance or set a saved state, which starts another process"
 
@@ -51,9 +59,10 @@ static const Side remote_side;
 
 static Remote *side_of(const Instance *instance) { return instance->python; }
 
-/* A call on its way and back. `answer` is given; on TRANSFERRED its bytes are what the method returned, or why not. */
-static Transfer transfer(const Remote *side, const Question *question, Outcome *outcome, Answer *answer) {
-    double deadline = process_clock() + side->limit;
+/* A call on its way and back within `limit` seconds. `answer` is given; on TRANSFERRED its bytes are what the method returned, or why not. */
+static Transfer transfer(const Remote *side, const Question *question, double limit, Outcome *outcome,
+                         Answer *answer) {
+    double deadline = process_clock() + limit;
     CallHead call = {.index = question->index ? (int64_t)*question->index : -1,
                      .size = question->size,
                      .given = question->bytes != NULL};
@@ -71,15 +80,15 @@ static Transfer transfer(const Remote *side, const Question *question, Outcome *
 }
 
 /* Ends a process that does not answer and adds how it ended. */
-static void lose(Remote *side, Transfer why, Text *text) {
+static void lose(Remote *side, Transfer why, double limit, Text *text) {
     Text how = {0};
     int status = process_end(side->process, why == TOO_LATE ? 0.0 : PATIENCE, &how);
     side->process = NULL;
     if (why == TOO_LATE)
         text_add(text,
-                 "%s did not answer for FMU_PYTHON_TIMEOUT = %g s and was ended. " CURE_ENDED
-                 "; a greater FMU_PYTHON_TIMEOUT gives it more time, 0 all the time it wants",
-                 side->interpreter, side->limit);
+                 "the unit's Python process, %s, did not answer for %g s and was ended. " CURE_ENDED
+                 "; a greater FMU_PYTHON_TIMEOUT (s) gives it more time, 0 all the time it wants",
+                 side->interpreter, limit);
     else if (status == TOO_OLD)
         text_add(text, "it is older than Python 3.10");
     else
@@ -95,10 +104,10 @@ static Outcome ask(const Instance *instance, const char *function, const Questio
     }
     Outcome outcome = LOST;
     Answer given = {0};
-    Transfer done = transfer(side, question, &outcome, &given);
+    Transfer done = transfer(side, question, side->limit, &outcome, &given);
     if (done != TRANSFERRED) {
         Text why = {0};
-        lose(side, done, &why);
+        lose(side, done, side->limit, &why);
         refuse(instance, function, "%s", text_of(&why));
         text_clear(&why);
         outcome = LOST;
@@ -130,12 +139,13 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     Question question = {.method = "start", .bytes = text_of(&wanted), .size = wanted.length};
     Answer answer = {0};
     Outcome outcome = LOST;
-    Transfer done = transfer(side, &question, &outcome, &answer);
+    double limit = fmax(side->limit, STARTING);
+    Transfer done = transfer(side, &question, limit, &outcome, &answer);
     text_clear(&wanted);
     Start start = NOT_STARTED;
     Begun begun;
     if (done != TRANSFERRED) {
-        lose(side, done, fault);
+        lose(side, done, limit, fault);
         start = NO_PYTHON;
     } else if (outcome != ANSWERED) {
         refuse(instance, function, "%s", answer.bytes);
@@ -158,11 +168,14 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
 }
 
 static bool revive(Instance *instance, const char *function) {
-    if (side_of(instance)->process) return true;
+    Remote *side = side_of(instance);
+    if (side->process && process_runs(side->process)) return true;
     Text fault = {0};
+    if (side->process) process_end(side->process, 0.0, &fault); /* nobody has asked it since it ended */
+    text_clear(&fault);
     Start start = begin(instance, function, &fault);
     if (start == NO_PYTHON)
-        refuse(instance, function, "%s does not start again: %s", side_of(instance)->interpreter, text_of(&fault));
+        refuse(instance, function, "%s does not start again: %s", side->interpreter, text_of(&fault));
     text_clear(&fault);
     return start == STARTED;
 }
@@ -222,13 +235,22 @@ static Start try(Instance *instance, const char *function, const char *from, cha
     return start;
 }
 
+static bool readable(const Instance *instance, const char *function, const char *resources, const char *source) {
+    Text path = {0};
+    text_add(&path, "%s/sources/fmus/%s", resources, source);
+    bool there = platform_exists(text_of(&path));
+    if (!there) refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+    text_clear(&path);
+    return there;
+}
+
 static Start search(Instance *instance, const char *function, Text *tried) {
     char *chosen = platform_environment("FMU_PYTHON");
     if (chosen) return try(instance, function, "FMU_PYTHON", chosen, tried);
     text_add(tried, "\n  FMU_PYTHON: not set");
     char *noted = python_noted(side_of(instance)->resources);
     Start start = try(instance, function, "resources/python.txt", noted, tried);
-    if (start == NO_PYTHON) start = try(instance, function, "python3 on the PATH", copy_of("python3"), tried);
+    if (start == NO_PYTHON) start = try(instance, function, ON_THE_PATH " on the PATH", copy_of(ON_THE_PATH), tried);
     return start;
 }
 
@@ -239,7 +261,9 @@ Start remote_start(Instance *instance, const char *function, const char *resourc
     *side = (Remote){.memory = NO_SHARED_MEMORY, .resources = copy_of(resources), .token = copy_of(token)};
     instance->python = side;
     instance->side = &remote_side;
-    if (!read_limit(instance, function, &side->limit)) return NOT_STARTED;
+    if (!read_limit(instance, function, &side->limit) || !readable(instance, function, resources, "server.py") ||
+        !readable(instance, function, resources, "loader.py"))
+        return NOT_STARTED;
     Text apart = {0};
     Start start = NO_PYTHON;
     if (shared_memory_open(&side->memory, &apart)) start = search(instance, function, &apart);
