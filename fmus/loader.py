@@ -49,7 +49,7 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
-    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["fmi"], memory)
+    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["form"], memory)
 
 
 def warning(resources: str) -> str:

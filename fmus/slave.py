@@ -6,7 +6,7 @@ from typing import Any
 from cosim.block import Block, describe
 from fmus.buffers import Buffers, UnfitState, join, split
 from fmus.exchange import input_reader, output_writer
-from fmus.layout import Layout
+from fmus.layout import Form, Layout
 from fmus.parameters import read_parameters
 from fmus.table import table
 
@@ -31,15 +31,15 @@ class Slave:
 
     Args:
         block: the block's class.
-        fmi: version of the standard, 2 or 3; it decides what a value reference stands for.
+        form: a value of `Form`; it decides what a value reference stands for.
         memory: where the variables lie, see `Buffers`.
     """
 
     _block: Block
 
-    def __init__(self, block: type[Any], fmi: int, memory: Callable[[int], Any] | None = None) -> None:
+    def __init__(self, block: type[Any], form: str, memory: Callable[[int], Any] | None = None) -> None:
         self._type = block
-        self._fmi = fmi
+        self._form = Form(form)
         description = describe(block)
         self._period = None if description.period is None else float(description.period)
         self._buffers = Buffers(Layout(description), memory)
@@ -51,7 +51,7 @@ class Slave:
 
     def table(self) -> bytes:
         """Return what the C runtime must know of the buffers."""
-        return table(self._buffers, self._fmi)
+        return table(self._buffers, self._form)
 
     def initialise(self) -> None:
         """Work out the outputs at the start.

@@ -84,13 +84,18 @@ def list_(name: str | None) -> None:
 @click.argument("units", nargs=-1, metavar="[UNIT]...")
 @click.option("--fmi", type=click.Choice(["2", "3", "both"]), default="both", show_default=True, help="FMI version.")
 @click.option(
+    "--scalar",
+    is_flag=True,
+    help="FMI 3 with a variable for every entry of an array, for tools that know no arrays. FMI 2 is always so.",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path("fmus-built"),
     show_default=True,
     help="Folder for the files.",
 )
-def build_(units: Sequence[str], fmi: str, out: Path) -> None:
+def build_(units: Sequence[str], fmi: str, out: Path, *, scalar: bool) -> None:
     """Build UNITs (all by default) as FMUs for other tools.
 
     A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
@@ -100,7 +105,7 @@ def build_(units: Sequence[str], fmi: str, out: Path) -> None:
         raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown))
     with Interruption(), _told_in_one_line():
         check_place(out)
-        for line in _build_all(units or list(UNITS), fmi, out, named=bool(units)):
+        for line in _build_all(units or list(UNITS), fmi, out, named=bool(units), scalar=scalar):
             click.echo(line)
 
 
@@ -163,11 +168,11 @@ def _fmus(experiment: type[Experiment[Any]], others: Mapping[str, Path]) -> dict
         raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
 
 
-def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Iterator[str]:
+def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool, scalar: bool) -> Iterator[str]:
     for name in units:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
             try:
-                yield str(build(UNITS[name], version, out))
+                yield str(build(UNITS[name], version, out, scalar=scalar))
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise BadCall(str(e)) from e

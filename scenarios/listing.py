@@ -78,7 +78,7 @@ def _allowed(v: Variable) -> str:
 def _type_of(v: Variable) -> str:
     shape = f"[{','.join(map(str, v.shape))}]" if v.shape else ""
     unit = v.unit.symbol if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
-    return f"{v.kind.value}{shape} {unit}".rstrip()
+    return f"{v.type_name}{shape} {unit}".rstrip()
 
 
 def _start_of(v: Variable) -> str:

@@ -87,53 +87,59 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real values[]) {
-    return (fmi2Status)get_floats(c, __func__, vr, n, values, n);
+    return (fmi2Status)get_floats(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real values[]) {
-    return (fmi2Status)set_floats(c, __func__, vr, n, values, n);
+    return (fmi2Status)set_floats(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer values[]) {
     Instance *instance = c;
-    if (!may_get(instance, __func__, INT64, vr, n, values, n)) return fmi2Error;
+    if (!may_get(instance, __func__, INT64, ANY_TYPE, vr, n, values, n)) return fmi2Error;
     for (size_t i = 0; i < n; i++) {
-        int64_t value = instance->integers[variable_of(instance, vr[i])->offset];
-        if (value < INT32_MIN || value > INT32_MAX)
-            return (fmi2Status)refuse(instance, __func__, "the value %lld of variable %u has no place in 32 bits",
-                                      (long long)value, vr[i]);
-        values[i] = (fmi2Integer)value;
+        const Variable *variable = variable_of(instance, vr[i]);
+        int64_t value = instance->integers[variable->offset];
+        if (value >= (variable->type == TYPE_UINT64 ? 0 : INT32_MIN) && value <= INT32_MAX) {
+            values[i] = (fmi2Integer)value;
+            continue;
+        }
+        const char *format = variable->type == TYPE_UINT64 ? "the value %llu of variable %u has no place in 32 bits"
+                                                           : "the value %lld of variable %u has no place in 32 bits";
+        return (fmi2Status)refuse(instance, __func__, format, (long long)value, vr[i]);
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer values[]) {
     Instance *instance = c;
-    if (!may_set(instance, __func__, INT64, vr, n, values, n)) return fmi2Error;
+    if (!may_set(instance, __func__, INT64, ANY_TYPE, vr, n, values, n)) return fmi2Error;
+    for (size_t i = 0; i < n; i++)
+        if (!takes_integer(instance, __func__, vr[i], values[i])) return fmi2Error;
     for (size_t i = 0; i < n; i++) instance->integers[variable_of(instance, vr[i])->offset] = values[i];
     return fmi2OK;
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean values[]) {
     Instance *instance = c;
-    if (!may_get(instance, __func__, BOOLEAN, vr, n, values, n)) return fmi2Error;
+    if (!may_get(instance, __func__, BOOLEAN, ANY_TYPE, vr, n, values, n)) return fmi2Error;
     for (size_t i = 0; i < n; i++) values[i] = instance->booleans[variable_of(instance, vr[i])->offset] != 0;
     return fmi2OK;
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean values[]) {
     Instance *instance = c;
-    if (!may_set(instance, __func__, BOOLEAN, vr, n, values, n)) return fmi2Error;
+    if (!may_set(instance, __func__, BOOLEAN, ANY_TYPE, vr, n, values, n)) return fmi2Error;
     for (size_t i = 0; i < n; i++) instance->booleans[variable_of(instance, vr[i])->offset] = values[i] != 0;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String values[]) {
-    return (fmi2Status)get_strings(c, __func__, vr, n, values, n);
+    return (fmi2Status)get_strings(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String values[]) {
-    return (fmi2Status)set_strings(c, __func__, vr, n, values, n);
+    return (fmi2Status)set_strings(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {

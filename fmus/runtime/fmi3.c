@@ -5,8 +5,13 @@
 #include "instance.h"
 #include "platform.h"
 
+/* The callback does not say whose message it is, so the message begins with the instance's name. */
 static void log_message(const Instance *instance, Status status, const char *category, const char *message) {
-    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category, message);
+    Text named = {0};
+    text_add(&named, *instance->name ? "%s: %s" : "%s%s", instance->name, message);
+    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category,
+                                                    named.chars ? named.chars : message);
+    text_clear(&named);
 }
 
 #define BEGIN(modes)             \

@@ -13,7 +13,7 @@ Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void),
     instance->log = log;
     instance->host_logger = host_logger;
     instance->host_environment = environment;
-    instance->logging = logging;
+    instance->logged = logging ? LOG_EVERYTHING : 0;
     instance->mode = INSTANTIATED;
     instance->stop_time = INFINITY;
     if (instance->name) return instance;

@@ -33,10 +33,29 @@ typedef enum {
 typedef enum { FLOAT64, INT64, BOOLEAN, STRING, BINARY } Kind;
 typedef enum { PARAMETER, INPUT, OUTPUT, INDEPENDENT } Causality;
 
+/* Types of FMI 3. FMI 2 knows kinds only: ANY_TYPE stands for all of a kind. */
+typedef enum {
+    ANY_TYPE,
+    TYPE_FLOAT64,
+    TYPE_FLOAT32,
+    TYPE_INT8,
+    TYPE_UINT8,
+    TYPE_INT16,
+    TYPE_UINT16,
+    TYPE_INT32,
+    TYPE_UINT32,
+    TYPE_INT64,
+    TYPE_UINT64,
+    TYPE_ENUMERATION,
+    TYPE_BOOLEAN,
+    TYPE_STRING,
+    TYPE_BINARY
+} Type;
+
 /* What a value reference stands for: `count` entries from `offset` on in the buffer of its kind. */
 typedef struct {
     uint8_t kind, causality;
-    uint16_t unused;
+    uint16_t type;
     uint32_t count, offset, name;
 } Variable;
 
@@ -62,7 +81,7 @@ struct Instance {
     Logger *log;
     void (*host_logger)(void); /* the host's own function, called by `log` */
     void *host_environment;
-    bool logging; /* messages beyond errors and warnings are wanted */
+    unsigned logged; /* the LOG_... that the host wants; errors are always told */
 
     Mode mode;
     bool event_mode_used;
@@ -90,6 +109,8 @@ struct Instance {
 };
 
 /* log.c */
+
+enum { LOG_WARNINGS = 1, LOG_NOTES = 2, LOG_EVERYTHING = 3 };
 
 #define CATEGORY_ERROR "logStatusError"
 #define CATEGORY_WARNING "logStatusWarning"
@@ -139,18 +160,25 @@ static inline const Variable *variable_of(const Instance *instance, uint32_t ref
 
 /* Whether these variables may be read (written) now and have `values` entries altogether. Reading brings outputs up to
  * date, writing marks them stale. */
-bool may_get(Instance *instance, const char *function, Kind kind, const uint32_t references[], size_t n,
+bool may_get(Instance *instance, const char *function, Kind kind, Type type, const uint32_t references[], size_t n,
              const void *values, size_t n_values);
-bool may_set(Instance *instance, const char *function, Kind kind, const uint32_t references[], size_t n,
+bool may_set(Instance *instance, const char *function, Kind kind, Type type, const uint32_t references[], size_t n,
              const void *values, size_t n_values);
 
-Status get_floats(Instance *instance, const char *function, const uint32_t vr[], size_t n, double values[], size_t);
-Status set_floats(Instance *instance, const char *function, const uint32_t vr[], size_t n, const double values[],
+/* Whether an integer variable takes a number. */
+bool takes_integer(const Instance *instance, const char *function, uint32_t reference, int64_t number);
+
+Status get_floats(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n, double values[],
                   size_t);
-Status get_strings(Instance *instance, const char *function, const uint32_t vr[], size_t n, const char *values[],
+Status set_floats(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
+                  const double values[], size_t);
+Status get_singles(Instance *instance, const char *function, const uint32_t vr[], size_t n, float values[], size_t);
+Status set_singles(Instance *instance, const char *function, const uint32_t vr[], size_t n, const float values[],
                    size_t);
-Status set_strings(Instance *instance, const char *function, const uint32_t vr[], size_t n, const char *const values[],
-                   size_t);
+Status get_strings(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
+                   const char *values[], size_t);
+Status set_strings(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
+                   const char *const values[], size_t);
 
 /* The first of `n` real entries that is not finite, described, or false if all are. */
 bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *description);

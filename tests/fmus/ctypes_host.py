@@ -34,6 +34,9 @@ class CtypesHost:
 
     Attributes:
         log: messages so far, as the host gets them.
+        categories: their categories.
+        names: the instance's name with each, in FMI 2.
+        logging: whether the next instance is made with logging on.
         references: value references by variable's name; of an array in FMI 2 that of its first entry.
     """
 
@@ -53,8 +56,11 @@ class CtypesHost:
         suffix = library(host_platform(), fmi).suffix
         self.library = ctypes.CDLL(str(self.folder / "binaries" / folder / (root.attrib["modelName"] + suffix)))
         self.instance: int | None = None
-        self._log2 = Log2(lambda *arguments: self.log.append(arguments[-1].decode()))
-        self._log3 = Log3(lambda *arguments: self.log.append(arguments[-1].decode()))
+        self.categories: list[str] = []
+        self.names: list[str] = []
+        self.logging = False
+        self._log2 = Log2(self._take_2)
+        self.logger3 = Log3(self._take_3)
         self._callbacks = Callbacks(logger=self._log2)
 
     def instantiate(self, token: str | None = None, *, event_mode: bool = False) -> bool:
@@ -70,16 +76,25 @@ class CtypesHost:
                 resources.as_uri().encode(),
                 ctypes.byref(self._callbacks),
                 0,
-                0,
+                int(self.logging),
             )
         else:
             make = self.library.fmi3InstantiateCoSimulation
             flags = (BOOL(False), BOOL(False), BOOL(event_mode), BOOL(False))
             path = f"{resources}/".encode()
-            arguments = (b"x", given, path, *flags, None, SIZE(0), None, self._log3, None)
+            flags = (flags[0], BOOL(self.logging), *flags[2:])
+            arguments = (b"x", given, path, *flags, None, SIZE(0), None, self.logger3, None)
         make.restype = ctypes.c_void_p
         self.instance = make(*arguments)
         return self.instance is not None
+
+    def _take_2(self, _environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self.names.append(name.decode())
+        self._take_3(_environment, status, category, message)
+
+    def _take_3(self, _environment: object, _status: int, category: bytes, message: bytes) -> None:
+        self.categories.append(category.decode())
+        self.log.append(message.decode())
 
     def call(self, function: str, *arguments: Any) -> int:
         """Call fmi2... or fmi3... with the instance; return the status."""
