@@ -17,9 +17,8 @@ typedef enum {
 } Transfer;
 
 /* Starts `interpreter arguments... CHANNEL MEMORY`: the last two, numbers, are its ends of the channel and of the shared
- * memory (descriptors; on Windows handles). It inherits nothing else but, on
- * POSIX, standard output and standard error. On failure
- * returns NULL and adds why to `fault`. */
+ * memory (descriptors; on Windows handles). It inherits nothing else but, on POSIX, standard output and standard error.
+ * On failure returns NULL and adds why to `fault`. */
 Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault);
 
 /* Seconds of a clock that never goes back. */

@@ -45,8 +45,10 @@ void shared_memory_close(SharedMemory *memory) {
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/syscall.h>
 #include <unistd.h>
+#ifdef __linux__
+#include <sys/syscall.h>
+#endif
 
 /* A file that is nowhere on a disk, or in a temporary folder without a name. */
 static int nameless_file(void) {
