@@ -24,6 +24,9 @@ from cosim.width import Width
 class Block(Protocol):
     """A plant or a controller with declared ports, advanced in steps.
 
+    What a block may offer besides: `cosim.eventful_block.EventfulBlock`,
+    `cosim.differentiable_block.DifferentiableBlock`.
+
     Class attributes: `feedthrough` names, by output, the inputs that act on it at once (within the same communication
     point); `period` is the sampling period of a block that is sampled, in seconds, else None.
     """
@@ -37,7 +40,10 @@ class Block(Protocol):
         ...
 
     def step(self, t: float, dt: float, u: Any) -> Any:
-        """Advance from t by dt with u held and return the outputs at t + dt."""
+        """Advance from t by dt with u held and return the outputs at t + dt.
+
+        A sampled block is stepped by its period only, once at each tick; its outputs hold until the next one.
+        """
         ...
 
     def get_state(self) -> bytes:
@@ -47,6 +53,9 @@ class Block(Protocol):
     def set_state(self, state: bytes) -> None:
         """Go back to a state that `get_state` gave."""
         ...
+
+
+_EVENT_METHODS = ("advance", "handle_event", "next_event")
 
 
 class Kind(enum.Enum):
@@ -129,6 +138,8 @@ class Description:
     outputs: tuple[Variable, ...]
     feedthrough: Mapping[str, tuple[str, ...]]
     period: Fraction | None
+    has_events: bool
+    has_derivatives: bool
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -142,11 +153,14 @@ def describe(block: type[Any]) -> Description:
 
     Raises:
         DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
-            declaration, or a type that is no port's, or a start value or bound that its type cannot hold.
+            declaration, or a type that is no port's, or a start value or bound that its type cannot hold; the
+            period is not positive.
     """
     for name in ("feedthrough", "period", "step"):
         if not hasattr(block, name):
             raise DeclarationError(block.__name__, name, "a block has this attribute; see cosim.block.Block")
+    if block.period is not None and block.period <= 0:
+        raise DeclarationError(block.__name__, "period", f"{block.period} s is not positive")
     params_type = _annotation(block, "__init__", "params")
     inputs_type = _annotation(block, "step", "u")
     outputs_type = _annotation(block, "step", "return")
@@ -168,7 +182,20 @@ def describe(block: type[Any]) -> Description:
         outputs=outputs,
         feedthrough=feedthrough,
         period=block.period,
+        has_events=_has_events(block),
+        has_derivatives=hasattr(block, "directional_derivative"),
     )
+
+
+def _has_events(block: type[Any]) -> bool:
+    present = [name for name in _EVENT_METHODS if hasattr(block, name)]
+    for name in _EVENT_METHODS:
+        if present and name not in present:
+            fault = f"a block that has {present[0]} has this method too; see cosim.eventful_block.EventfulBlock"
+            raise DeclarationError(block.__name__, name, fault)
+    if present and block.period is not None:
+        raise DeclarationError(block.__name__, "period", "a block with events is not sampled: its period is None")
+    return bool(present)
 
 
 def _annotation(block: type[Any], method: str, name: str) -> type[Any]:

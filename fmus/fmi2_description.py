@@ -58,6 +58,7 @@ def fmi2_description(model: Model) -> bytes:
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
+        attrib={"providesDirectionalDerivative": "true"} if model.description.has_derivatives else {},
     )
     add_units(root, model.description.variables)
     _add_types(root, model.description.variables)

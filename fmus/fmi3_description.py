@@ -5,11 +5,12 @@ In the scalar form an array's entries are variables of their own, named as in FM
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from fractions import Fraction
 
 import numpy as np
 
 from cosim.block import Causality, Kind, Variable
-from fmus.layout import TIME, HostVariable, capacity
+from fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
 from fmus.model_description import (
     GENERATOR,
     Model,
@@ -39,17 +40,7 @@ def fmi3_description(model: Model) -> bytes:
         generationTool=GENERATOR,
         variableNamingConvention="structured",
     )
-    period = model.description.period
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=model.name,
-        needsExecutionTool="true",  # Python
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize=boolean(model.variable_step),
-        attrib={} if period is None else {"fixedInternalStepSize": number(float(period))},
-    )
+    _add_interface(root, model)
     add_units(root, model.description.variables)
     _add_types(root, model.description.variables)
     add_log_categories(root)
@@ -66,8 +57,55 @@ def fmi3_description(model: Model) -> bytes:
     )
     for v in model.layout.shown(model.form):
         _add_variable(variables, model, v)
+    if model.description.period is not None and model.layout.has_clock(model.form):
+        _add_clock(variables, model.description.period)
     _add_structure(root, model)
     return text(root)
+
+
+def _add_interface(root: ET.Element, model: Model) -> None:
+    block = model.description
+    interface = ET.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=model.name,
+        needsExecutionTool="true",  # Python
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize=boolean(model.variable_step),
+    )
+    if block.period is not None:
+        interface.set("fixedInternalStepSize", number(float(block.period)))
+    if model.layout.has_clock(model.form) or block.has_events:
+        interface.set("hasEventMode", "true")
+        interface.set("mightReturnEarlyFromDoStep", "true")
+    if block.has_derivatives:
+        interface.set("providesDirectionalDerivatives", "true")
+        interface.set("providesAdjointDerivatives", "true")
+
+
+def _add_clock(variables: ET.Element, period: Fraction) -> None:
+    """Add a sampled unit's clock after all other variables; the runtime finds its value reference by that.
+
+    No port names it in `clocks`: a clocked variable has a value only while its clock is active, so hosts without event
+    mode could not reach it, and these outputs hold between ticks.
+    """
+    ET.SubElement(
+        variables,
+        "Clock",
+        name=SAMPLE_CLOCK,
+        valueReference=str(len(variables)),
+        description="ticks at the start, and whenever a period has passed",
+        causality="input",
+        variability="discrete",
+        intervalVariability="constant",
+        intervalDecimal=number(float(period)),
+        shiftDecimal="0.0",
+        supportsFraction="true",
+        resolution=str(period.denominator),
+        intervalCounter=str(period.numerator),
+        shiftCounter="0",
+    )
 
 
 def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:

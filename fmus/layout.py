@@ -17,6 +17,9 @@ CLOCK = 2
 TIME = "time"
 """Name of the independent variable in FMI 3."""
 
+SAMPLE_CLOCK = "sample_clock"
+"""Name of a sampled unit's clock in FMI 3; it has no place in the buffers."""
+
 BYTES_CAPACITY = 1 << 16
 """Most bytes in a binary variable that is not a picture."""
 
@@ -65,7 +68,7 @@ CAUSALITIES = (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
 class DuplicateName(ValueError):
     """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables.
 
-    FMI 3 has the time among them.
+    FMI 3 has the time among them, and a sampled block's clock.
     """
 
     def __init__(self, block: str, names: list[str]) -> None:
@@ -137,12 +140,12 @@ class Layout:
     """The places of all variables of a block.
 
     Raises:
-        DuplicateName: two variables share a name, or one is called `time`.
+        DuplicateName: two variables share a name, or one is called `time`, or as a sampled block's clock.
     """
 
     def __init__(self, description: Description) -> None:
         names = [v.name for v in description.variables]
-        taken = [TIME, *names]
+        taken = [TIME, *names] if description.period is None else [TIME, SAMPLE_CLOCK, *names]
         duplicates = sorted({name for name in taken if taken.count(name) > 1})
         if duplicates:
             raise DuplicateName(description.name, duplicates)
@@ -167,6 +170,14 @@ class Layout:
         """Return the slice of a buffer that holds all variables of one causality."""
         slots = self.of(causality, buffer)
         return slice(slots[0].offset, slots[-1].entries.stop) if slots else slice(0, 0)
+
+    def has_clock(self, form: Form) -> bool:
+        """Tell whether there is a clock among what a host is shown.
+
+        The scalar form has none, it is for tools that know little of FMI 3: when Ecos 0.7 unloads a unit with a clock,
+        it crashes with `double free`.
+        """
+        return form is Form.FMI3 and self.description.period is not None
 
     def shown(self, form: Form) -> list[HostVariable]:
         """Return the variables as a host sees them, by value reference. FMI 3's value reference 0 is the time."""

@@ -9,12 +9,14 @@ from cosim.block import Causality
 from fmus.buffers import Buffers
 from fmus.layout import TIME, Buffer, Form, Type, type_of
 
-HEADER = struct.Struct("=11Q")
+HEADER = struct.Struct("=14Q")
 BINARY_BUFFER = struct.Struct("=3Q")
 VARIABLE = struct.Struct("=BBHIII")
 
 CAUSALITIES = {Causality.PARAMETER: 0, Causality.INPUT: 1, Causality.OUTPUT: 2}
 INDEPENDENT = 3
+
+HAS_EVENTS, HAS_DERIVATIVES, HAS_CLOCK = 1, 2, 4
 
 
 def table(buffers: Buffers, form: Form) -> bytes:
@@ -38,8 +40,12 @@ def table(buffers: Buffers, form: Form) -> bytes:
     spans = [layout.span(causality, Buffer.FLOAT64) for causality in (Causality.INPUT, Causality.OUTPUT)]
     addresses = [a.ctypes.data for a in (buffers.floats, buffers.integers, buffers.booleans, buffers.sizes)]
     places = [n for span in spans for n in (span.start, span.stop - span.start)]
+    block = layout.description
+    abilities = HAS_EVENTS * block.has_events + HAS_DERIVATIVES * block.has_derivatives
+    abilities += HAS_CLOCK * layout.has_clock(form)
+    period = (0, 0) if block.period is None else (block.period.numerator, block.period.denominator)
     return (
-        HEADER.pack(*addresses, *places, len(rows), len(binaries), len(names))
+        HEADER.pack(*addresses, *places, len(rows), len(binaries), len(names), abilities, *period)
         + b"".join(binaries)
         + b"".join(rows)
         + bytes(names)

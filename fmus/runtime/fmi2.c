@@ -7,7 +7,7 @@
 #include "platform.h"
 
 #define ASYNCHRONOUS "steps are done when fmi2DoStep returns"
-#define DERIVATIVES "derivatives of inputs and outputs are not provided"
+#define DERIVATIVES "derivatives of inputs and outputs with respect to time are not provided"
 #define MODEL_EXCHANGE "this unit is a co-simulation slave, it has no model-exchange form"
 
 /* A logger's message is a printf format in which # begins a reference to a variable: both are doubled. */
@@ -167,7 +167,15 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real dt, fmi2Boolean no_set_state_prior) {
     (void)no_set_state_prior;
     BEGIN(STEPPING);
-    return (fmi2Status)instance_step(instance, __func__, t, dt);
+    StepEnd end;
+    return (fmi2Status)instance_step(instance, __func__, t, dt, &end);
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t n_unknowns,
+                                        const fmi2ValueReference knowns[], size_t n_knowns, const fmi2Real seed[],
+                                        fmi2Real sensitivity[]) {
+    return (fmi2Status)get_derivative(c, __func__, false, unknowns, n_unknowns, knowns, n_knowns, seed, n_knowns,
+                                      sensitivity, n_unknowns);
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
@@ -201,8 +209,6 @@ UNSUPPORTED_BARE(ASYNCHRONOUS, fmi2CancelStep)
 UNSUPPORTED(ASYNCHRONOUS, fmi2GetStatus, const fmi2StatusKind k, fmi2Status *v)
 UNSUPPORTED(ASYNCHRONOUS, fmi2GetIntegerStatus, const fmi2StatusKind k, fmi2Integer *v)
 UNSUPPORTED(ASYNCHRONOUS, fmi2GetStringStatus, const fmi2StatusKind k, fmi2String *v)
-UNSUPPORTED(DERIVATIVES, fmi2GetDirectionalDerivative, const fmi2ValueReference u[], size_t nu,
-            const fmi2ValueReference k[], size_t nk, const fmi2Real seed[], fmi2Real sensitivity[])
 UNSUPPORTED(DERIVATIVES, fmi2SetRealInputDerivatives, const fmi2ValueReference vr[], size_t n,
             const fmi2Integer order[], const fmi2Real v[])
 UNSUPPORTED(DERIVATIVES, fmi2GetRealOutputDerivatives, const fmi2ValueReference vr[], size_t n,

@@ -218,7 +218,7 @@ static bool search(const char *resources, Text *tried) {
         done = use_chosen(chosen, text_of(&script), tried);
     else if (!done)
         done = use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
-               use_description(platform_run("python3", text_of(&script)), "python3 on the PATH", tried);
+               use_description(platform_run(PYTHON_ON_PATH, text_of(&script)), PYTHON_ON_PATH " on the PATH", tried);
     free(chosen);
     text_clear(&noted);
     text_clear(&script);

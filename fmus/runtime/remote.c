@@ -24,12 +24,6 @@
     "import sys; del sys.path[0]; sys.version_info < (3, 10) and sys.exit(86);" \
     "import runpy; runpy.run_path(sys.argv[1], run_name='__main__')"
 
-#ifdef _WIN32
-#define ON_THE_PATH "python" /* python.org's installer makes no python3.exe */
-#else
-#define ON_THE_PATH "python3"
-#endif
-
 #define CURE_ENDED "Cure: reset the instance or set a saved state, which starts another process"
 
 typedef struct {
@@ -250,7 +244,7 @@ static Start search(Instance *instance, const char *function, Text *tried) {
     text_add(tried, "\n  FMU_PYTHON: not set");
     char *noted = python_noted(side_of(instance)->resources);
     Start start = try(instance, function, "resources/python.txt", noted, tried);
-    if (start == NO_PYTHON) start = try(instance, function, ON_THE_PATH " on the PATH", copy_of(ON_THE_PATH), tried);
+    if (start == NO_PYTHON) start = try(instance, function, PYTHON_ON_PATH " on the PATH", copy_of(PYTHON_ON_PATH), tried);
     return start;
 }
 

@@ -27,6 +27,9 @@ bool slave_take_table(Instance *instance, const char *bytes, size_t size, uint64
     instance->n_inputs = header.inputs;
     instance->first_output = header.first_output;
     instance->n_outputs = header.outputs;
+    instance->abilities = header.abilities;
+    instance->period_counter = header.period_counter;
+    instance->period_resolution = header.period_resolution;
     return true;
 }
 
@@ -108,6 +111,15 @@ static char **kept_string(Instance *instance, size_t index) {
         instance->n_strings = index + 1;
     }
     return &instance->strings[index];
+}
+
+Status slave_derivative(Instance *instance, const char *function, const double seed[], double sensitivity[]) {
+    Question question = {.method = "derivative", .bytes = (const char *)seed, .size = instance->n_inputs * sizeof *seed};
+    Answer answer = {0};
+    Status status = status_of(instance, instance->side->ask(instance, function, &question, &answer));
+    if (status == STATUS_OK) memcpy(sensitivity, answer.bytes, instance->n_outputs * sizeof *sensitivity);
+    free(answer.bytes);
+    return status;
 }
 
 Status slave_get_string(Instance *instance, const char *function, size_t index, const char **value) {

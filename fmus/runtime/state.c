@@ -5,13 +5,14 @@
 #include "instance.h"
 
 #define MAGIC 0x48435354u /* "HCST": begins a serialised state */
-#define VERSION 1u
+#define VERSION 2u
 
 typedef struct {
     uint32_t magic, version;
     uint32_t mode;
     uint8_t has_outputs, outputs_stale, unused[2];
     double stop_time;
+    Events events;
     uint64_t size;
 } StateHeader;
 
@@ -76,6 +77,7 @@ Status state_get(Instance *instance, const char *function, void **state) {
                                   .has_outputs = instance->has_outputs,
                                   .outputs_stale = instance->outputs_stale,
                                   .stop_time = instance->stop_time,
+                                  .events = instance->events,
                                   .size = size};
     *state = saved;
     return STATUS_OK;
@@ -91,6 +93,11 @@ Status state_set(Instance *instance, const char *function, void *state) {
     instance->has_outputs = header->has_outputs;
     instance->outputs_stale = header->outputs_stale;
     instance->stop_time = header->stop_time;
+    instance->events = header->events;
+    if (instance->events.clock_active) { /* the block's state is that of before the tick */
+        instance->events.evaluated = false;
+        instance->outputs_stale = true;
+    }
     return STATUS_OK;
 }
 

@@ -61,14 +61,6 @@ def test_each_entry_of_an_output_depends_on_every_entry_of_its_inputs(every_kind
     assert now.keys() == first.keys()
 
 
-def test_the_page_tells_how_entries_are_named(every_kind: Path, fmu_folder: Path):
-    pages: list[str] = []
-    for fmu in (every_kind, build_block(BLOCK, 3, fmu_folder)):
-        with zipfile.ZipFile(fmu) as archive:
-            pages.append(archive.read("documentation/index.html").decode())
-    assert ["R[1,2]" in page for page in pages] == [True, False]
-
-
 def test_the_same_sources_give_the_same_bytes(every_kind: Path, tmp_path: Path):
     assert build_block(BLOCK, 3, tmp_path, scalar=True).read_bytes() == every_kind.read_bytes()
 
@@ -138,3 +130,11 @@ def poses(fmu: Callable[[str], Path]) -> list[bytes]:
     with Master(system) as master:
         master.run(Fraction(2, 125) * 50, [observe])
     return told
+
+
+def test_the_page_tells_how_entries_are_named(every_kind: Path, fmu_folder: Path):
+    pages: list[str] = []
+    for fmu in (every_kind, build_block(BLOCK, 3, fmu_folder)):
+        with zipfile.ZipFile(fmu) as archive:
+            pages.append(archive.read("documentation/index.html").decode())
+    assert ["R[1,2]" in page for page in pages] == [True, False]

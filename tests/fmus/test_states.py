@@ -2,17 +2,11 @@ import ctypes
 import struct
 
 import pytest
-from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from ctypes_host import ERROR, OK, CtypesHost
+from saved_states import called, deserialise, save, serialised
 from workshop import Workshop
 
 DT = 1 / 64
-
-
-def called(host: CtypesHost, name: str) -> str:
-    """Return the standard's spelling of a function's name."""
-    if host.fmi == 3:
-        return name.replace("state", "State")
-    return name.replace("Deserialize", "DeSerialize")
 
 
 def ready(workshop: Workshop, fmi: int) -> CtypesHost:
@@ -23,31 +17,12 @@ def ready(workshop: Workshop, fmi: int) -> CtypesHost:
     return host
 
 
-def save(host: CtypesHost) -> ctypes.c_void_p:
-    state = ctypes.c_void_p()
-    assert host.call(called(host, "GetFMUstate"), ctypes.byref(state)) == OK
-    return state
-
-
 def ten_steps(host: CtypesHost) -> list[list[float]]:
     seen: list[list[float]] = []
     for i in range(3, 13):
         assert host.step(i * DT, DT) == OK, host.log[-1]
         seen.append(host.get("p", 3))
     return seen
-
-
-def serialised(host: CtypesHost, state: ctypes.c_void_p) -> bytes:
-    size = ctypes.c_size_t()
-    assert host.call(called(host, "SerializedFMUstateSize"), state, ctypes.byref(size)) == OK
-    data = ctypes.create_string_buffer(size.value)
-    assert host.call(called(host, "SerializeFMUstate"), state, data, size) == OK
-    return data.raw
-
-
-def deserialise(host: CtypesHost, data: bytes) -> tuple[int, ctypes.c_void_p]:
-    state = ctypes.c_void_p()
-    return host.call(called(host, "DeserializeFMUstate"), data, SIZE(len(data)), ctypes.byref(state)), state
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
