@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import zipfile
 from fractions import Fraction
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 from fmus import interpreter
 from fmus.build import cached
 from fmus.catalog import UNITS
+from fmus.compile import TARGETS
 from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SYSTEMS
 
@@ -38,7 +40,8 @@ def program(text: str, folder: Path) -> str:
 
 def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " run " in c]) == 9
-    assert len([c for c in COMMANDS if " build " in c]) == 1
+    assert len([c for c in COMMANDS if " build " in c]) == 2
+    assert len([c for c in COMMANDS if " check " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
     assert len(PROGRAMS) == 3
 
@@ -71,7 +74,7 @@ def is_plant(unit: str) -> bool:
 
 
 def test_the_table_of_units_has_their_steps_and_standards():
-    cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `\w+`", row)]
+    cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `[A-Z][a-z]\w+`", row)]
     told = {unit: (step.strip(), fmi.strip()) for units, step, fmi in cells for unit in re.findall(r"`(\w+)`", units)}
     assert set(told) == set(UNITS)
     for name, entry in UNITS.items():
@@ -91,8 +94,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("repository")
     for name, target in ((".venv", Path(sys.prefix)), ("docs", ROOT / "docs"), ("fmus", ROOT / "fmus")):
         (made / name).symlink_to(target)
-    (build,) = (c for c in COMMANDS if " build " in c)
-    done = handover(build, made)
+    done = handover(command_with(" build TendonArm "), made)
     assert done.returncode == 0, done.stderr
     return made
 
@@ -129,6 +131,25 @@ def test_a_unit_runs_in_ecos(folder: Path):
     assert (folder / "units" / "TendonArm.fmi3-scalar.fmu").is_file()
 
 
+def test_the_unit_passes_its_check(folder: Path):
+    done = handover(command_with(" check "), folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_a_unit_is_built_for_all_platforms(folder: Path):
+    done = handover(command_with(" --platform all "), folder)
+    assert done.returncode == 0, done.stderr
+    with zipfile.ZipFile(folder / "units" / "Push.fmi3.fmu") as archive:
+        libraries = [name for name in archive.namelist() if name.startswith("binaries/")]
+    assert len(libraries) == len(TARGETS)
+
+
+def command_with(part: str) -> str:
+    (command,) = (c for c in COMMANDS if part in c)
+    return command
+
+
 def block_with(part: str) -> str:
     (block,) = (text for kind, text in BLOCKS if not kind and part in text)
     return block
@@ -150,7 +171,7 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in COMMANDS if " run " in c])
 def test_the_runs_succeed(command: str, tmp_path: Path):
-    needed = [" build ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
+    needed = [" build TendonArm ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
     for before in (c for c in COMMANDS if any(word in c for word in needed)):
         assert handover(before, tmp_path).returncode == 0
     done = handover(command, tmp_path)
