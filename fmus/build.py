@@ -6,7 +6,7 @@ import importlib.util
 import json
 import os
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
@@ -82,7 +82,9 @@ def build_block(
     return build(Entry(name or block.rpartition(":")[2], block, step, summary), fmi, out_dir, scalar=scalar)
 
 
-def build(entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False) -> Path:
+def build(
+    entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False, platforms: Sequence[str] | None = None
+) -> Path:
     """Build a unit's FMU. The same sources, packages and interpreter give the same bytes.
 
     Args:
@@ -91,12 +93,15 @@ def build(entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False) -> Pat
         out_dir: folder of the FMU.
         scalar: make every entry of an array a variable of its own in FMI 3, for hosts that know no arrays; FMI 2 has
             no arrays, there this changes nothing.
+        platforms: those to have the runtime for, such as `x86_64-windows`, or `host`, or `all`; without it all that
+            it is compiled for.
 
     Raises:
         UnknownBlock: the entry's block does not exist.
         UnknownVersion, UnusableName: the standard's version or the name is not one that can be.
         DeclarationError, DuplicateName, AmbiguousName, UnusableText: the block's declarations are not in order.
         NoFmi2Form: FMI 2 and the block has binary ports, or integers that start beyond 32 bits.
+        UnknownPlatform: the runtime is not made for a platform.
         NotCompiled: there is no runtime and no compiler.
     """
     form = _form(fmi, scalar=scalar)
@@ -122,7 +127,7 @@ def build(entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False) -> Pat
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
         "resources/python.txt": os.fsencode(interpreter.describe()),
         **{f"resources/sources/{path}": content for path, content in sources.items()},
-        **binaries(entry.name, fmi),
+        **binaries(entry.name, fmi, platforms),
     }
     return write_archive(out_dir / file_name(entry.name, form), files)
 

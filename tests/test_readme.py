@@ -1,7 +1,9 @@
 """The README's commands and programs do what it says."""
 
+import importlib.util
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from fractions import Fraction
@@ -9,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from fmus import interpreter
 from fmus.build import cached
 from fmus.catalog import UNITS
 from fmus.fmi2_description import NoFmi2Form
@@ -82,13 +85,60 @@ def test_the_table_of_units_has_their_steps_and_standards():
             assert fmi == "3"
 
 
-def test_a_unit_runs_in_fmpy(tmp_path: Path):
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a tree that looks like the repository's, in which the units have been built."""
+    made = tmp_path_factory.mktemp("repository")
+    for name, target in ((".venv", Path(sys.prefix)), ("docs", ROOT / "docs"), ("fmus", ROOT / "fmus")):
+        (made / name).symlink_to(target)
     (build,) = (c for c in COMMANDS if " build " in c)
-    done = handover(build, tmp_path)
+    done = handover(build, made)
     assert done.returncode == 0, done.stderr
-    printed = program(PROGRAMS[0], tmp_path)
+    return made
+
+
+def test_a_unit_runs_in_fmpy(folder: Path):
+    printed = program(PROGRAMS[0], folder)
     x, y, z = (float(n) for n in printed.strip().strip("[]").split())
     assert (x, y, z) == pytest.approx((0.0, 0.0, -0.7), abs=1e-6)
+
+
+@pytest.mark.skipif(sys.platform != "linux" or not interpreter.library(), reason="the program looks for linux64")
+def test_a_unit_runs_in_a_c_program(folder: Path):
+    script = block_with("./c_host")
+    if shutil.which("cc") is None:
+        assert ".venv/bin/python -m ziglang cc" in README
+        script = script.replace("\ncc ", "\n.venv/bin/python -m ziglang cc ")
+    printed = shell(script, folder)
+    assert f"prints `{printed.strip()}`" in README
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ecospy") is None, reason="ecospy has wheels for few platforms")
+@pytest.mark.skipif(shutil.which("unzip") is None, reason="Ecos calls unzip")
+@pytest.mark.skipif(not interpreter.library(), reason="this Python has no shared library that Ecos can load")
+def test_a_unit_runs_in_ecos(folder: Path):
+    install, *commands = block_with("./ecos ").splitlines(keepends=True)
+    assert install == ".venv/bin/python -m pip install ecospy tbb\n"  # the tests' environment has them
+    shell("".join(commands), folder)
+    header, *rows = (folder / "TendonArm.fmi2.csv").read_text().splitlines()
+    column = header.split(", ").index("instance::p_WG[3][REAL]")
+    assert len(rows) >= 50
+    assert {row.split(", ")[column] for row in rows} == {"-0.700000"}
+    (scalar,) = re.findall(r"`(handover build [^`]*--scalar[^`]*)`", README)
+    assert handover(scalar, folder).returncode == 0
+    assert (folder / "units" / "TendonArm.fmi3-scalar.fmu").is_file()
+
+
+def block_with(part: str) -> str:
+    (block,) = (text for kind, text in BLOCKS if not kind and part in text)
+    return block
+
+
+def shell(script: str, folder: Path) -> str:
+    call = ["sh", "-e", "-c", script]
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 def test_a_block_of_ones_own_is_built(tmp_path: Path):

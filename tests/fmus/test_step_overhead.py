@@ -23,7 +23,9 @@ def test_plain_object(benchmark: Any):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_fmu(benchmark: Any, workshop: Workshop, fmi: int):
+@pytest.mark.parametrize("apart", ["0", "1"], ids=["in the host's process", "in a process of its own"])
+def test_fmu(benchmark: Any, workshop: Workshop, monkeypatch: pytest.MonkeyPatch, fmi: int, apart: str):
+    monkeypatch.setenv("FMU_PYTHON_PROCESS", apart)
     host = workshop.host("scalars:Scalars", fmi)
     host.initialise()
     step = getattr(host.library, f"fmi{fmi}DoStep")
