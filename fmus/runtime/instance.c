@@ -92,11 +92,12 @@ Status instance_step(Instance *instance, const char *function, double t, double 
         return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
                       instance->stop_time);
     if (!inputs_finite(instance, function)) return STATUS_ERROR;
-    double before = instance->floats[0];
+    double before = instance->floats[0], dt_before = instance->floats[1];
     instance->floats[0] = t;
     instance->floats[1] = dt;
     if (slave_step(instance, function) != STATUS_OK) {
         instance->floats[0] = before;
+        instance->floats[1] = dt_before;
         return STATUS_ERROR;
     }
     instance->floats[0] = t + dt;
