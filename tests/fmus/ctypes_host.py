@@ -37,10 +37,10 @@ class CtypesHost:
         references: value references by variable's name; of an array in FMI 2 that of its first entry.
     """
 
-    def __init__(self, fmu: Path, fmi: int) -> None:
+    def __init__(self, fmu: Path, fmi: int, prefix: str = "a 100% größerer Ordner ") -> None:
         self.fmi = fmi
         self.log: list[str] = []
-        self.folder = Path(tempfile.mkdtemp(prefix="a 100% größerer Ordner "))
+        self.folder = Path(tempfile.mkdtemp(prefix=prefix))
         with zipfile.ZipFile(fmu) as archive:
             archive.extractall(self.folder)
         root = ET.parse(self.folder / "modelDescription.xml").getroot()
@@ -55,7 +55,7 @@ class CtypesHost:
         self.instance: int | None = None
         self._log2 = Log2(lambda *arguments: self.log.append(arguments[-1].decode()))
         self._log3 = Log3(lambda *arguments: self.log.append(arguments[-1].decode()))
-        self._callbacks = Callbacks(logger=self._log2)
+        self.callbacks = Callbacks(logger=self._log2)
 
     def instantiate(self, token: str | None = None, *, event_mode: bool = False) -> bool:
         """Make the instance; tell whether it was made."""
@@ -68,7 +68,7 @@ class CtypesHost:
                 1,
                 given,
                 resources.as_uri().encode(),
-                ctypes.byref(self._callbacks),
+                ctypes.byref(self.callbacks),
                 0,
                 0,
             )
