@@ -1,12 +1,17 @@
-"""Compiles the FMI runtime while the package is built; all else about the package is in pyproject.toml."""
+"""Compiles the FMI runtime while the package is built; all else about the package is in pyproject.toml.
+
+The wheel has it for this machine, or for the platforms that the environment variable HANDOVER_FMI_PLATFORMS names.
+"""
 
 import importlib.util
+import shutil
 from pathlib import Path
 from types import ModuleType
 
 from setuptools import Distribution, setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
+from setuptools.errors import CompileError, OptionError
 
 
 def _compiler() -> ModuleType:
@@ -20,13 +25,33 @@ def _compiler() -> ModuleType:
     return module
 
 
+def _wanted_platforms() -> tuple[str, ...]:
+    compiler = _compiler()
+    try:
+        wanted: tuple[str, ...] = compiler.wanted_platforms()
+    except compiler.UnknownPlatform as e:
+        raise OptionError(f"HANDOVER_FMI_PLATFORMS: {e}") from e
+    return wanted
+
+
 class BuildWithRuntime(build_py):
     """Compiles the runtime into the source tree, from where it is packed as data, or used in an editable install."""
 
     def run(self) -> None:
         """Compile, then build."""
-        _compiler().compile_runtime()
+        compiler = _compiler()
+        try:
+            compiler.compile_runtime(_wanted_platforms())
+        except compiler.CompilationError as e:
+            raise CompileError(str(e)) from e
+        shutil.rmtree(Path(self.build_lib, "fmus", "runtime", "bin"), ignore_errors=True)  # of a build before
         super().run()
+
+    def find_data_files(self, package: str, src_dir: str) -> list[str]:
+        """Leave out what a checkout has been compiled for besides."""
+        wanted = _wanted_platforms()
+        files = [Path(file) for file in super().find_data_files(package, src_dir)]
+        return [str(file) for file in files if file.parent.parent.name != "bin" or file.parent.name in wanted]
 
 
 class PlatformWheel(bdist_wheel):

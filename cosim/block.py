@@ -18,10 +18,14 @@ import numpy as np
 
 from cosim.ports import Declaration, Raster, Shape
 from cosim.units import ONE, Unit
+from cosim.width import Width
 
 
 class Block(Protocol):
     """A plant or a controller with declared ports, advanced in steps.
+
+    What a block may offer besides: `cosim.eventful_block.EventfulBlock`,
+    `cosim.differentiable_block.DifferentiableBlock`.
 
     Class attributes: `feedthrough` names, by output, the inputs that act on it at once (within the same communication
     point); `period` is the sampling period of a block that is sampled, in seconds, else None.
@@ -36,7 +40,10 @@ class Block(Protocol):
         ...
 
     def step(self, t: float, dt: float, u: Any) -> Any:
-        """Advance from t by dt with u held and return the outputs at t + dt."""
+        """Advance from t by dt with u held and return the outputs at t + dt.
+
+        A sampled block is stepped by its period only, once at each tick; its outputs hold until the next one.
+        """
         ...
 
     def get_state(self) -> bytes:
@@ -46,6 +53,9 @@ class Block(Protocol):
     def set_state(self, state: bytes) -> None:
         """Go back to a state that `get_state` gave."""
         ...
+
+
+_EVENT_METHODS = ("advance", "handle_event", "next_event")
 
 
 class Kind(enum.Enum):
@@ -77,7 +87,10 @@ class DeclarationError(TypeError):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Declared:
-    """What is known of a parameter, input or output, be it a block's or an FMU's. `items` are an enumeration's."""
+    """What is known of a parameter, input or output, be it a block's or an FMU's.
+
+    `items` are an enumeration's; reals and integers have a `width`.
+    """
 
     name: str
     kind: Kind
@@ -88,11 +101,18 @@ class Declared:
     minimum: float | None = None
     maximum: float | None = None
     items: tuple[tuple[str, int], ...] = ()
+    width: Width | None = None
 
     @property
     def size(self) -> int:
         """Number of entries; 1 for a scalar."""
         return math.prod(self.shape)
+
+    @property
+    def type_name(self) -> str:
+        """Kind, with the width of numbers where it is not the usual one, as in `integer (Int16)`."""
+        usual = self.width in (None, Width.FLOAT64, Width.INT64)
+        return self.kind.value if usual or self.width is None else f"{self.kind.value} ({self.width.value})"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -118,6 +138,8 @@ class Description:
     outputs: tuple[Variable, ...]
     feedthrough: Mapping[str, tuple[str, ...]]
     period: Fraction | None
+    has_events: bool
+    has_derivatives: bool
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -131,11 +153,14 @@ def describe(block: type[Any]) -> Description:
 
     Raises:
         DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
-            declaration, or a type that is no port's.
+            declaration, or a type that is no port's, or a start value or bound that its type cannot hold; the
+            period is not positive.
     """
     for name in ("feedthrough", "period", "step"):
         if not hasattr(block, name):
             raise DeclarationError(block.__name__, name, "a block has this attribute; see cosim.block.Block")
+    if block.period is not None and block.period <= 0:
+        raise DeclarationError(block.__name__, "period", f"{block.period} s is not positive")
     params_type = _annotation(block, "__init__", "params")
     inputs_type = _annotation(block, "step", "u")
     outputs_type = _annotation(block, "step", "return")
@@ -157,7 +182,20 @@ def describe(block: type[Any]) -> Description:
         outputs=outputs,
         feedthrough=feedthrough,
         period=block.period,
+        has_events=_has_events(block),
+        has_derivatives=hasattr(block, "directional_derivative"),
     )
+
+
+def _has_events(block: type[Any]) -> bool:
+    present = [name for name in _EVENT_METHODS if hasattr(block, name)]
+    for name in _EVENT_METHODS:
+        if present and name not in present:
+            fault = f"a block that has {present[0]} has this method too; see cosim.eventful_block.EventfulBlock"
+            raise DeclarationError(block.__name__, name, fault)
+    if present and block.period is not None:
+        raise DeclarationError(block.__name__, "period", "a block with events is not sampled: its period is None")
+    return bool(present)
 
 
 def _annotation(block: type[Any], method: str, name: str) -> type[Any]:
@@ -184,6 +222,8 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
     declaration = field.metadata.get("declaration")
     if not isinstance(declaration, Declaration):
         raise DeclarationError(owner, field.name, "declare it with parameter(...), port(...) or output(...)")
+    if not field.name.isascii():
+        raise DeclarationError(owner, field.name, "a name has ASCII letters, digits and underscores; so FMI wants it")
     kind, facts = _facts(owner, field.name, hint)
     made = Variable(
         name=field.name,
@@ -195,24 +235,55 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
         maximum=declaration.maximum,
         **facts,
     )
-    return dataclasses.replace(made, start=_start(made))
+    made = _with_width(owner, made)
+    made = dataclasses.replace(made, start=_start(made))
+    _check_range(owner, made)
+    return made
+
+
+def _check_range(owner: str, v: Variable) -> None:
+    """A start value lies within the bounds: hosts take both from a unit as they are."""
+    if v.kind not in (Kind.REAL, Kind.INTEGER, Kind.ENUMERATION) or v.causality is Causality.OUTPUT:
+        return
+    low = -math.inf if v.minimum is None else v.minimum
+    high = math.inf if v.maximum is None else v.maximum
+    outside = [x for x in np.ravel(v.start).tolist() if not low <= x <= high]
+    if outside:
+        raise DeclarationError(owner, v.name, f"start {outside[0]!r} is not between {low:g} and {high:g}, its bounds")
+
+
+def _with_width(owner: str, made: Variable) -> Variable:
+    """Return a declaration with its width, its start and bounds rounded to it as a host will see them."""
+    width = made.width or {Kind.REAL: Width.FLOAT64, Kind.INTEGER: Width.INT64}.get(made.kind)
+    if width is None:
+        return made
+    if made.kind is not (Kind.REAL if width.is_real else Kind.INTEGER):
+        raise DeclarationError(owner, made.name, f"{width.value} is not the type of {made.kind.value} values")
+    if width is Width.FLOAT64:
+        return dataclasses.replace(made, width=width)
+    rounded: dict[str, Any] = {}
+    for what, value in (("minimum", made.minimum), ("maximum", made.maximum), ("start", made.start)):
+        if value is None:
+            continue
+        for entry in np.ravel(value).tolist():
+            if not width.holds(entry):
+                raise DeclarationError(owner, made.name, f"{what} {entry!r} does not fit {width.told}")
+        rounded[what] = np.float32(value).astype(float) if np.ndim(value) else width.rounded(value)
+    return dataclasses.replace(made, width=width, **rounded)
 
 
 def _facts(owner: str, name: str, hint: Any) -> tuple[Kind, dict[str, Any]]:
     alias = typing.get_origin(hint)
     if hasattr(alias, "__value__"):  # Vector3[Metre]: the alias carries the shape, its argument the unit
-        _, facts = _facts(owner, name, alias.__value__)
+        notes = _notes(alias.__value__)
         (entry,) = typing.get_args(hint)
-        _, unit = _facts(owner, name, entry)
-        return Kind.REAL, facts | unit
-    facts: dict[str, Any] = {}
-    for note in getattr(hint, "__metadata__", ()):
-        if isinstance(note, Unit):
-            facts["unit"] = note
-        elif isinstance(note, Shape):
-            facts["shape"] = note.extents
-        elif isinstance(note, Raster):
-            return Kind.BINARY, {"raster": note}
+        kind, facts = _facts(owner, name, entry)
+        if "shape" in notes and kind is not Kind.REAL:
+            raise DeclarationError(owner, name, f"an array of {kind.value} entries; arrays have real entries")
+        return kind, facts | notes
+    facts = _notes(hint)
+    if "raster" in facts:
+        return Kind.BINARY, facts
     plain = typing.get_args(hint)[0] if hasattr(hint, "__metadata__") else hint
     if isinstance(plain, type) and issubclass(plain, enum.IntEnum):
         return Kind.ENUMERATION, {"enumeration": plain, "items": tuple((e.name, int(e)) for e in plain)}
@@ -222,6 +293,21 @@ def _facts(owner: str, name: str, hint: Any) -> tuple[Kind, dict[str, Any]]:
     if plain not in kinds:
         raise DeclarationError(owner, name, f"{plain!r} is not the type of a port")
     return kinds[plain], facts
+
+
+def _notes(hint: Any) -> dict[str, Any]:
+    """Return what a type is annotated with."""
+    facts: dict[str, Any] = {}
+    for note in getattr(hint, "__metadata__", ()):
+        if isinstance(note, Unit):
+            facts["unit"] = note
+        elif isinstance(note, Shape):
+            facts["shape"] = note.extents
+        elif isinstance(note, Raster):
+            facts["raster"] = note
+        elif isinstance(note, Width):
+            facts["width"] = note
+    return facts
 
 
 def _start(v: Variable) -> Any:

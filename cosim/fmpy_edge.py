@@ -2,22 +2,25 @@
 
 import ctypes
 import os
-import zipfile
-import zlib
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, cast
-from xml.etree import ElementTree
 
 import fmpy
 import fmpy.fmi2
 import fmpy.fmi3
+from fmpy.model_description import ValidationError
+from fmpy.validation import validate_model_description
 
 from cosim.exceptions import InvalidFmu
+from cosim.fmu_archive import DESCRIPTION, FmuArchive
+from cosim.fmu_xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
 Logger = Callable[[int, str], None]
 """Takes an FMI status and a message."""
+
+_BUILD_DESCRIPTION = "sources/buildDescription.xml"
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
@@ -58,30 +61,94 @@ def read_description(path: Path) -> ModelDescription:
     Raises:
         InvalidFmu: with what is wrong with the file.
     """
-    if not path.is_file():
-        raise InvalidFmu(path, "there is no such file" if not path.exists() else "not a file but a folder")
-    if not zipfile.is_zipfile(path):
-        raise InvalidFmu(path, "not an FMU: an FMU is a zip archive, and this file is not one")
+    archive = FmuArchive(path)
+    version_of(path, checked_xml(archive))
     try:
         md: Any = fmpy.read_model_description(str(path))
-    except KeyError as e:
-        raise InvalidFmu(path, f"not an FMU: {str(e.args[0]).lower()}") from e
     except (
         Exception
     ) as e:  # FMPy raises plain Exception for what it does not know, lxml its own for what it cannot parse
         raise InvalidFmu(path, f"its modelDescription.xml is not valid: {_one_line(e)}") from e
-    if md.fmiVersion == "1.0":
-        raise InvalidFmu(path, "an FMU of FMI 1.0; versions 2.0 and 3.0 can be used")
     if md.coSimulation is None:
         raise InvalidFmu(path, "it has no co-simulation interface")
     return cast(ModelDescription, md)
 
 
+def checked_xml(archive: FmuArchive) -> XmlElement:
+    """Return the root of an FMU's model description, after looking at every XML file that FMPy's reader opens.
+
+    Raises:
+        InvalidFmu: a file is malformed or not to be read.
+    """
+    try:
+        root = parse_xml(archive.description())
+    except UnsafeXml as e:
+        raise InvalidFmu(archive.path, f"its {DESCRIPTION} cannot be read: {e}") from e
+    if _BUILD_DESCRIPTION in archive.names:
+        try:
+            check_xml(archive.read(_BUILD_DESCRIPTION))
+        except UnsafeXml as e:
+            raise InvalidFmu(archive.path, f"its {_BUILD_DESCRIPTION} cannot be read: {e}") from e
+    return root
+
+
+def version_of(path: Path, root: XmlElement) -> int:
+    """Return the major version of a model description's standard, 2 or 3.
+
+    Raises:
+        InvalidFmu: it is of another version, or not a model description.
+    """
+    if root.tag != "fmiModelDescription":
+        raise InvalidFmu(path, f"its {DESCRIPTION} begins with <{root.tag[:80]}>; <fmiModelDescription> is right")
+    version = root.get("fmiVersion")
+    if not version:
+        raise InvalidFmu(path, f"its {DESCRIPTION} does not say its fmiVersion; 2.0 or 3.0 is right")
+    if version != "2.0" and not version.startswith("3."):
+        raise InvalidFmu(path, f"an FMU of FMI {version[:80]}; versions 2.0 and 3.0 can be used")
+    return int(version[0])
+
+
+def problems_of(path: Path) -> tuple[list[str], str]:
+    """Return what FMPy's validation has to say of an FMU that passed `checked_xml`, and why it stopped, if it did.
+
+    Where the schema is not kept, the rules beyond it are tried nonetheless, as far as the reader gets.
+    """
+    try:
+        fmpy.read_model_description(str(path), validate_variable_names=True, validate_model_structure=True)
+    except ValidationError as e:
+        problems = [str(p) for p in cast(list[Any], e.problems)]
+    except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... where it does not understand a description
+        return [], f"{type(e).__name__}: {_one_line(e)}"
+    else:
+        return [], ""
+    try:
+        md: Any = fmpy.read_model_description(str(path), validate=False)
+        problems += validate_model_description(md, validate_variable_names=True, validate_model_structure=True)
+    except Exception as e:
+        return problems, f"{type(e).__name__}: {_one_line(e)}"
+    return problems, ""
+
+
+def required_functions(fmi: int) -> list[str]:
+    """Return the functions that FMPy loads of a co-simulation FMU: it refuses a library that lacks any of them."""
+    slave = fmpy.fmi2.FMU2Slave if fmi == 2 else fmpy.fmi3.FMU3Slave
+    return sorted(name for name in dir(slave) if name.startswith(f"fmi{fmi}"))
+
+
 def mime_types(path: Path) -> dict[str, str]:
     """Return the MIME types of an FMI 3 FMU's binary variables by name; FMPy does not read them."""
-    with zipfile.ZipFile(path) as z:
-        root = ElementTree.fromstring(z.read("modelDescription.xml"))
-    return {e.get("name", ""): e.get("mimeType", "application/octet-stream") for e in root.iter("Binary")}
+    variables = checked_xml(FmuArchive(path)).named("ModelVariables", "Binary")
+    return {e.get("name"): e.get("mimeType", "application/octet-stream") for e in variables}
+
+
+def platform_folder(fmi: int) -> str:
+    """Return the folder of `binaries/` that holds this machine's library, by the standard's name."""
+    return cast(str, fmpy.platform if fmi == 2 else fmpy.platform_tuple)
+
+
+def library_path(fmi: int, identifier: str) -> str:
+    """Return where in an FMU this machine's library lies."""
+    return f"binaries/{platform_folder(fmi)}/{identifier}{fmpy.sharedLibraryExtension}"
 
 
 def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
@@ -90,23 +157,14 @@ def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
     Raises:
         InvalidFmu: damaged archive, a path that leads out of the folder, or no binary for this platform.
     """
-    here = cast(str, fmpy.platform if fmi == 2 else fmpy.platform_tuple)
-    binary = f"binaries/{here}/{identifier}{fmpy.sharedLibraryExtension}"
-    try:
-        with zipfile.ZipFile(path) as z:
-            names = z.namelist()
-            outside = [n for n in names if ".." in Path(n).parts or Path(n).is_absolute() or "\\" in n or ":" in n]
-            if outside:
-                raise InvalidFmu(path, f"the archive holds a path that leads out of it: {outside[0]}")
-            if binary not in names:
-                has = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") > 1})
-                raise InvalidFmu(
-                    path,
-                    f"no binary for this machine ({here}); it has {', '.join(has) or 'none'}",
-                )
-            z.extractall(folder)
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, OSError, EOFError) as e:
-        raise InvalidFmu(path, f"the archive is damaged: {_one_line(e)}") from e
+    archive = FmuArchive(path)
+    if library_path(fmi, identifier) not in archive.names:
+        inside = [n.split("/") for n in archive.names if n.startswith("binaries/")]
+        has = sorted({parts[1] for parts in inside if len(parts) > 2})
+        raise InvalidFmu(
+            path, f"no binary for this machine ({platform_folder(fmi)}); it has {', '.join(has) or 'none'}"
+        )
+    archive.unpack(folder)
 
 
 def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger) -> Any:

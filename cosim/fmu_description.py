@@ -1,7 +1,8 @@
 """What an FMU says of itself, in this engine's words: its ports with kind, shape and unit, whatever the FMI version.
 
-FMI 2 knows no arrays: variables named `p[1]`, `p[2]`, ... (or `R[1,1]`, ...) that agree in type, causality and unit are
-taken together as one array port `p`, so that units of both standards can stand in for each other.
+FMI 2 knows no arrays, and in FMI 3 some tools do without: scalar variables named `p[1]`, `p[2]`, ... (or `R[1,1]`, ...)
+that agree in type, causality and unit are taken together as one array port `p`, so that units of both standards and
+forms can stand in for each other.
 """
 
 import itertools
@@ -15,6 +16,7 @@ from typing import Any
 from cosim.block import Causality, Declared, Kind
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
 from cosim.units import UNKNOWN, BaseExponents, Unit
+from cosim.width import Width
 
 _KINDS = {
     "Real": Kind.REAL,
@@ -27,6 +29,7 @@ _KINDS = {
     "String": Kind.STRING,
     "Binary": Kind.BINARY,
 }
+_WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
 _ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 
 
@@ -37,7 +40,7 @@ def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 @dataclass(frozen=True, kw_only=True)
 class FmuPort(Declared):
-    """A parameter, input or output of an FMU. `references` has one value reference a scalar (FMI 2) or one in all."""
+    """A parameter, input or output of an FMU. `references` has one value reference in all, or one for each entry."""
 
     fmi_type: str
     references: tuple[int, ...]
@@ -88,7 +91,7 @@ def describe_fmu(path: Path) -> FmuDescription:
     mimes = {} if is_fmi2 else mime_types(path)
     ports = [_port(v, units, mimes) for v in md.modelVariables if v.causality in ("parameter", "input", "output")]
     ports = [p for p in ports if p is not None]
-    grouped = _group_elements(ports) if is_fmi2 else ports
+    grouped = _group_elements(ports)
     owner = {r: p.name for p in grouped for r in p.references}
     by_causality: dict[Causality, dict[str, FmuPort]] = {c: {} for c in Causality}
     for p in grouped:
@@ -142,6 +145,7 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         maximum=float(high) if high is not None else None,
         items=tuple((i.name, int(i.value)) for i in items),
         mime=mimes.get(v.name),
+        width=_WIDTHS.get(v.type),
         description=v.description or "",
     )
 
@@ -149,7 +153,7 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
 def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
     groups: dict[str, list[tuple[tuple[int, ...], FmuPort]]] = defaultdict(list)
     for p in ports:
-        match = _ELEMENT.match(p.name)
+        match = None if p.shape or p.kind is Kind.BINARY else _ELEMENT.match(p.name)
         indices = tuple(int(i) for i in match["indices"].split(",")) if match else ()
         groups[match["base"] if match else p.name].append((indices, p))
     grouped: list[FmuPort] = []

@@ -168,4 +168,5 @@ class Instance:
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
-            self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {message}")
+            told = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
+            self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {told}")

@@ -13,6 +13,7 @@ from typing import Any
 from cosim.exceptions import CosimError, UnitFailure, UnitRefused
 from cosim.fmpy_edge import unpack
 from cosim.instance import Instance
+from cosim.narrowing import Narrowing, narrows
 from cosim.schedule import Algorithm, Schedule, Slot
 from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
@@ -47,6 +48,7 @@ class Master:
         self._due: dict[str, int] = dict.fromkeys(system.units, 0)
         self._instances: dict[str, Instance] = {}
         self._copies: dict[str, Sequence[Copy]] = {}
+        self._narrowings: dict[str, list[Narrowing]] = {}
         self._cleanup = contextlib.ExitStack()
 
     def __enter__(self) -> "Master":
@@ -123,6 +125,8 @@ class Master:
 
     def _feed(self, unit: str, known: Collection[str] | None = None) -> None:
         """Set a unit's inputs from its sources, or only from those whose outputs are known already."""
+        for narrowing in self._narrowings[unit]:
+            narrowing.check(self.time)
         for target, source in self._copies[unit]:
             target[...] = source
         if known is None:
@@ -155,8 +159,13 @@ class Master:
             self._instances[name] = instance
         for name, instance in self._instances.items():
             copies: list[Copy] = []
+            self._narrowings[name] = []
             for port, source in self.system.sources_of(name).items():
-                copies += zip(instance.u[port], self._instances[source.unit].y[source.port], strict=True)
+                other, target = self._instances[source.unit], instance.description.inputs[port]
+                copies += zip(instance.u[port], other.y[source.port], strict=True)
+                if target.width and narrows(other.description.outputs[source.port], target):
+                    values = other.y[source.port][0]
+                    self._narrowings[name].append(Narrowing(str(source), name, port, target.width, values))
             self._copies[name] = joined(copies)
 
     def _initialize(self) -> None:

@@ -3,6 +3,10 @@
 A scalar port is a float with a unit (`cosim.units`), an int, a bool, a str or an `enum.IntEnum`. An array is one of the
 shapes below with the unit of its entries, as in `Vector3[Metre]`; `Polyline25[Metre]` holds 25 points in space. A
 camera picture is `Picture1280x720`.
+
+Outside, reals have 64 bits and integers too. A block that wants others says so by type: `Single[Metre]` and
+`Single[Vector3[Metre]]` are reals of 32 bits, `Int8` ... `UInt64` integers. For the block they are float, array and int
+all the same.
 """
 
 from dataclasses import dataclass, field
@@ -11,6 +15,8 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
+
+from cosim.width import Width
 
 U = TypeVar("U")
 T = TypeVar("T")
@@ -55,6 +61,16 @@ Vector12 = TypeAliasType("Vector12", Annotated[Floats, Shape((12,))], type_param
 Vector14 = TypeAliasType("Vector14", Annotated[Floats, Shape((14,))], type_params=(U,))
 Matrix3 = TypeAliasType("Matrix3", Annotated[Floats, Shape((3, 3))], type_params=(U,))
 Polyline25 = TypeAliasType("Polyline25", Annotated[Floats, Shape((25, 3))], type_params=(U,))
+
+Single = TypeAliasType("Single", Annotated[U, Width.FLOAT32], type_params=(U,))
+
+Int8 = Annotated[int, Width.INT8]
+UInt8 = Annotated[int, Width.UINT8]
+Int16 = Annotated[int, Width.INT16]
+UInt16 = Annotated[int, Width.UINT16]
+Int32 = Annotated[int, Width.INT32]
+UInt32 = Annotated[int, Width.UINT32]
+UInt64 = Annotated[int, Width.UINT64]
 
 Picture1280x720 = Annotated[NDArray[np.uint8], Raster(1280, 720)]
 """Array of shape (720, 1280, 3)."""

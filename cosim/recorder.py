@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cosim.block import Kind
 from cosim.signals import Column, Signals
+from cosim.width import Width
 
 _ROWS = 256
 _TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}
@@ -81,7 +82,7 @@ class Recorder:
         arrays: list[pa.Array[Any]] = [pa.array(self._time[:n])]
         for column, block in zip(self._columns, self._block, strict=True):
             values = block[:n].astype(bool) if column.port.kind is Kind.BOOLEAN else block[:n]
-            arrays.append(pa.array(values).cast(_TYPES[column.port.kind]))
+            arrays.append(pa.array(values).cast(_type_of(column)))
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
 
     def _complete(self) -> None:
@@ -111,8 +112,12 @@ def _rows_of(columns: list[Column]) -> tuple[list[tuple[NDArray[Any], NDArray[An
     return list(rows.values()), block
 
 
+def _type_of(c: Column) -> "pa.DataType":
+    return pa.uint64() if c.port.width is Width.UINT64 else _TYPES[c.port.kind]
+
+
 def _field(c: Column) -> "pa.Field[Any]":
     metadata = {"unit": c.port.unit.symbol, "description": c.port.description}
     if c.port.items:
         metadata["items"] = ", ".join(f"{v} {n}" for n, v in c.port.items)
-    return pa.field(c.name, _TYPES[c.port.kind], metadata=metadata)
+    return pa.field(c.name, _type_of(c), metadata=metadata)

@@ -29,7 +29,7 @@ def fault_of(port: Declared, value: Any) -> str | None:
         return f"{_told(value)} is not {_wanted(port)}"
     if port.kind is Kind.ENUMERATION and int(numbers[0]) not in [v for _, v in port.items]:
         return f"{_told(value)} is none of {', '.join(f'{v} ({n.lower()})' for n, v in port.items)}"
-    return _range_fault(port, value, numbers)
+    return _range_fault(port, value, numbers) or _width_fault(port, value, numbers)
 
 
 def parameter_faults(params: Any) -> list[str]:
@@ -80,6 +80,12 @@ def _range_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | Non
     if (low is None or np.all(numbers >= low)) and (high is None or np.all(numbers <= high)):
         return None
     return f"{_told(value)} is out of range: {range_of(port)}"
+
+
+def _width_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | None:
+    if port.width is None or all(port.width.holds(number) for number in numbers.tolist()):
+        return None
+    return f"{_told(value)} does not fit {port.width.told}"
 
 
 def _told(value: Any) -> str:

@@ -27,6 +27,7 @@ class Buffers:
 
     Attributes:
         floats: the time, the step size, then the real variables.
+        integers: int64 whatever the width; a UInt64 variable's 64 bits are read as int64.
         strings: UTF-8, as the host sees them.
         binaries: a buffer of fixed capacity for each of `binary_variables`, of which `sizes` are in use.
     """
@@ -52,7 +53,7 @@ class Buffers:
         if slot.buffer is Buffer.FLOAT64:
             self.floats[slot.entries] = np.ravel(start)
         elif slot.buffer is Buffer.INT64:
-            self.integers[slot.offset] = int(start)
+            self.integers[slot.offset] = to_signed(int(start))
         elif slot.buffer is Buffer.BOOLEAN:
             self.booleans[slot.offset] = start
         elif slot.buffer is Buffer.STRING:
@@ -105,6 +106,16 @@ class Buffers:
             self.binaries[i][: len(part)] = np.frombuffer(part, dtype=np.uint8)
             self.sizes[i] = len(part)
         self.strings[:] = strings
+
+
+def to_signed(number: int) -> int:
+    """Return the int64 of the same 64 bits as a uint64 that has no place in one; others as they are."""
+    return number - 2**64 if number >= 2**63 else number
+
+
+def to_unsigned(number: int) -> int:
+    """Return the uint64 that `to_signed` was given."""
+    return number + 2**64 if number < 0 else number
 
 
 def _fits(variable: Variable, part: bytes) -> bool:

@@ -6,7 +6,7 @@ import importlib.util
 import json
 import os
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
@@ -21,7 +21,7 @@ from fmus.compile import cache_folder
 from fmus.documentation import page
 from fmus.fmi2_description import fmi2_description
 from fmus.fmi3_description import fmi3_description
-from fmus.layout import Layout
+from fmus.layout import Form, Layout
 from fmus.model_description import Model
 from fmus.sources import Carried, UnknownBlock, closure
 
@@ -42,8 +42,8 @@ class UnusableName(ValueError):
         self.name = name
 
 
-def cached(name: str, fmi: int) -> Path:
-    """Return a catalog unit's FMU, built unless the cache has the one of the present sources.
+def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
+    """Return a catalog unit's FMU, built unless the cache has the one of the present sources; see `build`.
 
     The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit at once.
 
@@ -53,13 +53,20 @@ def cached(name: str, fmi: int) -> Path:
     """
     entry = find_unit(name)
     carried = closure(entry.block)
-    folder = cache_folder() / "fmus" / _content_key(entry, fmi, carried)
-    wanted = folder / file_name(name, fmi)
-    return wanted if wanted.is_file() else build(entry, fmi, folder)
+    folder = cache_folder() / "fmus" / _content_key(entry, _form(fmi, scalar=scalar), carried)
+    wanted = folder / file_name(name, _form(fmi, scalar=scalar))
+    return wanted if wanted.is_file() else build(entry, fmi, folder, scalar=scalar)
 
 
 def build_block(
-    block: str, fmi: int, out_dir: Path, *, step: Fraction = Fraction(1, 100), summary: str = "", name: str = ""
+    block: str,
+    fmi: int,
+    out_dir: Path,
+    *,
+    step: Fraction = Fraction(1, 100),
+    summary: str = "",
+    name: str = "",
+    scalar: bool = False,
 ) -> Path:
     """Build an FMU of any block class, wherever its module lies.
 
@@ -70,34 +77,46 @@ def build_block(
         step: communication step that suits it, in seconds.
         summary: one line of description; without it the first line of the class's docstring.
         name: the FMU's name, without it the class's.
+        scalar: see `build`.
     """
-    return build(Entry(name or block.rpartition(":")[2], block, step, summary), fmi, out_dir)
+    return build(Entry(name or block.rpartition(":")[2], block, step, summary), fmi, out_dir, scalar=scalar)
 
 
-def build(entry: Entry, fmi: int, out_dir: Path) -> Path:
+def build(
+    entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False, platforms: Sequence[str] | None = None
+) -> Path:
     """Build a unit's FMU. The same sources, packages and interpreter give the same bytes.
+
+    Args:
+        entry: the unit.
+        fmi: 2 or 3.
+        out_dir: folder of the FMU.
+        scalar: make every entry of an array a variable of its own in FMI 3, for hosts that know no arrays; FMI 2 has
+            no arrays, there this changes nothing.
+        platforms: those to have the runtime for, such as `x86_64-windows`, or `host`, or `all`; without it all that
+            it is compiled for.
 
     Raises:
         UnknownBlock: the entry's block does not exist.
         UnknownVersion, UnusableName: the standard's version or the name is not one that can be.
-        DeclarationError, DuplicateName: the block's declarations are not in order.
-        NoFmi2Form: FMI 2 and the block has binary ports.
+        DeclarationError, DuplicateName, AmbiguousName, UnusableText: the block's declarations are not in order.
+        NoFmi2Form: FMI 2 and the block has binary ports, or integers that start beyond 32 bits.
+        UnknownPlatform: the runtime is not made for a platform.
         NotCompiled: there is no runtime and no compiler.
     """
-    if fmi not in (2, 3):
-        raise UnknownVersion(fmi)
+    form = _form(fmi, scalar=scalar)
     carried = closure(entry.block)
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise UnusableName(entry.name)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     packages = carried.packages()
     describe_in_xml = fmi2_description if fmi == 2 else fmi3_description
-    without_token = _model(entry, "")
-    model = _model(entry, _token({**sources, "modelDescription.xml": describe_in_xml(without_token)}))
+    without_token = _model(entry, form, "")
+    model = _model(entry, form, _token({**sources, "modelDescription.xml": describe_in_xml(without_token)}))
     unit = {
         "unit": entry.name,
         "block": entry.block,
-        "fmi": fmi,
+        "form": form.value,
         "token": model.token,
         "prefix": f"_fmu_{_digest(sources)[:16]}",
         "packages": [asdict(package) for package in packages],
@@ -108,17 +127,23 @@ def build(entry: Entry, fmi: int, out_dir: Path) -> Path:
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
         "resources/python.txt": os.fsencode(interpreter.describe()),
         **{f"resources/sources/{path}": content for path, content in sources.items()},
-        **binaries(entry.name, fmi),
+        **binaries(entry.name, fmi, platforms),
     }
-    return write_archive(out_dir / file_name(entry.name, fmi), files)
+    return write_archive(out_dir / file_name(entry.name, form), files)
 
 
-def file_name(name: str, fmi: int) -> str:
-    """Return the name of a unit's file, such as `TendonArm.fmi3.fmu`."""
-    return f"{name}.fmi{fmi}.fmu"
+def file_name(name: str, form: Form) -> str:
+    """Return the name of a unit's file, such as `TendonArm.fmi3.fmu` or `TendonArm.fmi3-scalar.fmu`."""
+    return f"{name}.{form.value}.fmu"
 
 
-def _model(entry: Entry, token: str) -> Model:
+def _form(fmi: int, *, scalar: bool) -> Form:
+    if fmi not in (2, 3):
+        raise UnknownVersion(fmi)
+    return Form.FMI2 if fmi == 2 else Form.FMI3_SCALAR if scalar else Form.FMI3
+
+
+def _model(entry: Entry, form: Form, token: str) -> Model:
     block = import_block(entry.block)
     description = describe(block)
     return Model(
@@ -128,6 +153,7 @@ def _model(entry: Entry, token: str) -> Model:
         token=token,
         description=description,
         layout=Layout(description),
+        form=form,
         variable_step=description.period is None and getattr(block, "variable_step", True),
     )
 
@@ -145,14 +171,14 @@ def import_block(path: str) -> type[Any]:
     return found
 
 
-def _content_key(entry: Entry, fmi: int, carried: Carried) -> str:
+def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
     """Return what changes whenever the FMU would: sources, packages, interpreter, runtime, and the builder itself."""
     builder = sorted(Path(__file__).parent.glob("*.*"))
     parts = {path: file.read_bytes() for path, file in carried.files.items()}
     parts |= {f"builder/{file.name}": file.read_bytes() for file in builder if file.is_file()}
-    parts |= binaries(entry.name, fmi)
+    parts |= binaries(entry.name, form.fmi)
     parts |= {f"environment/{module}": _version_mark(module) for module in carried.modules}
-    parts |= {"interpreter": os.fsencode(interpreter.describe()), "entry": repr((entry, fmi)).encode()}
+    parts |= {"interpreter": os.fsencode(interpreter.describe()), "entry": repr((entry, form)).encode()}
     return _digest(parts)
 
 

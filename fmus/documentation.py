@@ -44,7 +44,7 @@ def page(model: Model, packages: list[Package]) -> bytes:
 def _row(v: Variable) -> Row:
     return Row(
         name=v.name,
-        kind=v.raster.mime if v.raster else v.enumeration.__name__ if v.enumeration else v.kind.value,
+        kind=v.raster.mime if v.raster else v.enumeration.__name__ if v.enumeration else v.type_name,
         shape=" × ".join(map(str, v.shape)),
         unit=v.unit.symbol if v.kind is Kind.REAL else "",
         start="" if v.causality.value == "output" or v.kind is Kind.BINARY else _start(v),

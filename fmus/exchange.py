@@ -3,7 +3,6 @@
 What a step costs beyond the block's own work is spent here, so all that can be prepared is prepared once.
 """
 
-import enum
 import functools
 import operator
 import struct
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 
 from cosim.block import Causality, Variable
 from cosim.ports import Raster
-from fmus.buffers import Buffers
+from cosim.width import Width
+from fmus.buffers import Buffers, to_signed
 from fmus.layout import Buffer, Slot, capacity
 from fmus.parameters import read_value
 
@@ -27,6 +27,8 @@ class UnfitOutput(TypeError):
 
     def __init__(self, variable: Variable, value: object) -> None:
         declared = f"array of shape {variable.shape}" if variable.shape else variable.kind.value
+        if variable.width and not variable.width.is_real:
+            declared = variable.width.told
         if variable.items:
             declared = "one of " + ", ".join(f"{number} {name}" for name, number in variable.items)
         if variable.raster:
@@ -129,7 +131,7 @@ def _exact_statement(buffers: Buffers, slot: Slot, i: int, names: dict[str, Any]
         names[f"to{i}"], names[f"shape{i}"] = buffers.array(slot, writeable=True), v.shape
         inexact = f"y{i}.__class__ is not array or y{i}.shape != shape{i} or y{i}.dtype is not real"
         return inexact, f"to{i}[...] = y{i}"
-    if slot.buffer in (Buffer.BOOLEAN, Buffer.INT64):
+    if slot.buffer is Buffer.BOOLEAN or (slot.buffer is Buffer.INT64 and v.width in (None, Width.INT64)):
         is_boolean = slot.buffer is Buffer.BOOLEAN
         names[f"to{i}"] = buffers.booleans if is_boolean else buffers.integers
         names[f"type{i}"] = bool if is_boolean else v.enumeration or int
@@ -177,7 +179,7 @@ def _writer(buffers: Buffers, slot: Slot) -> Callable[[Any], None]:
     """Return what writes one output that is not real; it raises TypeError, ValueError or OverflowError."""
     at = slot.offset
     if slot.buffer is Buffer.INT64:
-        number = functools.partial(_number, slot.variable.enumeration)
+        number = functools.partial(_number, slot.variable)
         return lambda value: buffers.integers.__setitem__(at, number(value))
     if slot.buffer is Buffer.BOOLEAN:
         return lambda value: buffers.booleans.__setitem__(at, _instance(value, bool, np.bool_))
@@ -194,11 +196,15 @@ def _instance(value: Any, *types: type[Any]) -> Any:
     return value
 
 
-def _number(items: type[enum.IntEnum] | None, value: Any) -> int:
+def _number(variable: Variable, value: Any) -> int:
     if isinstance(value, bool):
         raise TypeError("a truth value is not a number")
     number = operator.index(value)
-    return number if items is None else items(number)
+    if variable.enumeration is not None:
+        return variable.enumeration(number)
+    if variable.width and not variable.width.holds(number):
+        raise ValueError(f"no {variable.width.value}")
+    return to_signed(number)
 
 
 def _picture_writer(buffers: Buffers, slot: Slot, raster: Raster) -> Callable[[Any], None]:

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from cosim.block import Causality, Kind, Variable
+from cosim.width import Width
+from fmus.layout import Form, HostVariable
 from fmus.model_description import (
     GENERATOR,
     Model,
@@ -20,14 +22,13 @@ from fmus.model_description import (
     text,
     variability,
 )
-from fmus.table import element_names
 
 
 class NoFmi2Form(ValueError):
-    """A unit has binary ports, for which FMI 2 has no type."""
+    """A unit has ports for which FMI 2 has no type; `reason` says why."""
 
-    def __init__(self, unit: str, ports: list[str]) -> None:
-        super().__init__(f"{unit} has no FMI 2 form: FMI 2 knows no binary variables ({', '.join(ports)}); use FMI 3")
+    def __init__(self, unit: str, reason: str, ports: list[str]) -> None:
+        super().__init__(f"{unit} has no FMI 2 form: {reason} ({', '.join(ports)}); use FMI 3")
         self.unit, self.ports = unit, ports
 
 
@@ -35,11 +36,9 @@ def fmi2_description(model: Model) -> bytes:
     """Return the model description as XML.
 
     Raises:
-        NoFmi2Form: the block has binary ports.
+        NoFmi2Form: the block has binary ports, or an integer starts beyond 32 bits.
     """
-    binaries = [v.name for v in model.description.variables if v.kind is Kind.BINARY]
-    if binaries:
-        raise NoFmi2Form(model.name, binaries)
+    _check_form(model)
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -59,16 +58,27 @@ def fmi2_description(model: Model) -> bytes:
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
+        attrib={"providesDirectionalDerivative": "true"} if model.description.has_derivatives else {},
     )
     add_units(root, model.description.variables)
     _add_types(root, model.description.variables)
     add_log_categories(root)
     add_default_experiment(root, model)
     variables = ET.SubElement(root, "ModelVariables")
-    for v in model.description.variables:
+    for v in model.layout.shown(Form.FMI2):
         _add_variable(variables, model, v)
     _add_structure(root, model)
     return text(root)
+
+
+def _check_form(model: Model) -> None:
+    shown = model.description.variables
+    binaries = [v.name for v in shown if v.kind is Kind.BINARY]
+    if binaries:
+        raise NoFmi2Form(model.name, "FMI 2 knows no binary variables", binaries)
+    long = [v.name for v in shown if v.kind is Kind.INTEGER and not Width.INT32.holds(v.start)]
+    if long:
+        raise NoFmi2Form(model.name, "FMI 2's integers have 32 bits, too few for start values", long)
 
 
 def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
@@ -83,33 +93,38 @@ def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
             ET.SubElement(items, "Item", name=item.name, value=str(int(item)))
 
 
-def _add_variable(variables: ET.Element, model: Model, v: Variable) -> None:
-    first = model.layout.references(2)[v.name]
+def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> None:
+    v = shown.variable
     is_parameter, is_output = v.causality is Causality.PARAMETER, v.causality is Causality.OUTPUT
-    for i, name in enumerate(element_names(v)):
-        scalar = ET.SubElement(
-            variables,
-            "ScalarVariable",
-            name=name,
-            valueReference=str(first + i),
-            description=v.description,
-            causality=v.causality.value,
-            variability="fixed" if is_parameter else variability(model, v),
-            attrib={"initial": "exact"} if is_parameter else {"initial": "calculated"} if is_output else {},
-        )
-        tag, facts = _type(v)
-        start = {} if is_output else {"start": _start(v, i)}
-        ET.SubElement(scalar, tag, {**facts, **start})
+    scalar = ET.SubElement(
+        variables,
+        "ScalarVariable",
+        name=shown.name,
+        valueReference=str(shown.reference),
+        description=v.description,
+        causality=v.causality.value,
+        variability="fixed" if is_parameter else variability(model, v),
+        attrib={"initial": "exact"} if is_parameter else {"initial": "calculated"} if is_output else {},
+    )
+    tag, facts = _type(v)
+    start = {} if is_output else {"start": _start(v, shown.entries.start)}
+    ET.SubElement(scalar, tag, {**facts, **start})
 
 
 def _type(v: Variable) -> tuple[str, dict[str, str]]:
     if v.kind is Kind.REAL:
-        return "Real", {"unit": v.unit.symbol, **bounds(v, as_integer=False)}
+        return "Real", {"unit": v.unit.symbol, **bounds(v)}
     if v.kind is Kind.INTEGER:
-        return "Integer", bounds(v, as_integer=True)
+        return "Integer", _integer_bounds(v)
     if v.enumeration is not None:
-        return "Enumeration", {"declaredType": v.enumeration.__name__}
+        return "Enumeration", {"declaredType": v.enumeration.__name__, **bounds(v)}
     return {Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}[v.kind], {}
+
+
+def _integer_bounds(v: Variable) -> dict[str, str]:
+    """Return `min` and `max`, those of the width where none are declared; what 32 bits cannot pass is no bound."""
+    limits = {} if v.width in (None, Width.INT32) else {"min": str(v.width.lowest), "max": str(v.width.highest)}
+    return {name: bound for name, bound in {**limits, **bounds(v)}.items() if Width.INT32.holds(int(bound))}
 
 
 def _start(v: Variable, i: int) -> str:
@@ -122,11 +137,10 @@ def _start(v: Variable, i: int) -> str:
 
 def _add_structure(root: ET.Element, model: Model) -> None:
     """Indices here count the scalar variables from 1."""
-    sizes = {v.name: v.size for v in model.description.variables}
-    references = model.layout.references(2)
+    references = model.layout.references(Form.FMI2)
 
     def indices(names: Iterable[str]) -> list[int]:
-        return [references[name] + i + 1 for name in names for i in range(sizes[name])]
+        return [reference + 1 for name in names for reference in references[name]]
 
     structure = ET.SubElement(root, "ModelStructure")
     outputs = ET.SubElement(structure, "Outputs")

@@ -1,12 +1,16 @@
-"""modelDescription.xml of FMI 3.0: arrays with dimensions, values in row-major order; pictures as binary variables."""
+"""modelDescription.xml of FMI 3.0: arrays with dimensions, values in row-major order; pictures as binary variables.
+
+In the scalar form an array's entries are variables of their own, named as in FMI 2.
+"""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from fractions import Fraction
 
 import numpy as np
 
 from cosim.block import Causality, Kind, Variable
-from fmus.layout import capacity
+from fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
 from fmus.model_description import (
     GENERATOR,
     Model,
@@ -36,17 +40,7 @@ def fmi3_description(model: Model) -> bytes:
         generationTool=GENERATOR,
         variableNamingConvention="structured",
     )
-    period = model.description.period
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=model.name,
-        needsExecutionTool="true",  # Python
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize=boolean(model.variable_step),
-        attrib={} if period is None else {"fixedInternalStepSize": number(float(period))},
-    )
+    _add_interface(root, model)
     add_units(root, model.description.variables)
     _add_types(root, model.description.variables)
     add_log_categories(root)
@@ -55,16 +49,63 @@ def fmi3_description(model: Model) -> bytes:
     ET.SubElement(
         variables,
         "Float64",
-        name="time",
+        name=TIME,
         valueReference="0",
         description="time",
         causality="independent",
         variability="continuous",
     )
-    for v in model.description.variables:
+    for v in model.layout.shown(model.form):
         _add_variable(variables, model, v)
+    if model.description.period is not None and model.layout.has_clock(model.form):
+        _add_clock(variables, model.description.period)
     _add_structure(root, model)
     return text(root)
+
+
+def _add_interface(root: ET.Element, model: Model) -> None:
+    block = model.description
+    interface = ET.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=model.name,
+        needsExecutionTool="true",  # Python
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize=boolean(model.variable_step),
+    )
+    if block.period is not None:
+        interface.set("fixedInternalStepSize", number(float(block.period)))
+    if model.layout.has_clock(model.form) or block.has_events:
+        interface.set("hasEventMode", "true")
+        interface.set("mightReturnEarlyFromDoStep", "true")
+    if block.has_derivatives:
+        interface.set("providesDirectionalDerivatives", "true")
+        interface.set("providesAdjointDerivatives", "true")
+
+
+def _add_clock(variables: ET.Element, period: Fraction) -> None:
+    """Add a sampled unit's clock after all other variables; the runtime finds its value reference by that.
+
+    No port names it in `clocks`: a clocked variable has a value only while its clock is active, so hosts without event
+    mode could not reach it, and these outputs hold between ticks.
+    """
+    ET.SubElement(
+        variables,
+        "Clock",
+        name=SAMPLE_CLOCK,
+        valueReference=str(len(variables)),
+        description="ticks at the start, and whenever a period has passed",
+        causality="input",
+        variability="discrete",
+        intervalVariability="constant",
+        intervalDecimal=number(float(period)),
+        shiftDecimal="0.0",
+        supportsFraction="true",
+        resolution=str(period.denominator),
+        intervalCounter=str(period.numerator),
+        shiftCounter="0",
+    )
 
 
 def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
@@ -78,12 +119,13 @@ def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
             ET.SubElement(items, "Item", name=item.name, value=str(int(item)))
 
 
-def _add_variable(variables: ET.Element, model: Model, v: Variable) -> None:
+def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> None:
+    v = shown.variable
     is_parameter, is_output = v.causality is Causality.PARAMETER, v.causality is Causality.OUTPUT
     tag, facts = _type(v)
     attributes = {
-        "name": v.name,
-        "valueReference": str(model.layout.references(3)[v.name]),
+        "name": shown.name,
+        "valueReference": str(shown.reference),
         "description": v.description,
         "causality": v.causality.value,
         "variability": "fixed" if is_parameter else variability(model, v),
@@ -91,34 +133,34 @@ def _add_variable(variables: ET.Element, model: Model, v: Variable) -> None:
     if is_parameter or is_output:
         attributes["initial"] = "exact" if is_parameter else "calculated"
     attributes.update(facts)
-    start = None if is_output else _start(v)
+    start = None if is_output else _start(shown)
     in_attribute = v.kind not in (Kind.STRING, Kind.BINARY)
     if start is not None and in_attribute:
         attributes["start"] = start
     element = ET.SubElement(variables, tag, attributes)
-    for extent in v.shape:
+    for extent in shown.shape:
         ET.SubElement(element, "Dimension", start=str(extent))
     if start is not None and not in_attribute:
         ET.SubElement(element, "Start", value=start)
 
 
 def _type(v: Variable) -> tuple[str, dict[str, str]]:
-    if v.kind is Kind.REAL:
-        return "Float64", {"unit": v.unit.symbol, **bounds(v, as_integer=False)}
-    if v.kind is Kind.INTEGER:
-        return "Int64", bounds(v, as_integer=True)
+    if v.width is not None:
+        unit = {"unit": v.unit.symbol} if v.kind is Kind.REAL else {}
+        return v.width.value, {**unit, **bounds(v)}
     if v.enumeration is not None:
-        return "Enumeration", {"declaredType": v.enumeration.__name__}
+        return "Enumeration", {"declaredType": v.enumeration.__name__, **bounds(v)}
     if v.kind is Kind.BINARY:
         mime = v.raster.mime if v.raster else BYTES_MIME_TYPE
         return "Binary", {"mimeType": mime, "maxSize": str(capacity(v))}
     return {Kind.BOOLEAN: "Boolean", Kind.STRING: "String"}[v.kind], {}
 
 
-def _start(v: Variable) -> str:
+def _start(shown: HostVariable) -> str:
     """Return the start value; a picture's is empty, which the runtime takes for black."""
+    v = shown.variable
     if v.kind is Kind.REAL:
-        return " ".join(number(entry) for entry in np.ravel(v.start))
+        return " ".join(number(np.ravel(v.start)[i]) for i in shown.entries)
     if v.kind is Kind.BOOLEAN:
         return boolean(v.start)
     if v.kind is Kind.BINARY:
@@ -127,15 +169,17 @@ def _start(v: Variable) -> str:
 
 
 def _add_structure(root: ET.Element, model: Model) -> None:
-    references = model.layout.references(3)
+    references = model.layout.references(model.form)
 
     def listed(names: Iterable[str]) -> str:
-        return " ".join(map(str, sorted(references[name] for name in names)))
+        return " ".join(map(str, sorted(reference for name in names for reference in references[name])))
 
     structure = ET.SubElement(root, "ModelStructure")
     for v in model.description.outputs:
         now = listed(model.description.feedthrough.get(v.name, ()))
-        ET.SubElement(structure, "Output", valueReference=str(references[v.name]), dependencies=now)
+        for reference in references[v.name]:
+            ET.SubElement(structure, "Output", valueReference=str(reference), dependencies=now)
     for v in model.description.outputs:
         first = listed(known_at_start(model, v.name))
-        ET.SubElement(structure, "InitialUnknown", valueReference=str(references[v.name]), dependencies=first)
+        for reference in references[v.name]:
+            ET.SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=first)

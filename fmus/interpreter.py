@@ -1,7 +1,8 @@
 """What a host that is not Python must know of an interpreter to run FMUs in it.
 
 The builder notes it in each FMU (resources/python.txt). Carried in the FMU and run as a script it tells of the
-interpreter that runs it: that is how the runtime asks the `python3` on the PATH. Standard library only.
+interpreter that runs it: that is how the runtime asks the `python3` on the PATH, on Windows the `python`. Standard
+library only.
 """
 
 import os

@@ -5,6 +5,7 @@ parameters, the inputs and the outputs. Scalars stand before arrays, so that all
 """
 
 import enum
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -12,6 +13,12 @@ from cosim.block import Causality, Description, Kind, Variable
 
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""
+
+TIME = "time"
+"""Name of the independent variable in FMI 3."""
+
+SAMPLE_CLOCK = "sample_clock"
+"""Name of a sampled unit's clock in FMI 3; it has no place in the buffers."""
 
 BYTES_CAPACITY = 1 << 16
 """Most bytes in a binary variable that is not a picture."""
@@ -36,11 +43,33 @@ BUFFER_OF = {
     Kind.BINARY: Buffer.BINARY,
 }
 
+
+class Form(enum.Enum):
+    """How an FMU shows a block's variables to its host; the values are part of files' names."""
+
+    FMI2 = "fmi2"
+    FMI3 = "fmi3"
+    FMI3_SCALAR = "fmi3-scalar"
+
+    @property
+    def fmi(self) -> int:
+        """Version of the standard."""
+        return 2 if self is Form.FMI2 else 3
+
+    @property
+    def has_arrays(self) -> bool:
+        """Whether an array is one variable; else each of its entries is one."""
+        return self is Form.FMI3
+
+
 CAUSALITIES = (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
 
 
 class DuplicateName(ValueError):
-    """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables."""
+    """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables.
+
+    FMI 3 has the time among them, and a sampled block's clock.
+    """
 
     def __init__(self, block: str, names: list[str]) -> None:
         super().__init__(f"{block}: more than one variable is named {', '.join(names)}; rename all but one")
@@ -61,16 +90,63 @@ class Slot:
         return slice(self.offset, self.offset + self.variable.size)
 
 
+class Type(enum.IntEnum):
+    """Type of a variable in FMI 3; the numbers are those of `Type` in runtime/instance.h."""
+
+    FLOAT64 = 1
+    FLOAT32 = 2
+    INT8 = 3
+    UINT8 = 4
+    INT16 = 5
+    UINT16 = 6
+    INT32 = 7
+    UINT32 = 8
+    INT64 = 9
+    UINT64 = 10
+    ENUMERATION = 11
+    BOOLEAN = 12
+    STRING = 13
+    BINARY = 14
+
+
+def type_of(variable: Variable) -> Type:
+    """Return a variable's type in FMI 3."""
+    return Type[variable.width.name if variable.width else variable.kind.name]
+
+
+@dataclass(frozen=True)
+class HostVariable:
+    """A variable as a host sees it: one of the block's, or one entry of an array.
+
+    Attributes:
+        variable: the block's variable.
+        name: `p_WG`, or an entry's `p_WG[1]`, `cov_O[1,1]`.
+        reference: the value reference.
+        buffer, offset: where its first value lies.
+        entries: which of the block's variable's entries it has, in row-major order.
+        shape: empty for a scalar.
+    """
+
+    variable: Variable
+    name: str
+    reference: int
+    buffer: Buffer
+    offset: int
+    entries: range
+    shape: tuple[int, ...]
+
+
 class Layout:
     """The places of all variables of a block.
 
     Raises:
-        DuplicateName: two variables share a name.
+        DuplicateName: two variables share a name, or one is called `time`, or as a sampled block's clock.
     """
 
     def __init__(self, description: Description) -> None:
         names = [v.name for v in description.variables]
-        duplicates = sorted({name for name in names if names.count(name) > 1})
+        taken = [TIME, *names] if description.period is None else [TIME, SAMPLE_CLOCK, *names]
+        duplicates = sorted({name for name in taken if taken.count(name) > 1})
         if duplicates:
             raise DuplicateName(description.name, duplicates)
         self.description = description
@@ -95,19 +171,43 @@ class Layout:
         slots = self.of(causality, buffer)
         return slice(slots[0].offset, slots[-1].entries.stop) if slots else slice(0, 0)
 
-    def references(self, fmi: int) -> dict[str, int]:
-        """Return each variable's value reference; in FMI 2 that of its first entry, the others follow.
+    def has_clock(self, form: Form) -> bool:
+        """Tell whether there is a clock among what a host is shown.
 
-        FMI 3's value reference 0 is the time.
+        The scalar form has none, it is for tools that know little of FMI 3: when Ecos 0.7 unloads a unit with a clock,
+        it crashes with `double free`.
         """
-        if fmi == 3:
-            return {name: 1 + i for i, name in enumerate(self.slots)}
-        references: dict[str, int] = {}
-        following = 0
+        return form is Form.FMI3 and self.description.period is not None
+
+    def shown(self, form: Form) -> list[HostVariable]:
+        """Return the variables as a host sees them, by value reference. FMI 3's value reference 0 is the time."""
+        made: list[HostVariable] = []
+        first = 0 if form is Form.FMI2 else 1
         for name, slot in self.slots.items():
-            references[name] = following
-            following += slot.variable.size
+            v = slot.variable
+            if form.has_arrays:
+                made.append(HostVariable(v, name, first + len(made), slot.buffer, slot.offset, range(v.size), v.shape))
+                continue
+            for i, element in enumerate(element_names(v)):
+                reference, offset = first + len(made), slot.offset + i
+                made.append(HostVariable(v, element, reference, slot.buffer, offset, range(i, i + 1), ()))
+        return made
+
+    def references(self, form: Form) -> dict[str, tuple[int, ...]]:
+        """Return the value references by the block's variables: one each, or one for each entry of an array."""
+        references: dict[str, tuple[int, ...]] = {}
+        for shown in self.shown(form):
+            name = shown.variable.name
+            references[name] = (*references.get(name, ()), shown.reference)
         return references
+
+
+def element_names(variable: Variable) -> list[str]:
+    """Return the names of a variable's entries, `p_WG[1]` or `cov_O[1,1]`, in row-major order; a scalar's own name."""
+    if not variable.shape:
+        return [variable.name]
+    indices = itertools.product(*(range(1, extent + 1) for extent in variable.shape))
+    return [f"{variable.name}[{','.join(map(str, index))}]" for index in indices]
 
 
 def capacity(variable: Variable) -> int:

@@ -48,7 +48,7 @@ def start(resources: str, token: str) -> Any:
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
-    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["fmi"])
+    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["form"])
 
 
 def warning(resources: str) -> str:

@@ -1,21 +1,43 @@
 """What both standards' model descriptions share: units, log categories, numbers as text."""
 
 import enum
+import math
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.block import Description, Variable
-from fmus.layout import Layout
+from cosim.block import Description, Kind, Variable
+from cosim.units import Unit
+from fmus.layout import Form, Layout
 
 GENERATOR = "handover-cosim"
 
 LOG_CATEGORIES = {
-    "logStatusError": "refused calls and failures, with the traceback of an exception",
+    "logStatusError": "refused calls and failures, with the traceback of an exception; told even while logging is off",
     "logStatusWarning": "calls that are answered, but perhaps not as expected",
-    "logAll": "beginning and end of a run, besides the others",
+    "logAll": "all the others, and the beginning and end of a run",
 }
+
+
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+
+
+class AmbiguousName(ValueError):
+    """Two things of one block that an FMU tells apart by name have the same."""
+
+    def __init__(self, what: str, name: str) -> None:
+        super().__init__(f"{what} {name!r}: something else in the block has this name; rename one of them")
+        self.what, self.name = what, name
+
+
+class UnusableText(ValueError):
+    """A text has characters that XML cannot carry."""
+
+    def __init__(self, where: str, text: str) -> None:
+        super().__init__(f"{where}: {text!r} has control characters, which a model description cannot hold")
+        self.where, self.text = where, text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +49,8 @@ class Model:
         step: the communication step that suits the unit, in seconds.
         token: GUID of FMI 2, instantiation token of FMI 3.
         description: the block's declarations.
-        layout: its variables' places, which give the value references.
+        layout: its variables' places.
+        form: how the variables are shown; with the layout it gives the value references.
         variable_step: whether a step may have any size.
     """
 
@@ -37,11 +60,20 @@ class Model:
     token: str
     description: Description
     layout: Layout
+    form: Form
     variable_step: bool
 
 
 def text(root: ET.Element) -> bytes:
-    """Return a document as indented UTF-8."""
+    """Return a document as indented UTF-8.
+
+    Raises:
+        UnusableText: an attribute has a character that XML cannot carry.
+    """
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            if _NOT_XML.search(value):
+                raise UnusableText(f"{name} of {element.get('name', element.tag)}", value)
     ET.indent(root)
     return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
@@ -56,17 +88,26 @@ def boolean(value: object) -> str:
     return "true" if value else "false"
 
 
-def bounds(variable: Variable, *, as_integer: bool) -> dict[str, str]:
-    """Return the attributes `min` and `max` as far as they are declared."""
+def bounds(variable: Variable) -> dict[str, str]:
+    """Return the attributes `min` and `max` as far as they are declared and finite."""
     pairs = {"min": variable.minimum, "max": variable.maximum}
     return {
-        name: str(int(value)) if as_integer else number(value) for name, value in pairs.items() if value is not None
+        name: number(value) if variable.kind is Kind.REAL else str(int(value))
+        for name, value in pairs.items()
+        if value is not None and math.isfinite(value)
     }
 
 
 def add_units(root: ET.Element, variables: Iterable[Variable]) -> None:
-    """Add the units in use: value in SI = factor * value + offset, with the exponents of the base units."""
-    units = {v.unit.symbol: v.unit for v in variables if v.kind.value == "real"}
+    """Add the units in use: value in SI = factor * value + offset, with the exponents of the base units.
+
+    Raises:
+        AmbiguousName: two different units are called the same.
+    """
+    units: dict[str, Unit] = {}
+    for v in variables:
+        if v.kind is Kind.REAL and units.setdefault(v.unit.symbol, v.unit) != v.unit:
+            raise AmbiguousName("unit", v.unit.symbol)
     if not units:
         return
     definitions = ET.SubElement(root, "UnitDefinitions")
@@ -92,15 +133,24 @@ def add_default_experiment(root: ET.Element, model: Model) -> None:
 
 
 def enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:
-    """Return the enumeration types in use, by name."""
-    used = {v.enumeration.__name__: v.enumeration for v in variables if v.enumeration}
+    """Return the enumeration types in use, by name.
+
+    Raises:
+        AmbiguousName: two of them are called the same, or one as a variable, which FMI forbids.
+    """
+    listed = list(variables)
+    names = [v.name for v in listed]
+    used: dict[str, type[enum.IntEnum]] = {}
+    for items in (v.enumeration for v in listed if v.enumeration):
+        if used.setdefault(items.__name__, items) is not items or items.__name__ in names:
+            raise AmbiguousName("enumeration", items.__name__)
     return [items for _, items in sorted(used.items())]
 
 
 def variability(model: Model, variable: Variable) -> str:
     """Return a port's variability: real ports are continuous but the outputs of a sampled block."""
     sampled_output = variable.causality.value == "output" and model.description.period is not None
-    return "continuous" if variable.kind.value == "real" and not sampled_output else "discrete"
+    return "continuous" if variable.kind is Kind.REAL and not sampled_output else "discrete"
 
 
 def known_at_start(model: Model, output: str) -> list[str]:

@@ -7,7 +7,8 @@ import numpy as np
 
 from cosim.block import Variable
 from cosim.start_values import fault_of
-from fmus.buffers import Buffers
+from cosim.width import Width
+from fmus.buffers import Buffers, to_unsigned
 from fmus.layout import Buffer, Slot
 
 
@@ -60,6 +61,8 @@ def read_value(buffers: Buffers, slot: Slot) -> Any:
         return np.array(values).reshape(v.shape) if v.shape else values.item()
     if slot.buffer is Buffer.INT64:
         number = int(buffers.integers[slot.offset])
+        if v.width is Width.UINT64:
+            return to_unsigned(number)
         return number if v.enumeration is None else _item(v, v.enumeration, number)
     if slot.buffer is Buffer.BOOLEAN:
         return bool(buffers.booleans[slot.offset])

@@ -1,26 +1,16 @@
 """The Python side of an FMU's instance: what the C runtime calls (runtime/slave.c)."""
 
+import math
 from typing import Any
 
-from cosim.block import Block, describe
+from cosim.block import describe
+from cosim.eventful_block import UnfitAdvance
 from fmus.buffers import Buffers, UnfitState, join, split
+from fmus.derivatives import derivative_reader
 from fmus.exchange import input_reader, output_writer
-from fmus.layout import Layout
+from fmus.layout import Form, Layout
 from fmus.parameters import read_parameters
 from fmus.table import table
-
-PERIOD_TOLERANCE = 1e-6
-"""Relative; hosts add up step sizes, and write them as decimals."""
-
-
-class UnfitStep(ValueError):
-    """A sampled block was to make a step that is not its period."""
-
-    is_refusal = True
-
-    def __init__(self, block: str, dt: float, period: float) -> None:
-        super().__init__(f"a step of {dt:.9g} s: {block} is sampled, each of its steps is its period, {period!r} s")
-        self.dt, self.period = dt, period
 
 
 class Slave:
@@ -30,26 +20,28 @@ class Slave:
 
     Args:
         block: the block's class.
-        fmi: version of the standard, 2 or 3; it decides what a value reference stands for.
+        form: a value of `Form`; it decides what a value reference stands for.
     """
 
-    _block: Block
+    _block: Any  # a cosim.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
 
-    def __init__(self, block: type[Any], fmi: int) -> None:
+    def __init__(self, block: type[Any], form: str) -> None:
         self._type = block
-        self._fmi = fmi
+        self._form = Form(form)
         description = describe(block)
-        self._period = None if description.period is None else float(description.period)
         self._buffers = Buffers(Layout(description))
         self._clock = self._buffers.floats[:2]
         self._read = input_reader(self._buffers)
         self._write = output_writer(self._buffers)
         self._made_from: bytes | None = None
         self._fresh = b""
+        self._before_tick: bytes | None = None
+        if description.has_derivatives:
+            self._derive = derivative_reader(self._buffers)
 
     def table(self) -> bytes:
         """Return what the C runtime must know of the buffers."""
-        return table(self._buffers, self._fmi)
+        return table(self._buffers, self._form)
 
     def initialise(self) -> None:
         """Work out the outputs at the start.
@@ -67,25 +59,65 @@ class Slave:
         self._write(self._block.outputs(float(self._clock[0]), self._read()))
 
     def step(self) -> None:
-        """Advance from t by dt, as the buffers have them, and write the outputs.
+        """Advance from t by dt, as the buffers have them, and write the outputs; a sampled block's dt is its period."""
+        t, dt = self._clock.tolist()
+        self._write(self._block.step(t, dt, self._read()))
+
+    def evaluate(self) -> None:
+        """Step as `step` does, but for trial: when called again, from the same state as at the first time."""
+        t, dt = self._clock.tolist()
+        u = self._read()
+        if self._before_tick is None:
+            self._before_tick = self._block.get_state()
+        else:
+            self._block.set_state(self._before_tick)
+        self._write(self._block.step(t, dt, u))
+
+    def settle(self) -> None:
+        """Make the step that was last tried the one that was done."""
+        self._before_tick = None
+
+    def advance(self) -> None:
+        """Advance from t by dt or to the first event, write the outputs, and how far it came in the place of dt.
 
         Raises:
-            UnfitStep: the block is sampled and dt is not its period; nothing has changed.
+            UnfitAdvance: the block says that it went backwards, or farther than dt.
         """
         t, dt = self._clock.tolist()
-        if self._period is not None and abs(dt - self._period) > PERIOD_TOLERANCE * self._period:
-            raise UnfitStep(self._type.__name__, dt, self._period)
-        self._write(self._block.step(t, dt, self._read()))
+        reached, y = self._block.advance(t, dt, self._read())
+        if not 0.0 <= reached <= dt:
+            raise UnfitAdvance(self._type.__name__, reached, dt)
+        self._write(y)
+        self._clock[1] = reached
+
+    def handle_event(self) -> None:
+        """Change at t what an event changes, and write the outputs."""
+        self._write(self._block.handle_event(float(self._clock[0]), self._read()))
+
+    def next_event(self) -> None:
+        """Write the time of the next event that is known beforehand, or infinity, in the place of dt."""
+        following = self._block.next_event(float(self._clock[0]))
+        self._clock[1] = math.inf if following is None else following
+
+    def derivative(self, seed: bytes) -> bytes:
+        """Return the real outputs' derivatives in a direction of the real inputs; float64, as in the buffers."""
+        du, give = self._derive(seed)
+        return give(self._block.directional_derivative(float(self._clock[0]), self._read(), du))
 
     def reset(self) -> None:
         """Go back to where a new instance is."""
         self._buffers.reset()
-        self._made_from = None
+        self._made_from = self._before_tick = None
 
     def get_state(self) -> bytes:
-        """Return the variables, the time, and the block's state if there is a block that fits its parameters."""
-        has_block = self._made_from == self._buffers.parameters()
-        return join([self._buffers.to_bytes(), *([self._block.get_state()] if has_block else [])])
+        """Return the variables, the time, and the block's state if there is a block that fits its parameters.
+
+        While a step is tried, that is the state before it.
+        """
+        parts = [self._buffers.to_bytes()]
+        if self._made_from == self._buffers.parameters():
+            parts.append(self._block.get_state() if self._before_tick is None else self._before_tick)
+        return join(parts)
 
     def set_state(self, state: bytes) -> None:
         """Take over what `get_state` gave, here or in another instance.
@@ -100,7 +132,7 @@ class Slave:
         before = self._buffers.to_bytes()
         self._buffers.from_bytes(parts[0])
         if len(parts) == 1:
-            self._made_from = None
+            self._made_from = self._before_tick = None
             return
         if self._made_from != self._buffers.parameters():
             try:
@@ -108,6 +140,7 @@ class Slave:
             except BaseException:
                 self._buffers.from_bytes(before)
                 raise
+        self._before_tick = None
         self._block.set_state(parts[1])
 
     def get_string(self, index: int) -> bytes:
@@ -125,6 +158,6 @@ class Slave:
 
     def _make(self) -> None:
         """Make a block of the parameters; if that fails, the block of before stays, with what it was made from."""
-        block: Block = self._type(read_parameters(self._buffers))
+        block = self._type(read_parameters(self._buffers))
         self._fresh = block.get_state()
         self._block, self._made_from = block, self._buffers.parameters()

@@ -2,8 +2,9 @@
 
 import sys
 import time
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,19 @@ import click
 from cosim.exceptions import CosimError, nearest
 from fmus.binaries import NotCompiled
 from fmus.build import build, cached
-from fmus.catalog import UNITS
-from fmus.compile import CompilationError
+from fmus.catalog import UNITS, Entry
+from fmus.compile import (
+    TARGETS,
+    CompilationError,
+    UnknownPlatform,
+    compile_runtime,
+    has_compiler,
+    is_current,
+    named_platforms,
+)
 from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SCENARIOS
+from scenarios.check_command import check
 from scenarios.experiment import Experiment
 from scenarios.interruption import Interruption
 from scenarios.listing import print_catalog, print_scenario, print_summary, print_unit
@@ -44,6 +54,7 @@ handover list helix_handover           a scenario's parameters, with ranges
 handover list VslArm                   a unit's parameters, inputs and outputs
 handover run helix_handover            one run; leaves a folder with a report
 handover build TendonArm --fmi both    units for other tools
+handover check Their.fmu               what is wrong with an FMU, whoever made it
 handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -84,13 +95,26 @@ def list_(name: str | None) -> None:
 @click.argument("units", nargs=-1, metavar="[UNIT]...")
 @click.option("--fmi", type=click.Choice(["2", "3", "both"]), default="both", show_default=True, help="FMI version.")
 @click.option(
+    "--scalar",
+    is_flag=True,
+    help="FMI 3 with a variable for every entry of an array, for tools that know no arrays. FMI 2 is always so.",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path("fmus-built"),
     show_default=True,
     help="Folder for the files.",
 )
-def build_(units: Sequence[str], fmi: str, out: Path) -> None:
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    metavar="NAME[,NAME]...",
+    help="Platforms to run on: " + ", ".join(TARGETS) + ", `host` or `all`; missing ones are compiled, which takes a "
+    "minute the first time  [default: all that are compiled]",
+)
+def build_(units: Sequence[str], fmi: str, out: Path, platforms: Sequence[str], *, scalar: bool) -> None:
     """Build UNITs (all by default) as FMUs for other tools.
 
     A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
@@ -100,10 +124,13 @@ def build_(units: Sequence[str], fmi: str, out: Path) -> None:
         raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown))
     with Interruption(), _told_in_one_line():
         check_place(out)
-        for line in _build_all(units or list(UNITS), fmi, out, named=bool(units)):
+        _compile_missing(platforms)
+        make = partial(build, out_dir=out, scalar=scalar, platforms=platforms or None)
+        for line in _build_all(units or list(UNITS), fmi, make, named=bool(units)):
             click.echo(line)
 
 
+main.add_command(check)
 main.add_command(vsl_train)
 
 
@@ -163,11 +190,20 @@ def _fmus(experiment: type[Experiment[Any]], others: Mapping[str, Path]) -> dict
         raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
 
 
-def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Iterator[str]:
+def _compile_missing(platforms: Sequence[str]) -> None:
+    missing = [target for target in named_platforms(platforms) if not is_current(target)] if platforms else []
+    if missing and not has_compiler():
+        raise NotCompiled(missing)
+    for target in missing:
+        click.echo(f"compiling the FMI runtime for {target}", err=True)
+        compile_runtime([target])
+
+
+def _build_all(units: Sequence[str], fmi: str, make: Callable[[Entry, int], Path], *, named: bool) -> Iterator[str]:
     for name in units:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
             try:
-                yield str(build(UNITS[name], version, out))
+                yield str(make(UNITS[name], version))
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise BadCall(str(e)) from e
@@ -179,7 +215,7 @@ def _build_all(units: Sequence[str], fmi: str, out: Path, *, named: bool) -> Ite
 def _told_in_one_line() -> Generator[None, None, None]:
     try:
         yield
-    except (CosimError, BadParameter, BadRunFolder, NotCompiled) as e:
+    except (CosimError, BadParameter, BadRunFolder, NotCompiled, UnknownPlatform) as e:
         raise BadCall(str(e)) from e
     except CompilationError as e:
         raise BadCall(str(e).replace("\n", " ", 1)) from e

@@ -1,7 +1,5 @@
 """What `handover` prints: the catalog, a scenario's parameters, a run's summary."""
 
-import os
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +12,7 @@ from cosim.start_values import range_of
 from fmus.build import import_block
 from fmus.catalog import UNITS, Entry
 from scenarios.catalog import SCENARIOS, SYSTEMS
+from scenarios.console import open_console
 from scenarios.experiment import Experiment
 from scenarios.report import told
 from scenarios.run_folder import RunFolder
@@ -22,7 +21,7 @@ from scenarios.runner import Ended
 
 def print_catalog() -> None:
     """Print the scenarios and the units of each robot system, a line each."""
-    console = _console()
+    console = open_console()
     width = max(map(len, [*SCENARIOS, *UNITS]))
     for system in SYSTEMS:
         console.print(system.title, style="bold")
@@ -36,7 +35,7 @@ def print_catalog() -> None:
 
 def print_scenario(experiment: type[Experiment[Any]]) -> None:
     """Print a scenario's parameters with defaults and ranges, and its units."""
-    console = _console()
+    console = open_console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold")
     console.print("Parameters, to be set with -p name=value")
     _print_rows(console, [(v.name, _plain(v.start), _allowed(v), v.description) for v in experiment.parameters()])
@@ -46,7 +45,7 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
 
 def print_unit(unit: Entry) -> None:
     """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
-    console = _console()
+    console = open_console()
     d = describe(import_block(unit.block))
     step = "sampled every" if d.period is not None else "stepped by, for instance,"
     console.print(f"{unit.name}: {unit.summary}", style="bold")
@@ -59,7 +58,7 @@ def print_unit(unit: Entry) -> None:
 
 def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> None:
     """Print how a run ended, the figures named in the headline, and where the report is."""
-    console = _console()
+    console = open_console()
     summary = ended.summary
     verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
     console.print(f"{summary['scenario']} {verdict}: ", end="")
@@ -78,7 +77,7 @@ def _allowed(v: Variable) -> str:
 def _type_of(v: Variable) -> str:
     shape = f"[{','.join(map(str, v.shape))}]" if v.shape else ""
     unit = v.unit.symbol if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
-    return f"{v.kind.value}{shape} {unit}".rstrip()
+    return f"{v.type_name}{shape} {unit}".rstrip()
 
 
 def _start_of(v: Variable) -> str:
@@ -91,18 +90,6 @@ def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
     for row in rows:
         table.add_row("", *row)
     console.print(table)
-
-
-def _console() -> Console:
-    return _Console(highlight=False, width=None if sys.stdout.isatty() else 160)
-
-
-class _Console(Console):
-    def on_broken_pipe(self) -> None:
-        """Say no more to a reader who has left; how the run ended is still told by the exit status."""
-        self.quiet = True
-        with open(os.devnull, "w", encoding="utf-8") as nowhere:
-            os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _plain(value: Any) -> str:

@@ -14,7 +14,7 @@ from controllers.vsl_kinematics import Elbow, VslKinematics
 from cosim.exceptions import CosimError, UnitFailure
 from fmus.binaries import NotCompiled
 from fmus.build import cached
-from fmus.compile import CompilationError
+from fmus.compile import CompilationError, UnknownPlatform
 from scenarios.interruption import Interruption
 from scenarios.progress import progress_bar
 from scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
@@ -126,7 +126,7 @@ def _told_in_one_line(interruption: Interruption) -> Generator[None, None, None]
     except UnitFailure as e:
         interruption.check()  # a unit may have taken Ctrl-C for a failure of its own
         raise _ArmFailed(e.cause) from e
-    except (CosimError, NotCompiled, NothingToLearn) as e:
+    except (CosimError, NotCompiled, NothingToLearn, UnknownPlatform) as e:
         interruption.check()
         raise _BadCall(str(e)) from e
     except CompilationError as e:

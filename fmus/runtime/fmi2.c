@@ -7,7 +7,7 @@
 #include "platform.h"
 
 #define ASYNCHRONOUS "steps are done when fmi2DoStep returns"
-#define DERIVATIVES "derivatives of inputs and outputs are not provided"
+#define DERIVATIVES "derivatives of inputs and outputs with respect to time are not provided"
 #define MODEL_EXCHANGE "this unit is a co-simulation slave, it has no model-exchange form"
 
 /* A logger's message is a printf format in which # begins a reference to a variable: both are doubled. */
@@ -87,53 +87,59 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real values[]) {
-    return (fmi2Status)get_floats(c, __func__, vr, n, values, n);
+    return (fmi2Status)get_floats(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real values[]) {
-    return (fmi2Status)set_floats(c, __func__, vr, n, values, n);
+    return (fmi2Status)set_floats(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer values[]) {
     Instance *instance = c;
-    if (!may_get(instance, __func__, INT64, vr, n, values, n)) return fmi2Error;
+    if (!may_get(instance, __func__, INT64, ANY_TYPE, vr, n, values, n)) return fmi2Error;
     for (size_t i = 0; i < n; i++) {
-        int64_t value = instance->integers[variable_of(instance, vr[i])->offset];
-        if (value < INT32_MIN || value > INT32_MAX)
-            return (fmi2Status)refuse(instance, __func__, "the value %lld of variable %u has no place in 32 bits",
-                                      (long long)value, vr[i]);
-        values[i] = (fmi2Integer)value;
+        const Variable *variable = variable_of(instance, vr[i]);
+        int64_t value = instance->integers[variable->offset];
+        if (value >= (variable->type == TYPE_UINT64 ? 0 : INT32_MIN) && value <= INT32_MAX) {
+            values[i] = (fmi2Integer)value;
+            continue;
+        }
+        const char *format = variable->type == TYPE_UINT64 ? "the value %llu of variable %u has no place in 32 bits"
+                                                           : "the value %lld of variable %u has no place in 32 bits";
+        return (fmi2Status)refuse(instance, __func__, format, (long long)value, vr[i]);
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer values[]) {
     Instance *instance = c;
-    if (!may_set(instance, __func__, INT64, vr, n, values, n)) return fmi2Error;
+    if (!may_set(instance, __func__, INT64, ANY_TYPE, vr, n, values, n)) return fmi2Error;
+    for (size_t i = 0; i < n; i++)
+        if (!takes_integer(instance, __func__, vr[i], values[i])) return fmi2Error;
     for (size_t i = 0; i < n; i++) instance->integers[variable_of(instance, vr[i])->offset] = values[i];
     return fmi2OK;
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean values[]) {
     Instance *instance = c;
-    if (!may_get(instance, __func__, BOOLEAN, vr, n, values, n)) return fmi2Error;
+    if (!may_get(instance, __func__, BOOLEAN, ANY_TYPE, vr, n, values, n)) return fmi2Error;
     for (size_t i = 0; i < n; i++) values[i] = instance->booleans[variable_of(instance, vr[i])->offset] != 0;
     return fmi2OK;
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean values[]) {
     Instance *instance = c;
-    if (!may_set(instance, __func__, BOOLEAN, vr, n, values, n)) return fmi2Error;
+    if (!may_set(instance, __func__, BOOLEAN, ANY_TYPE, vr, n, values, n)) return fmi2Error;
     for (size_t i = 0; i < n; i++) instance->booleans[variable_of(instance, vr[i])->offset] = values[i] != 0;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String values[]) {
-    return (fmi2Status)get_strings(c, __func__, vr, n, values, n);
+    return (fmi2Status)get_strings(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String values[]) {
-    return (fmi2Status)set_strings(c, __func__, vr, n, values, n);
+    return (fmi2Status)set_strings(c, __func__, ANY_TYPE, vr, n, values, n);
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
@@ -161,7 +167,15 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real dt, fmi2Boolean no_set_state_prior) {
     (void)no_set_state_prior;
     BEGIN(STEPPING);
-    return (fmi2Status)instance_step(instance, __func__, t, dt);
+    StepEnd end;
+    return (fmi2Status)instance_step(instance, __func__, t, dt, &end);
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t n_unknowns,
+                                        const fmi2ValueReference knowns[], size_t n_knowns, const fmi2Real seed[],
+                                        fmi2Real sensitivity[]) {
+    return (fmi2Status)get_derivative(c, __func__, false, unknowns, n_unknowns, knowns, n_knowns, seed, n_knowns,
+                                      sensitivity, n_unknowns);
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
@@ -195,8 +209,6 @@ UNSUPPORTED_BARE(ASYNCHRONOUS, fmi2CancelStep)
 UNSUPPORTED(ASYNCHRONOUS, fmi2GetStatus, const fmi2StatusKind k, fmi2Status *v)
 UNSUPPORTED(ASYNCHRONOUS, fmi2GetIntegerStatus, const fmi2StatusKind k, fmi2Integer *v)
 UNSUPPORTED(ASYNCHRONOUS, fmi2GetStringStatus, const fmi2StatusKind k, fmi2String *v)
-UNSUPPORTED(DERIVATIVES, fmi2GetDirectionalDerivative, const fmi2ValueReference u[], size_t nu,
-            const fmi2ValueReference k[], size_t nk, const fmi2Real seed[], fmi2Real sensitivity[])
 UNSUPPORTED(DERIVATIVES, fmi2SetRealInputDerivatives, const fmi2ValueReference vr[], size_t n,
             const fmi2Integer order[], const fmi2Real v[])
 UNSUPPORTED(DERIVATIVES, fmi2GetRealOutputDerivatives, const fmi2ValueReference vr[], size_t n,

@@ -5,8 +5,13 @@
 #include "instance.h"
 #include "platform.h"
 
+/* The callback does not say whose message it is, so the message begins with the instance's name. */
 static void log_message(const Instance *instance, Status status, const char *category, const char *message) {
-    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category, message);
+    Text named = {0};
+    text_add(&named, *instance->name ? "%s: %s" : "%s%s", instance->name, message);
+    ((fmi3LogMessageCallback)instance->host_logger)(instance->host_environment, (fmi3Status)status, category,
+                                                    named.chars ? named.chars : message);
+    text_clear(&named);
 }
 
 #define BEGIN(modes)             \
@@ -19,18 +24,26 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance handle, fmi3Boolean on, size_t n, co
     return (fmi3Status)set_logging(handle, __func__, on, n, categories);
 }
 
+/* The standard wants this error. The reverse it puts on the host: to use event mode where there is a clock. A host that
+ * does not is served nonetheless, the unit then ticks by itself. */
+static bool may_use_event_mode(const Instance *instance, const char *function) {
+    if (!instance->event_mode_used || has_clock(instance) || has_events(instance)) return true;
+    refuse(instance, function, "eventModeUsed is true, but the unit has no event mode (hasEventMode is false)");
+    return false;
+}
+
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
                                          fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
                                          const fmi3ValueReference intermediate[], size_t n_intermediate,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                          fmi3IntermediateUpdateCallback update) {
     (void)visible;
-    (void)early_return; /* a step is never cut short, whether that is allowed or not */
     (void)intermediate;
     (void)update;
     Instance *instance = instance_new(name, log_message, (void (*)(void))logger, environment, logging);
     if (!instance) return NULL;
     instance->event_mode_used = event_mode;
+    instance->early_return_allowed = early_return;
     if (n_intermediate > 0)
         warn(instance, __func__, "steps have no intermediate points: the %zu variables will not be updated within them",
              n_intermediate);
@@ -38,7 +51,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     if (given(instance, __func__, token, "instantiationToken") &&
         given(instance, __func__, resources, "resourcePath")) {
         char *folder = platform_path(resources);
-        started = folder && slave_start(instance, __func__, folder, token);
+        started = folder && slave_start(instance, __func__, folder, token) && may_use_event_mode(instance, __func__);
         free(folder);
     }
     if (started) return instance;
@@ -106,46 +119,12 @@ fmi3Status fmi3DoStep(fmi3Instance handle, fmi3Float64 t, fmi3Float64 dt, fmi3Bo
         !given(instance, __func__, early, "earlyReturn") || !given(instance, __func__, last_time, "lastSuccessfulTime"))
         return fmi3Error;
     *event_needed = *terminate = *early = false;
-    Status status = instance_step(instance, __func__, t, dt);
+    StepEnd end = {false, false};
+    Status status = instance_step(instance, __func__, t, dt, &end);
+    *early = end.early;
+    *event_needed = end.event_needed;
     *last_time = instance->floats[0];
     return (fmi3Status)status;
-}
-
-/* A unit has no events of its own. A host that uses event mode all the same may set inputs in it and goes on. */
-
-fmi3Status fmi3EnterEventMode(fmi3Instance handle) {
-    BEGIN(STEPPING);
-    if (!instance->event_mode_used)
-        return (fmi3Status)refuse(instance, __func__, "the instance was made with eventModeUsed = fmi3False");
-    instance->mode = EVENT;
-    return fmi3OK;
-}
-
-fmi3Status fmi3EnterStepMode(fmi3Instance handle) {
-    BEGIN(EVENT);
-    instance->mode = STEPPING;
-    return fmi3OK;
-}
-
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance handle) {
-    BEGIN(INITIALISATION | EVENT);
-    return fmi3OK;
-}
-
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance handle, fmi3Boolean *again, fmi3Boolean *terminate,
-                                    fmi3Boolean *nominals_changed, fmi3Boolean *states_changed,
-                                    fmi3Boolean *next_event_defined, fmi3Float64 *next_event) {
-    BEGIN(EVENT);
-    if (!given(instance, __func__, again, "discreteStatesNeedUpdate") ||
-        !given(instance, __func__, terminate, "terminateSimulation") ||
-        !given(instance, __func__, nominals_changed, "nominalsOfContinuousStatesChanged") ||
-        !given(instance, __func__, states_changed, "valuesOfContinuousStatesChanged") ||
-        !given(instance, __func__, next_event_defined, "nextEventTimeDefined") ||
-        !given(instance, __func__, next_event, "nextEventTime"))
-        return fmi3Error;
-    *again = *terminate = *nominals_changed = *states_changed = *next_event_defined = false;
-    *next_event = 0.0;
-    return fmi3OK;
 }
 
 fmi3Status fmi3GetFMUState(fmi3Instance handle, fmi3FMUState *state) {

@@ -2,10 +2,9 @@
 #include "fmi.h"
 #include "instance.h"
 
-#define CLOCKS "this unit has no clocks"
 #define CONFIGURATION "this unit has no structural parameters"
 #define DEPENDENCIES "the dependencies do not change, see ModelStructure in modelDescription.xml"
-#define DERIVATIVES "derivatives are not provided"
+#define DERIVATIVES "derivatives of outputs with respect to time are not provided"
 #define MODEL_EXCHANGE "this unit is a co-simulation slave, it has no model-exchange form"
 #define SCHEDULED "this unit is a co-simulation slave, it has no scheduled-execution form"
 
@@ -19,18 +18,6 @@
     }
 #define REFERENCES const fmi3ValueReference vr[], size_t n
 
-UNSUPPORTED(CLOCKS, fmi3GetClock, REFERENCES, fmi3Clock values[])
-UNSUPPORTED(CLOCKS, fmi3SetClock, REFERENCES, const fmi3Clock values[])
-UNSUPPORTED(CLOCKS, fmi3GetIntervalDecimal, REFERENCES, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-UNSUPPORTED(CLOCKS, fmi3GetIntervalFraction, REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
-            fmi3IntervalQualifier qualifiers[])
-UNSUPPORTED(CLOCKS, fmi3GetShiftDecimal, REFERENCES, fmi3Float64 shifts[])
-UNSUPPORTED(CLOCKS, fmi3GetShiftFraction, REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
-UNSUPPORTED(CLOCKS, fmi3SetIntervalDecimal, REFERENCES, const fmi3Float64 intervals[])
-UNSUPPORTED(CLOCKS, fmi3SetIntervalFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNSUPPORTED(CLOCKS, fmi3SetShiftDecimal, REFERENCES, const fmi3Float64 shifts[])
-UNSUPPORTED(CLOCKS, fmi3SetShiftFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-
 UNSUPPORTED_BARE(CONFIGURATION, fmi3EnterConfigurationMode)
 UNSUPPORTED_BARE(CONFIGURATION, fmi3ExitConfigurationMode)
 
@@ -38,12 +25,6 @@ UNSUPPORTED(DEPENDENCIES, fmi3GetNumberOfVariableDependencies, fmi3ValueReferenc
 UNSUPPORTED(DEPENDENCIES, fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t dependent_entries[],
             fmi3ValueReference independents[], size_t independent_entries[], fmi3DependencyKind kinds[], size_t n)
 
-UNSUPPORTED(DERIVATIVES, fmi3GetDirectionalDerivative, const fmi3ValueReference unknowns[], size_t n_unknowns,
-            const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[], size_t n_seed,
-            fmi3Float64 sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(DERIVATIVES, fmi3GetAdjointDerivative, const fmi3ValueReference unknowns[], size_t n_unknowns,
-            const fmi3ValueReference knowns[], size_t n_knowns, const fmi3Float64 seed[], size_t n_seed,
-            fmi3Float64 sensitivity[], size_t n_sensitivity)
 UNSUPPORTED(DERIVATIVES, fmi3GetOutputDerivatives, REFERENCES, const fmi3Int32 orders[], fmi3Float64 values[],
             size_t n_values)
 

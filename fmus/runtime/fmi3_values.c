@@ -1,4 +1,4 @@
-/* FMI 3.0: getting and setting variables. Those of a unit are Float64, Int64, Boolean, String, Binary, Enumeration. */
+/* FMI 3.0: getting and setting variables. Reals are doubles inside, integers int64: widths matter here only. */
 #include <string.h>
 
 #include "fmi.h"
@@ -7,48 +7,68 @@
 typedef const fmi3ValueReference References[];
 
 fmi3Status fmi3GetFloat64(fmi3Instance handle, References vr, size_t n, fmi3Float64 values[], size_t n_values) {
-    return (fmi3Status)get_floats(handle, __func__, vr, n, values, n_values);
+    return (fmi3Status)get_floats(handle, __func__, TYPE_FLOAT64, vr, n, values, n_values);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance handle, References vr, size_t n, const fmi3Float64 values[], size_t n_values) {
-    return (fmi3Status)set_floats(handle, __func__, vr, n, values, n_values);
+    return (fmi3Status)set_floats(handle, __func__, TYPE_FLOAT64, vr, n, values, n_values);
 }
 
-fmi3Status fmi3GetInt64(fmi3Instance handle, References vr, size_t n, fmi3Int64 values[], size_t n_values) {
-    Instance *instance = handle;
-    if (!may_get(instance, __func__, INT64, vr, n, values, n_values)) return fmi3Error;
-    for (size_t i = 0; i < n; i++) values[i] = instance->integers[variable_of(instance, vr[i])->offset];
-    return fmi3OK;
+fmi3Status fmi3GetFloat32(fmi3Instance handle, References vr, size_t n, fmi3Float32 values[], size_t n_values) {
+    return (fmi3Status)get_singles(handle, __func__, vr, n, values, n_values);
 }
 
-fmi3Status fmi3SetInt64(fmi3Instance handle, References vr, size_t n, const fmi3Int64 values[], size_t n_values) {
-    Instance *instance = handle;
-    if (!may_set(instance, __func__, INT64, vr, n, values, n_values)) return fmi3Error;
-    for (size_t i = 0; i < n; i++) instance->integers[variable_of(instance, vr[i])->offset] = values[i];
-    return fmi3OK;
+fmi3Status fmi3SetFloat32(fmi3Instance handle, References vr, size_t n, const fmi3Float32 values[], size_t n_values) {
+    return (fmi3Status)set_singles(handle, __func__, vr, n, values, n_values);
 }
+
+/* The buffer's int64 are within the variable's width: the Python side sees to it. UInt64 keeps its 64 bits. */
+#define INTEGER(Name, TYPE)                                                                                            \
+    fmi3Status fmi3Get##Name(fmi3Instance handle, References vr, size_t n, fmi3##Name values[], size_t n_values) {     \
+        Instance *instance = handle;                                                                                   \
+        if (!may_get(instance, __func__, INT64, TYPE, vr, n, values, n_values)) return fmi3Error;                      \
+        for (size_t i = 0; i < n; i++)                                                                                 \
+            values[i] = (fmi3##Name)instance->integers[variable_of(instance, vr[i])->offset];                          \
+        return fmi3OK;                                                                                                 \
+    }                                                                                                                  \
+    fmi3Status fmi3Set##Name(fmi3Instance handle, References vr, size_t n, const fmi3##Name values[],                  \
+                             size_t n_values) {                                                                        \
+        Instance *instance = handle;                                                                                   \
+        if (!may_set(instance, __func__, INT64, TYPE, vr, n, values, n_values)) return fmi3Error;                      \
+        for (size_t i = 0; i < n; i++)                                                                                 \
+            instance->integers[variable_of(instance, vr[i])->offset] = (int64_t)values[i];                             \
+        return fmi3OK;                                                                                                 \
+    }
+INTEGER(Int8, TYPE_INT8)
+INTEGER(UInt8, TYPE_UINT8)
+INTEGER(Int16, TYPE_INT16)
+INTEGER(UInt16, TYPE_UINT16)
+INTEGER(Int32, TYPE_INT32)
+INTEGER(UInt32, TYPE_UINT32)
+INTEGER(Int64, TYPE_INT64) /* enumerations too */
+INTEGER(UInt64, TYPE_UINT64)
 
 fmi3Status fmi3GetBoolean(fmi3Instance handle, References vr, size_t n, fmi3Boolean values[], size_t n_values) {
     Instance *instance = handle;
-    if (!may_get(instance, __func__, BOOLEAN, vr, n, values, n_values)) return fmi3Error;
+    if (!may_get(instance, __func__, BOOLEAN, TYPE_BOOLEAN, vr, n, values, n_values)) return fmi3Error;
     for (size_t i = 0; i < n; i++) values[i] = instance->booleans[variable_of(instance, vr[i])->offset] != 0;
     return fmi3OK;
 }
 
 fmi3Status fmi3SetBoolean(fmi3Instance handle, References vr, size_t n, const fmi3Boolean values[], size_t n_values) {
     Instance *instance = handle;
-    if (!may_set(instance, __func__, BOOLEAN, vr, n, values, n_values)) return fmi3Error;
+    if (!may_set(instance, __func__, BOOLEAN, TYPE_BOOLEAN, vr, n, values, n_values)) return fmi3Error;
     const uint8_t *bytes = (const uint8_t *)values; /* a host's true may be any bit pattern */
     for (size_t i = 0; i < n; i++) instance->booleans[variable_of(instance, vr[i])->offset] = bytes[i] != 0;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetString(fmi3Instance handle, References vr, size_t n, fmi3String values[], size_t n_values) {
-    return (fmi3Status)get_strings(handle, __func__, vr, n, values, n_values);
+    return (fmi3Status)get_strings(handle, __func__, TYPE_STRING, vr, n, values, n_values);
 }
 
 fmi3Status fmi3SetString(fmi3Instance handle, References vr, size_t n, const fmi3String values[], size_t n_values) {
-    return (fmi3Status)set_strings(handle, __func__, vr, n, values, n_values);
+    return (fmi3Status)set_strings(handle, __func__, TYPE_STRING, vr, n, values, n_values);
 }
 
 /* The pointers lead into the instance's own buffers: nothing is copied. */
@@ -56,7 +76,7 @@ fmi3Status fmi3GetBinary(fmi3Instance handle, References vr, size_t n, size_t si
                          size_t n_values) {
     Instance *instance = handle;
     if (n > 0 && !given(instance, __func__, sizes, "valueSizes")) return fmi3Error;
-    if (!may_get(instance, __func__, BINARY, vr, n, values, n_values)) return fmi3Error;
+    if (!may_get(instance, __func__, BINARY, TYPE_BINARY, vr, n, values, n_values)) return fmi3Error;
     for (size_t i = 0; i < n; i++) {
         uint32_t index = variable_of(instance, vr[i])->offset;
         values[i] = (fmi3Binary)(uintptr_t)instance->binaries[index].address;
@@ -80,7 +100,7 @@ static bool fits(const Instance *instance, const char *function, const Variable 
 fmi3Status fmi3SetBinary(fmi3Instance handle, References vr, size_t n, const size_t sizes[], const fmi3Binary values[],
                          size_t n_values) {
     Instance *instance = handle;
-    if (!may_set(instance, __func__, BINARY, vr, n, values, n_values)) return fmi3Error;
+    if (!may_set(instance, __func__, BINARY, TYPE_BINARY, vr, n, values, n_values)) return fmi3Error;
     if (n > 0 && !given(instance, __func__, sizes, "valueSizes")) return fmi3Error;
     for (size_t i = 0; i < n; i++)
         if (!fits(instance, __func__, variable_of(instance, vr[i]), sizes[i], values[i])) return fmi3Error;
@@ -97,22 +117,3 @@ fmi3Status fmi3SetBinary(fmi3Instance handle, References vr, size_t n, const siz
     }
     return fmi3OK;
 }
-
-#define NO_SUCH_TYPE(Type)                                                                                             \
-    fmi3Status fmi3Get##Type(fmi3Instance handle, References vr, size_t n, fmi3##Type values[], size_t n_values) {     \
-        (void)vr, (void)values, (void)n_values;                                                                        \
-        return n == 0 && handle ? fmi3OK : (fmi3Status)refuse_unsupported(handle, __func__, "no variable is " #Type);  \
-    }                                                                                                                  \
-    fmi3Status fmi3Set##Type(fmi3Instance handle, References vr, size_t n, const fmi3##Type values[],                  \
-                             size_t n_values) {                                                                        \
-        (void)vr, (void)values, (void)n_values;                                                                        \
-        return n == 0 && handle ? fmi3OK : (fmi3Status)refuse_unsupported(handle, __func__, "no variable is " #Type);  \
-    }
-NO_SUCH_TYPE(Float32)
-NO_SUCH_TYPE(Int8)
-NO_SUCH_TYPE(UInt8)
-NO_SUCH_TYPE(Int16)
-NO_SUCH_TYPE(UInt16)
-NO_SUCH_TYPE(Int32)
-NO_SUCH_TYPE(UInt32)
-NO_SUCH_TYPE(UInt64)

@@ -13,7 +13,7 @@ Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void),
     instance->log = log;
     instance->host_logger = host_logger;
     instance->host_environment = environment;
-    instance->logging = logging;
+    instance->logged = logging ? LOG_EVERYTHING : 0;
     instance->mode = INSTANTIATED;
     instance->stop_time = INFINITY;
     if (instance->name) return instance;
@@ -38,12 +38,11 @@ static bool all_finite(const Instance *instance, const char *function, size_t fi
     return false;
 }
 
-static bool inputs_finite(const Instance *instance, const char *function) {
+bool inputs_finite(const Instance *instance, const char *function) {
     return all_finite(instance, function, instance->first_input, instance->n_inputs);
 }
 
-/* The block has got there by itself, so it is of no further use. */
-static Status check_outputs(Instance *instance, const char *function) {
+Status check_outputs(Instance *instance, const char *function) {
     if (all_finite(instance, function, instance->first_output, instance->n_outputs)) return STATUS_OK;
     instance->mode = FAILED;
     return STATUS_ERROR;
@@ -66,7 +65,9 @@ Status instance_enter_initialisation(Instance *instance, const char *function) {
 }
 
 Status instance_refresh_outputs(Instance *instance, const char *function) {
-    if (instance->mode != INITIALISATION || !instance->outputs_stale) return STATUS_OK;
+    if (!instance->outputs_stale) return STATUS_OK;
+    if (instance->events.clock_active) return sampling_evaluate(instance, function);
+    if (instance->mode != INITIALISATION) return STATUS_OK;
     if (!inputs_finite(instance, function)) return STATUS_ERROR;
     if (slave_call(instance, function, "initialise") != STATUS_OK) return STATUS_ERROR;
     if (check_outputs(instance, function) != STATUS_OK) return STATUS_ERROR;
@@ -77,21 +78,16 @@ Status instance_refresh_outputs(Instance *instance, const char *function) {
 
 Status instance_exit_initialisation(Instance *instance, const char *function) {
     if (instance_refresh_outputs(instance, function) != STATUS_OK) return STATUS_ERROR;
+    instance->events = (Events){.start = instance->floats[0]};
     instance->mode = instance->event_mode_used ? EVENT : STEPPING;
     return STATUS_OK;
 }
 
-Status instance_step(Instance *instance, const char *function, double t, double dt) {
-    double tolerance = TIME_TOLERANCE * fmax(1.0, fabs(instance->floats[0]));
-    if (!(fabs(t - instance->floats[0]) <= tolerance))
-        return refuse(instance, function, "the step begins at t = %.17g s where the instance is at %.17g s", t,
-                      instance->floats[0]);
-    if (!(dt > 0.0 && isfinite(dt)))
-        return refuse(instance, function, "the step size is %.17g s; it must be positive", dt);
-    if (t + dt > instance->stop_time + tolerance)
-        return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
-                      instance->stop_time);
-    if (!inputs_finite(instance, function)) return STATUS_ERROR;
+double time_tolerance(const Instance *instance) {
+    return TIME_TOLERANCE * fmax(1.0, fabs(instance->floats[0]));
+}
+
+Status plain_step(Instance *instance, const char *function, double t, double dt) {
     double before = instance->floats[0], dt_before = instance->floats[1];
     instance->floats[0] = t;
     instance->floats[1] = dt;
@@ -102,6 +98,23 @@ Status instance_step(Instance *instance, const char *function, double t, double 
     }
     instance->floats[0] = t + dt;
     return check_outputs(instance, function);
+}
+
+Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
+    double tolerance = time_tolerance(instance);
+    if (!(fabs(t - instance->floats[0]) <= tolerance))
+        return refuse(instance, function, "the step begins at t = %.17g s where the instance is at %.17g s", t,
+                      instance->floats[0]);
+    if (!(dt > 0.0 && isfinite(dt)))
+        return refuse(instance, function, "the step size is %.17g s; it must be positive", dt);
+    if (t + dt > instance->stop_time + tolerance)
+        return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
+                      instance->stop_time);
+    if (!inputs_finite(instance, function)) return STATUS_ERROR;
+    *end = (StepEnd){false, false};
+    if (is_sampled(instance)) return sampling_step(instance, function, t, dt, end);
+    if (instance->event_mode_used && has_events(instance)) return events_step(instance, function, t, dt, end);
+    return plain_step(instance, function, t, dt);
 }
 
 Status instance_terminate(Instance *instance, const char *function) {
@@ -115,5 +128,6 @@ Status instance_reset(Instance *instance, const char *function) {
     instance->mode = INSTANTIATED;
     instance->has_outputs = instance->outputs_stale = false;
     instance->stop_time = INFINITY;
+    instance->events = (Events){0};
     return STATUS_OK;
 }

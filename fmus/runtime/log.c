@@ -1,3 +1,5 @@
+/* What the host is told. Errors are told always, as the standards recommend; warnings and notes while logging is on and
+ * their category is among those that the host has chosen. */
 #include <string.h>
 
 #include "instance.h"
@@ -21,6 +23,7 @@ Status refuse(const Instance *instance, const char *function, const char *format
 }
 
 void warn(const Instance *instance, const char *function, const char *format, ...) {
+    if (!(instance->logged & LOG_WARNINGS)) return;
     va_list arguments;
     va_start(arguments, format);
     say(instance, STATUS_WARNING, CATEGORY_WARNING, function, format, arguments);
@@ -28,7 +31,7 @@ void warn(const Instance *instance, const char *function, const char *format, ..
 }
 
 void note(const Instance *instance, const char *function, const char *format, ...) {
-    if (!instance->logging) return;
+    if (!(instance->logged & LOG_NOTES)) return;
     va_list arguments;
     va_start(arguments, format);
     say(instance, STATUS_OK, CATEGORY_ALL, function, format, arguments);
@@ -67,15 +70,17 @@ bool given(const Instance *instance, const char *function, const void *pointer, 
 Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]) {
     if (!instance) return STATUS_ERROR;
     if (n > 0 && !given(instance, function, categories, "categories")) return STATUS_ERROR;
-    bool all = n == 0;
+    unsigned logged = n == 0 ? LOG_EVERYTHING : 0;
     for (size_t i = 0; i < n; i++) {
         const char *category = categories[i] ? categories[i] : "NULL";
         if (strcmp(category, CATEGORY_ALL) == 0)
-            all = true;
-        else if (strcmp(category, CATEGORY_ERROR) != 0 && strcmp(category, CATEGORY_WARNING) != 0)
+            logged = LOG_EVERYTHING;
+        else if (strcmp(category, CATEGORY_WARNING) == 0)
+            logged |= LOG_WARNINGS;
+        else if (strcmp(category, CATEGORY_ERROR) != 0)
             return refuse(instance, function, "unknown log category '%s'; known: " CATEGORY_ERROR ", " CATEGORY_WARNING
                           ", " CATEGORY_ALL, category);
     }
-    instance->logging = on && all;
+    instance->logged = on ? logged : 0;
     return STATUS_OK;
 }

@@ -7,6 +7,8 @@
 
 #ifdef _WIN32
 #define PSAPI_VERSION 2
+#include <fcntl.h>
+#include <io.h>
 #include <windows.h>
 
 #include <psapi.h>
@@ -46,7 +48,10 @@ static char *narrow(const wchar_t *w) {
 
 void *platform_open_library(const char *path, Text *fault) {
     wchar_t *w = wide(path);
-    void *library = w ? (void *)LoadLibraryExW(w, NULL, LOAD_WITH_ALTERED_SEARCH_PATH) : NULL;
+    for (wchar_t *c = w; c && *c; c++)
+        if (*c == L'/') *c = L'\\'; /* the loader's rules speak of these only */
+    DWORD how = w && wcschr(w, L'\\') ? LOAD_WITH_ALTERED_SEARCH_PATH : 0; /* what it needs lies beside it */
+    void *library = w ? (void *)LoadLibraryExW(w, NULL, how) : NULL;
     if (!library) text_add(fault, "%s: LoadLibrary failed with code %lu", path, GetLastError());
     free(w);
     return library;
@@ -93,16 +98,41 @@ char *platform_read_file(const char *path) {
     return text;
 }
 
+/* Starts a process that writes to a pipe. Not by _wpopen, which a host with windows and no console cannot use. */
+static HANDLE start(wchar_t *command, HANDLE in) {
+    STARTUPINFOW streams = {.cb = sizeof streams, .dwFlags = STARTF_USESTDHANDLES, .hStdOutput = in};
+    PROCESS_INFORMATION made;
+    BOOL started = CreateProcessW(NULL, command, NULL, NULL, TRUE, CREATE_NO_WINDOW, NULL, NULL, &streams, &made);
+    if (started) CloseHandle(made.hThread);
+    return started ? made.hProcess : NULL;
+}
+
+/* Reads what comes out of a pipe; closes it. */
+static char *drained(HANDLE out) {
+    int number = _open_osfhandle((intptr_t)out, _O_RDONLY | _O_BINARY);
+    FILE *file = number >= 0 ? _fdopen(number, "rb") : NULL;
+    char *output = file ? read_all(file) : NULL;
+    if (file) fclose(file);
+    return output;
+}
+
 char *platform_run(const char *interpreter, const char *script) {
     Text command = {0};
-    text_add(&command, "\"\"%s\" \"%s\"\"", interpreter, script); /* cmd.exe takes the outer quotes off */
+    text_add(&command, "\"%s\" \"%s\"", interpreter, script);
     wchar_t *w = wide(text_of(&command));
-    FILE *pipe = w ? _wpopen(w, L"rb") : NULL;
-    free(w);
     text_clear(&command);
-    if (!pipe) return NULL;
-    char *output = read_all(pipe);
-    if (_pclose(pipe) == 0) return output;
+    SECURITY_ATTRIBUTES inherited = {.nLength = sizeof inherited, .bInheritHandle = TRUE};
+    HANDLE out, in;
+    if (!w || !CreatePipe(&out, &in, &inherited, 0)) return free(w), NULL;
+    SetHandleInformation(out, HANDLE_FLAG_INHERIT, 0);
+    HANDLE process = start(w, in);
+    CloseHandle(in); /* else the pipe never ends */
+    free(w);
+    char *output = drained(out);
+    DWORD status = 1;
+    if (process && WaitForSingleObject(process, INFINITE) == WAIT_OBJECT_0) GetExitCodeProcess(process, &status);
+    if (process) CloseHandle(process);
+    if (status == 0) return output;
     free(output);
     return NULL;
 }

@@ -6,6 +6,12 @@
 
 #include "text.h"
 
+#ifdef _WIN32
+#define PYTHON_ON_PATH "python" /* Python's installer makes no python3 there */
+#else
+#define PYTHON_ON_PATH "python3"
+#endif
+
 typedef void (*AnyFunction)(void);
 
 /* Loads a shared library whose symbols what is loaded later sees; on failure returns NULL and adds why to `fault`. */

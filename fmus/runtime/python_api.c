@@ -192,7 +192,7 @@ static bool search(const char *resources, Text *tried) {
     text_add(&script, "%s/sources/fmus/interpreter.py", resources);
     bool done = use_environment(tried) ||
                 use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
-                use_description(platform_run("python3", text_of(&script)), "python3 on the PATH", tried);
+                use_description(platform_run(PYTHON_ON_PATH, text_of(&script)), PYTHON_ON_PATH " on the PATH", tried);
     text_clear(&noted);
     text_clear(&script);
     text_add(tried,

@@ -147,6 +147,9 @@ static bool take_table(Instance *instance) {
     instance->n_inputs = header.inputs;
     instance->first_output = header.first_output;
     instance->n_outputs = header.outputs;
+    instance->abilities = header.abilities;
+    instance->period_counter = header.period_counter;
+    instance->period_resolution = header.period_resolution;
     return true;
 }
 
@@ -246,6 +249,22 @@ Status slave_set_state(Instance *instance, const char *function, const char *byt
     PyObject *result = state ? invoke(instance, "set_state", state, NULL) : NULL;
     Status status = result ? STATUS_OK : fail_by_exception(instance, function);
     drop(result);
+    py.PyGILState_Release(lock);
+    return status;
+}
+
+Status slave_derivative(Instance *instance, const char *function, const double seed[], double sensitivity[]) {
+    int lock = py.PyGILState_Ensure();
+    PyObject *given = py.PyBytes_FromStringAndSize((const char *)seed, (Py_ssize_t)(instance->n_inputs * sizeof *seed));
+    PyObject *bytes = given ? invoke(instance, "derivative", given, NULL) : NULL;
+    char *chars;
+    Py_ssize_t size;
+    Status status = STATUS_OK;
+    if (bytes && py.PyBytes_AsStringAndSize(bytes, &chars, &size) == 0)
+        memcpy(sensitivity, chars, instance->n_outputs * sizeof *sensitivity);
+    else
+        status = refuse_exception(instance, function);
+    drop(bytes);
     py.PyGILState_Release(lock);
     return status;
 }

@@ -12,6 +12,7 @@ typedef struct {
     uint32_t mode;
     uint8_t has_outputs, outputs_stale, unused[2];
     double stop_time;
+    Events events;
     uint64_t size;
     uint64_t digest; /* of a serialised state; it is 0 while it is worked out, and in memory */
 } StateHeader;
@@ -97,6 +98,7 @@ Status state_get(Instance *instance, const char *function, void **state) {
                                   .has_outputs = instance->has_outputs,
                                   .outputs_stale = instance->outputs_stale,
                                   .stop_time = instance->stop_time,
+                                  .events = instance->events,
                                   .size = size};
     *state = saved;
     return STATUS_OK;
@@ -112,6 +114,11 @@ Status state_set(Instance *instance, const char *function, void *state) {
     instance->has_outputs = header->has_outputs;
     instance->outputs_stale = header->outputs_stale;
     instance->stop_time = header->stop_time;
+    instance->events = header->events;
+    if (instance->events.clock_active) { /* the block's state is that of before the tick */
+        instance->events.evaluated = false;
+        instance->outputs_stale = true;
+    }
     return STATUS_OK;
 }
 

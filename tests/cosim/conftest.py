@@ -7,7 +7,9 @@ import pytest
 
 from fmus.build import build_block
 
-sys.path.insert(0, str(Path(__file__).parent))  # master_blocks
+sys.path.insert(0, str(Path(__file__).parent))  # master_blocks, decay
+
+import decay
 
 FmuOf = Callable[..., Path]
 
@@ -24,3 +26,9 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> FmuOf:
         return made[block, fmi]
 
     return build
+
+
+@pytest.fixture(scope="session")
+def decay_library(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Compile the foreign unit of decay.c."""
+    return decay.compiled(tmp_path_factory.mktemp("decay"))

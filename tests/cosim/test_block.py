@@ -1,3 +1,4 @@
+import dataclasses
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,9 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from cosim.block import Causality, DeclarationError, Kind, Variable, describe
-from cosim.ports import BLACK_1280X720, Picture1280x720, Vector3, output, parameter, port
+from cosim.block import Causality, DeclarationError, Kind, Variable, declared_variables, describe
+from cosim.ports import BLACK_1280X720, Int8, Picture1280x720, Single, UInt64, Vector3, output, parameter, port
 from cosim.units import Metre, Newton
+from cosim.width import Width
 
 
 class Phase(enum.IntEnum):
@@ -88,6 +90,12 @@ def test_a_field_without_declaration_is_refused():
         describe(Careless)
 
 
+def test_a_name_that_fmi_does_not_know_is_refused():
+    made = dataclasses.make_dataclass("Made", [("größe", Metre, port(0.0, "size"))])
+    with pytest.raises(DeclarationError, match=r"Made\.größe: a name has ASCII letters"):
+        declared_variables(made, Causality.INPUT)
+
+
 def test_feedthrough_names_ports():
     class Wrong(Gripper):
         feedthrough = {"phase": ("f_X",)}
@@ -102,3 +110,46 @@ def test_a_block_without_what_a_block_has_is_refused():
 
     with pytest.raises(DeclarationError, match=r"Bare\.period"):
         describe(Bare)
+
+
+def declared(hint: Any, field: Any) -> Variable:
+    made = dataclasses.make_dataclass("Made", [("x", hint, field)])
+    return declared_variables(made, Causality.INPUT)[0]
+
+
+def test_reals_and_integers_have_64_bits_unless_a_type_says_otherwise():
+    assert by_name(Gripper)["d"].width is by_name(Gripper)["gain"].width is Width.FLOAT64
+    assert by_name(Gripper)["seed"].width is Width.INT64
+    assert by_name(Gripper)["phase"].width is by_name(Gripper)["left"].width is None
+    assert declared(Int8, port(3, "x")).width is Width.INT8
+    for hint in (Single[Vector3[Metre]], Vector3[Single[Metre]]):
+        v = declared(hint, port(np.full(3, 0.1), "x"))
+        assert (v.width, v.shape, v.unit.symbol) == (Width.FLOAT32, (3,), "m")
+        assert v.start.tolist() == [float(np.float32(0.1))] * 3
+
+
+def test_start_and_bounds_of_a_single_are_what_a_host_sees_of_them():
+    v = declared(Single[Metre], port(0.3, "x", minimum=0.1, maximum=0.3))
+    assert (v.minimum, v.maximum, v.start) == tuple(float(np.float32(x)) for x in (0.1, 0.3, 0.3))
+
+
+@pytest.mark.parametrize(
+    ("hint", "field", "told"),
+    [
+        (Int8, port(128, "x"), r"Made\.x: start 128 does not fit Int8 \(from -128 to 127\)"),
+        (Int8, port(0, "x", minimum=-129), "minimum -129 does not fit Int8"),
+        (UInt64, port(-1, "x"), "start -1 does not fit UInt64"),
+        (int, port(2**63, "x"), "start 9223372036854775808 does not fit Int64"),
+        (Single[Metre], port(0.0, "x", maximum=1e39), r"maximum 1e\+39 does not fit Float32"),
+        (Single[Vector3[Metre]], port(np.array([0.0, -1e39, 0.0]), "x"), r"start -1e\+39 does not fit Float32"),
+        (Metre, port(3.0, "x", maximum=2.0), r"Made\.x: start 3\.0 is not between -inf and 2, its bounds"),
+        (Vector3[Metre], port(np.array([1.0, -1.0, 1.0]), "x", minimum=0.0), r"start -1\.0 is not between 0 and inf"),
+        (Phase, port(Phase.CLOSED, "x", maximum=0), "start 1 is not between"),
+        (Single[int], port(0, "x"), "Float32 is not the type of integer values"),
+        (Single[bool], port(start=False, description="x"), "Float32 is not the type of boolean values"),
+        (Vector3[Int8], port(np.zeros(3), "x"), "arrays have real entries"),
+    ],
+)
+def test_what_does_not_fit_its_type_is_refused(hint: Any, field: Any, told: str):
+    with pytest.raises(DeclarationError, match=told):
+        declared(hint, field)

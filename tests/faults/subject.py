@@ -119,9 +119,9 @@ class Subject:
         return False
 
     def expect_log_line(self, function: str) -> None:
-        """Raise a fault if no message begins with the function's name."""
-        start = f"fmi{self.unit.fmi}{self.spelt(function)}: "
-        if not any(line.startswith(start) and len(line) > len(start) + 5 for line in self.log):
+        """Raise a fault if no message names the function and the reason."""
+        name = f"fmi{self.unit.fmi}{self.spelt(function)}: "
+        if not any(len(line.partition(name)[2]) > 5 for line in self.log):
             raise Fault(f"{function} is answered with an error and no log line: {self.log}")
 
     def expect_refusal(self, function: str, *arguments: Any) -> None:

@@ -34,7 +34,11 @@ class CtypesHost:
 
     Attributes:
         log: messages so far, as the host gets them.
+        categories: their categories.
+        names: the instance's name with each, in FMI 2.
+        logging: whether the next instance is made with logging on.
         references: value references by variable's name; of an array in FMI 2 that of its first entry.
+        event_needed, terminate, early, last_time: what the last step answered (FMI 3).
     """
 
     def __init__(self, fmu: Path, fmi: int, prefix: str = "a 100% größerer Ordner ") -> None:
@@ -53,11 +57,14 @@ class CtypesHost:
         suffix = library(host_platform(), fmi).suffix
         self.library = ctypes.CDLL(str(self.folder / "binaries" / folder / (root.attrib["modelName"] + suffix)))
         self.instance: int | None = None
-        self._log2 = Log2(lambda *arguments: self.log.append(arguments[-1].decode()))
-        self._log3 = Log3(lambda *arguments: self.log.append(arguments[-1].decode()))
+        self.categories: list[str] = []
+        self.names: list[str] = []
+        self.logging = False
+        self._log2 = Log2(self._take_2)
+        self.logger3 = Log3(self._take_3)
         self.callbacks = Callbacks(logger=self._log2)
 
-    def instantiate(self, token: str | None = None, *, event_mode: bool = False) -> bool:
+    def instantiate(self, token: str | None = None, *, event_mode: bool = False, early_return: bool = False) -> bool:
         """Make the instance; tell whether it was made."""
         given = (token or self.token).encode()
         resources = self.folder / "resources"
@@ -70,16 +77,25 @@ class CtypesHost:
                 resources.as_uri().encode(),
                 ctypes.byref(self.callbacks),
                 0,
-                0,
+                int(self.logging),
             )
         else:
             make = self.library.fmi3InstantiateCoSimulation
-            flags = (BOOL(False), BOOL(False), BOOL(event_mode), BOOL(False))
+            flags = (BOOL(False), BOOL(False), BOOL(event_mode), BOOL(early_return))
             path = f"{resources}/".encode()
-            arguments = (b"x", given, path, *flags, None, SIZE(0), None, self._log3, None)
+            flags = (flags[0], BOOL(self.logging), *flags[2:])
+            arguments = (b"x", given, path, *flags, None, SIZE(0), None, self.logger3, None)
         make.restype = ctypes.c_void_p
         self.instance = make(*arguments)
         return self.instance is not None
+
+    def _take_2(self, _environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self.names.append(name.decode())
+        self._take_3(_environment, status, category, message)
+
+    def _take_3(self, _environment: object, _status: int, category: bytes, message: bytes) -> None:
+        self.categories.append(category.decode())
+        self.log.append(message.decode())
 
     def call(self, function: str, *arguments: Any) -> int:
         """Call fmi2... or fmi3... with the instance; return the status."""
@@ -105,7 +121,24 @@ class CtypesHost:
         flags = (BOOL * 3)()
         last = DOUBLE()
         pointers = [ctypes.byref(flags, i) for i in range(3)]
-        return self.call("DoStep", DOUBLE(t), DOUBLE(dt), BOOL(False), *pointers, ctypes.byref(last))
+        status = self.call("DoStep", DOUBLE(t), DOUBLE(dt), BOOL(False), *pointers, ctypes.byref(last))
+        self.event_needed, self.terminate, self.early = flags
+        self.last_time = last.value
+        return status
+
+    def update(self) -> int:
+        """Update discrete states in event mode; `next_event` is then the time of the next event, or None."""
+        flags, time = (BOOL * 5)(*[True] * 5), DOUBLE(-1.0)
+        pointers = [ctypes.byref(flags, i) for i in range(5)]
+        status = self.call("UpdateDiscreteStates", *pointers, ctypes.byref(time))
+        assert status != OK or list(flags)[:4] == [False] * 4
+        self.next_event = time.value if flags[4] else None
+        return status
+
+    def set_clock(self, value: bool = True) -> int:
+        """Activate the unit's clock."""
+        reference = ctypes.c_uint32(self.references["sample_clock"])
+        return self.call("SetClock", ctypes.byref(reference), SIZE(1), ctypes.byref(BOOL(value)))
 
     def set(self, name: str, values: Sequence[float]) -> int:
         """Set a real variable, by the name of its first entry in FMI 2."""

@@ -168,30 +168,14 @@ def test_outputs_at_the_start_that_are_not_finite_are_a_failure(workshop: Worksh
     assert "output 'b' is inf" in host.log[-1]
 
 
-def test_a_step_that_is_not_a_sampled_blocks_period_is_refused_and_changes_nothing(workshop: Workshop):
-    host = workshop.host("eye:Eye", 3)
-    assert host.initialise() == OK
-    for dt in (1 / 30 + 1e-6, 0.1):
-        assert host.step(0.0, dt) == ERROR
-        assert "Eye is sampled, each of its steps is its period, 0.0333" in host.log[-1]
-    assert host.step(0.0, 1 / 30 + 1e-9) == OK
-
-
 def test_an_output_of_the_wrong_shape_is_an_error_that_names_it(workshop: Workshop):
     host = workshop.host("careless:Careless", 3)
     assert host.initialise() == ERROR
     assert "output 'p' is declared as array of shape (3,); the block gave float64 array of shape (1,)" in host.log[-1]
 
 
-def test_event_mode_is_passed_through_when_a_host_insists(workshop: Workshop):
+def test_event_mode_is_refused_to_a_unit_that_has_none(workshop: Workshop):
     host = workshop.host(BLOCK, 3)
     host.free()
-    assert host.instantiate(event_mode=True)
-    host.initialise()
-    assert host.step(0.0, 0.1) == ERROR
-    flags, time = (ctypes.c_bool * 5)(*[True] * 5), DOUBLE()
-    pointers = [ctypes.byref(flags, i) for i in range(5)]
-    assert host.call("UpdateDiscreteStates", *pointers, ctypes.byref(time)) == OK
-    assert list(flags) == [False] * 5
-    assert host.call("EnterStepMode") == OK
-    assert host.step(0.0, 0.1) == OK
+    assert not host.instantiate(event_mode=True)
+    assert "the unit has no event mode (hasEventMode is false)" in host.log[-1]

@@ -86,8 +86,9 @@ def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop,
     unit = json.loads(file.read_text())
     unit["packages"] = [{"module": "numpy", "distribution": "numpy", "version": built}]
     file.write_text(json.dumps(unit))
+    host.logging = True
     assert host.instantiate()
-    expected = [f"fmi3InstantiateCoSimulation: numpy: built with {built}, found {here}"]
+    expected = [f"x: fmi3InstantiateCoSimulation: numpy: built with {built}, found {here}"]
     assert host.log == (expected if warned else [])
 
 

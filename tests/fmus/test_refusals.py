@@ -70,12 +70,17 @@ def test_no_variables_set_is_no_change(workshop: Workshop, fmi: int):
     assert state_of(host) == before
 
 
-def test_a_step_that_is_not_the_period_changes_nothing(workshop: Workshop):
-    host = workshop.host("eye:Eye", 3)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_step_with_an_unknown_item_of_an_enumeration_changes_nothing(workshop: Workshop, fmi: int):
+    host = workshop.host("every_kind:EveryKind", fmi)
     assert host.initialise() == OK
+    assert host.step(0.0, DT) == OK
+    reference, value = ctypes.c_uint32(host.references["mood_in"]), ctypes.c_int64(99)
+    kind, more = ("Integer", ()) if fmi == 2 else ("Int64", (SIZE(1),))
+    assert host.call(f"Set{kind}", ctypes.byref(reference), SIZE(1), ctypes.byref(value), *more) == OK
     before = state_of(host)
-    assert host.step(0.0, 0.5) == ERROR
-    assert "its period" in host.log[-1]
+    assert host.step(DT, 2 * DT) == ERROR
+    assert "input 'mood_in' is 99" in host.log[-1]
     assert state_of(host) == before
 
 

@@ -18,9 +18,13 @@ class Workshop:
         made = self.folder / f"{block.rpartition(':')[2]}.fmi{fmi}.fmu"
         return made if made.is_file() else build_block(f"sample_units.{block}", fmi, self.folder)
 
-    def host(self, block: str, fmi: int) -> CtypesHost:
+    def scalar_fmu(self, block: str) -> Path:
+        made = self.folder / f"{block.rpartition(':')[2]}.fmi3-scalar.fmu"
+        return made if made.is_file() else build_block(f"sample_units.{block}", 3, self.folder, scalar=True)
+
+    def host(self, block: str, fmi: int, *, event_mode: bool = False, early_return: bool = False) -> CtypesHost:
         """Return a host with an instance of a block's FMU."""
         host = CtypesHost(self.fmu(block, fmi), fmi)
         self.open.append(host)
-        host.instantiate()
+        host.instantiate(event_mode=event_mode, early_return=early_return)
         return host

@@ -173,6 +173,15 @@ def test_build_writes_the_files_it_names(tmp_path: Path):
     assert sorted(p.name for p in tmp_path.iterdir()) == names
 
 
+def test_build_scalar_writes_fmi_3_without_arrays(tmp_path: Path):
+    result = call("build", "VisualServo", "--scalar", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["VisualServo.fmi2.fmu", "VisualServo.fmi3-scalar.fmu"]
+    result = call("build", "VisualServo", "--fmi", "2", "--scalar", "--out", tmp_path / "two")
+    assert result.exit_code == 0, result.output
+    assert [p.name for p in (tmp_path / "two").iterdir()] == ["VisualServo.fmi2.fmu"]
+
+
 def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(tmp_path: Path):
     failing = build_block("failing_arm:FailingArm", 3, tmp_path, step=Fraction(1, 50))
     out = tmp_path / "out"

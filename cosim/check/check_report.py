@@ -1,0 +1,66 @@
+"""What a check of one file came to."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.check.finding import Finding, Level
+
+
+@dataclass(frozen=True)
+class Section:
+    """One group of checks.
+
+    Attributes:
+        name: its name.
+        told: what was looked at, in a few words; of a group that was not reached, why.
+        findings: what was found.
+        reached: whether it was carried out.
+    """
+
+    name: str
+    told: str
+    findings: tuple[Finding, ...] = ()
+    reached: bool = True
+
+    @property
+    def level(self) -> Level:
+        """The level of the worst finding."""
+        return max((f.level for f in self.findings), default=Level.OK)
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """The sections of one file's check, in the order in which they were carried out."""
+
+    path: Path
+    sections: Sequence[Section]
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is no fault."""
+        return self.count(Level.FAULT) == 0
+
+    def count(self, level: Level) -> int:
+        """Return the number of findings of a level."""
+        return sum(f.level is level for s in self.sections for f in s.findings)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the report as JSON's kinds of values."""
+        return {
+            "file": str(self.path),
+            "passed": self.passed,
+            "checks": [
+                {
+                    "name": s.name,
+                    "result": s.level.name.lower() if s.reached else "not reached",
+                    "told": s.told,
+                    "findings": [
+                        {"level": f.level.name.lower(), "where": f.where, "what": f.what, "cure": f.cure, "log": f.log}
+                        for f in s.findings
+                    ],
+                }
+                for s in self.sections
+            ],
+        }

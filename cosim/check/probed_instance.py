@@ -1,0 +1,158 @@
+"""An instance that notes each call before it is made, and that can be reset and rolled back."""
+
+import ctypes
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Kind
+from cosim.check.journal import Journal
+from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.instance import Instance
+from cosim.signal_buffer import SignalBuffer
+
+_WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
+
+
+class ProbedInstance(Instance):
+    """A unit under test. Its inputs, strings and binaries aside, are held at their start values.
+
+    Raises:
+        InvalidFmu: as `Instance`.
+    """
+
+    def __init__(self, name: str, description: FmuDescription, folder: Path, journal: Journal) -> None:
+        self._journal = journal
+        journal.begins(f"fmi{description.fmi}Instantiate" + ("CoSimulation" if description.fmi == 3 else ""))
+        held = [p.name for p in description.inputs.values() if p.kind not in _WITHOUT_NUMBERS]
+        super().__init__(name, description, folder, held)
+
+    def start(self, t: float) -> None:
+        """Set start values and go through initialisation mode; the outputs are read."""
+        self.time = t
+        starts = self._starts()
+        self.set_start(starts)
+        for name, views in self.u.items():
+            if name in starts:
+                views[0][:] = np.asarray(starts[name]).reshape(-1)
+        self.enter_initialization(t, None)
+        self.exit_initialization()
+        self.get_outputs()
+
+    def advance(self, dt: float) -> None:
+        """Set the inputs, do a step and read the outputs, as the master does."""
+        self.set_inputs()
+        self.step(self.time, dt)
+        self.get_outputs()
+
+    def step(self, t: float, dt: float) -> None:
+        """Note the step and do it."""
+        self._journal.begins(f"{self._prefix}DoStep", t)
+        super().step(t, dt)
+
+    def seen(self) -> dict[str, bytes]:
+        """Return the outputs as bytes, by name."""
+        return {name: _bytes_of(self.description.outputs[name], views) for name, views in self.y.items()}
+
+    def reset(self) -> None:
+        """Reset the unit to what it was after instantiation."""
+        self._call("Reset")
+
+    def keep_state(self) -> Any:
+        """Return the unit's state."""
+        state = ctypes.c_void_p()
+        self._call(self._state("GetFMU"), ctypes.byref(state))
+        return state
+
+    def restore(self, state: Any, t: float) -> None:
+        """Go back to a state that was kept at time t; the outputs are read."""
+        self._call(self._state("SetFMU"), state)
+        self.time = t
+        self.get_outputs()
+
+    def drop_state(self, state: Any) -> None:
+        """Free a state."""
+        self._call(self._state("FreeFMU"), ctypes.byref(state))
+
+    def serialised(self, state: Any) -> bytes:
+        """Return a state as bytes."""
+        size = ctypes.c_size_t()
+        self._call(f"{self._state('SerializedFMU')}Size", state, ctypes.byref(size))
+        content = ctypes.create_string_buffer(size.value)
+        self._call(self._state("SerializeFMU"), state, self._as_bytes(content), size.value)
+        return content.raw
+
+    def deserialised(self, content: bytes) -> Any:
+        """Return a state made of bytes."""
+        state = ctypes.c_void_p()
+        given = ctypes.create_string_buffer(content, len(content))
+        verb = "DeSerializeFMU" if self._fmi == 2 else "DeserializeFMU"
+        self._call(self._state(verb), self._as_bytes(given), len(content), ctypes.byref(state))
+        return state
+
+    def free(self) -> None:
+        """Note the freeing and do it."""
+        self._journal.begins(f"{self._prefix}FreeInstance")
+        super().free()
+
+    def _starts(self) -> Mapping[str, Any]:
+        """Return the start values of parameters and inputs that have one which can be set."""
+        ports = {**self.description.parameters, **self.description.inputs}
+        starts = {name: _start_of(p) for name, p in ports.items()}
+        return {name: value for name, value in starts.items() if value is not None}
+
+    def _state(self, verb: str) -> str:
+        return f"{verb}{'state' if self._fmi == 2 else 'State'}"
+
+    def _as_bytes(self, buffer: Any) -> Any:
+        return ctypes.cast(buffer, ctypes.POINTER(ctypes.c_char if self._fmi == 2 else ctypes.c_uint8))
+
+    def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
+        for buffer in buffers:
+            self._journal.begins(f"{buffer.name} of {', '.join(list(buffer.views)[:5])}", self.time)
+            super()._carry_out([buffer])
+
+    def _set_one(self, port: FmuPort, value: Any) -> None:
+        self._journal.begins(f"setting {port.name}")
+        super()._set_one(port, value)
+
+    def _take_log_line(self, status: int, message: str) -> None:
+        super()._take_log_line(status, message)
+        if status > 0:
+            self._journal.logs(message)
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        self._journal.begins(self._prefix + name, self.time)
+        super()._call(name, *arguments)
+
+
+def _start_of(port: FmuPort) -> Any:
+    """Return a port's start value as `Instance.set_start` takes it; None where there is none, or none that can be read.
+
+    Of strings and binaries only scalars are set, as by the master.
+    """
+    if port.start is None or (port.kind in _WITHOUT_NUMBERS and port.shape):
+        return None
+    if port.kind is Kind.STRING:
+        return port.start
+    try:
+        if port.kind is Kind.BINARY:
+            return bytes.fromhex(port.start)
+        if port.kind is Kind.BOOLEAN:
+            values: list[Any] = [word in ("true", "1") for word in port.start.split()]
+        else:
+            values = [float(w) if port.kind is Kind.REAL else int(w) for w in port.start.split()]
+        return np.array(values * port.size if len(values) == 1 else values).reshape(port.shape)
+    except ValueError:
+        return None
+
+
+def _bytes_of(port: FmuPort, views: tuple[Any, ...]) -> bytes:
+    if port.kind is Kind.STRING:
+        return b"\0".join(ctypes.string_at(int(a)) if a else b"" for a in views[0])
+    if port.kind is Kind.BINARY:
+        pairs = zip(views[0], views[1], strict=True)
+        return b"\0".join(ctypes.string_at(int(a), int(n)) if a else b"" for a, n in pairs)
+    return views[0].tobytes()

@@ -1,0 +1,183 @@
+"""A short run of one unit through the calls that a master makes."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.block import Kind
+from cosim.check.finding import Finding, fault, warning
+from cosim.check.journal import Journal
+from cosim.check.probed_instance import ProbedInstance
+from cosim.exceptions import InvalidFmu, UnitFailure
+from cosim.fmu_description import FmuDescription, FmuPort
+
+STEPS = 10
+_REPEATED = 5  # steps that are done again from a state
+
+
+@dataclass
+class SmokeRun:
+    """Instantiate, initialise, steps, state, a second instance, reset, terminate, free.
+
+    Attributes:
+        description: what the FMU says of itself.
+        folder: where it is unpacked.
+        journal: where calls and findings are told.
+        start: time of the start, in seconds.
+        step: communication step, in seconds.
+        keeps_state: whether it says that its state can be kept and restored.
+        serialises: whether it says that its state can be made bytes.
+        allows_two: whether it allows two instances in a process.
+    """
+
+    description: FmuDescription
+    folder: Path
+    journal: Journal
+    start: float
+    step: float
+    keeps_state: bool
+    serialises: bool
+    allows_two: bool
+    _told: set[str] = field(default_factory=set[str])
+
+    def carry_out(self) -> None:
+        """Do it all, until a call fails; tell the journal what is found."""
+        try:
+            unit = self._instance("unit")
+        except InvalidFmu as e:
+            self.journal.found(fault(e.fault, where="instantiation"))
+            return
+        try:
+            self._run(unit)
+        except UnitFailure as e:
+            self.journal.found(failure(e))
+        except InvalidFmu as e:
+            self.journal.found(fault(f"a second instance beside the first: {e.fault}", where="instantiation"))
+        finally:
+            unit.free()
+
+    def _run(self, unit: ProbedInstance) -> None:
+        unit.start(self.start)
+        at_start = unit.seen()
+        self._tell_values(unit)
+        for _ in range(STEPS - _REPEATED):
+            unit.advance(self.step)
+            self._tell_values(unit)
+        steps = self._steps_from_a_state(unit) if self.keeps_state else self._steps(unit)
+        self.journal.tells(steps=STEPS, step=self.step)
+        if self.allows_two:
+            self._beside(unit, at_start, steps)
+        unit.reset()
+        unit.start(self.start)
+        self._compare(
+            at_start,
+            unit.seen(),
+            f"fmi{self.description.fmi}Reset",
+            "a reset unit starts with other outputs than a new one",
+        )
+        unit.advance(self.step)
+        unit.end()
+        self.journal.tells(ended=True)
+
+    def _instance(self, name: str) -> ProbedInstance:
+        return ProbedInstance(name, self.description, self.folder, self.journal)
+
+    def _steps(self, unit: ProbedInstance) -> list[dict[str, bytes]]:
+        seen: list[dict[str, bytes]] = []
+        for _ in range(_REPEATED):
+            unit.advance(self.step)
+            self._tell_values(unit)
+            seen.append(unit.seen())
+        return seen
+
+    def _steps_from_a_state(self, unit: ProbedInstance) -> list[dict[str, bytes]]:
+        """Do steps, go back and do them again, with the state as it was kept and as bytes."""
+        t, before = unit.time, unit.seen()
+        state = unit.keep_state()
+        seen = self._steps(unit)
+        two = self.description.fmi == 2
+        same = self._again(unit, state, t, [before, *seen], f"fmi{'2SetFMUstate' if two else '3SetFMUState'}")
+        if self.serialises and same:
+            made = unit.deserialised(unit.serialised(state))
+            call = "fmi2DeSerializeFMUstate" if two else "fmi3DeserializeFMUState"
+            self._again(unit, made, t, [before, *seen], call)
+            unit.drop_state(made)
+        unit.drop_state(state)
+        return seen
+
+    def _again(self, unit: ProbedInstance, state: Any, t: float, expected: list[dict[str, bytes]], call: str) -> bool:
+        """Go back, do the steps again, and tell whether the outputs are the same."""
+        unit.restore(state, t)
+        after = unit.seen()
+        for first, second in zip(expected, [after, *self._steps(unit)], strict=True):
+            what = f"steps from a restored state (t = {t:.6g} s) give other outputs than the first time"
+            if self._compare(first, second, call, what, tell=fault, cure="the state must hold all that changes"):
+                return False
+        return True
+
+    def _beside(self, unit: ProbedInstance, at_start: dict[str, bytes], steps: list[dict[str, bytes]]) -> None:
+        """Run a second instance beside the first: it does the same, and the first does not notice."""
+        before = unit.seen()
+        second = self._instance("second")
+        try:
+            second.start(self.start)
+            told = "a second instance"
+            if not self._compare(at_start, second.seen(), told, "it starts with other outputs than the first"):
+                for _ in range(STEPS - _REPEATED):
+                    second.advance(self.step)
+                self._compare(steps[-1], self._steps(second)[-1], told, "its outputs differ from the first's")
+            unit.get_outputs()
+            self._compare(before, unit.seen(), told, "its steps changed the first one's outputs", tell=fault)
+            second.end()
+        finally:
+            second.free()
+
+    def _compare(
+        self,
+        a: Mapping[str, bytes],
+        b: Mapping[str, bytes],
+        where: str,
+        what: str,
+        *,
+        tell: Any = warning,
+        cure: str = "",
+    ) -> bool:
+        """Tell, and return, whether outputs differ."""
+        different = [name for name, content in a.items() if b[name] != content]
+        if different:
+            names = ", ".join(different[:5]) + (f" and {len(different) - 5} more" if len(different) > 5 else "")
+            self.journal.found(tell(f"{what}: {names}", where=where, cure=cure))
+        return bool(different)
+
+    def _tell_values(self, unit: ProbedInstance) -> None:
+        """Tell of outputs with values that cannot be, of each the first time."""
+        for name, views in unit.y.items():
+            for finding in (
+                () if name in self._told else _value_findings(self.description.outputs[name], views[0], unit.time)
+            ):
+                self._told.add(name)
+                self.journal.found(finding)
+
+
+def failure(e: UnitFailure) -> Finding:
+    """Return a failed call as a finding, with the unit's log."""
+    lines = tuple(line for entry in e.log for line in entry.splitlines() if line.strip())
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=lines[-12:])
+
+
+def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
+    where = f"output {port.name!r} at t = {t:.6g} s"
+    if port.kind is Kind.REAL and not np.all(np.isfinite(values)):
+        yield fault(f"not finite: {float(values[~np.isfinite(values)][0])}", where=where)
+    elif port.kind in (Kind.REAL, Kind.INTEGER):
+        low, high = port.minimum, port.maximum
+        out = [x for x in values.tolist() if (low is not None and x < low) or (high is not None and x > high)]
+        if out:
+            yield warning(f"{out[0]:g} is out of its declared range", where=where)
+    elif port.kind is Kind.ENUMERATION and (
+        wrong := [x for x in values.tolist() if x not in [value for _, value in port.items]]
+    ):
+        yield warning(f"{wrong[0]} is no item of its type", where=where)

@@ -1,0 +1,158 @@
+"""What a model description says of its variables, as far as it matters in a run and FMPy does not look at it."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from cosim.check.described_variable import REALS, DescribedVariable
+from cosim.check.finding import Finding, fault, warning
+from cosim.fmu_xml import XmlElement
+
+_CLASSES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+
+
+def variable_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
+    """Yield what is wrong with variables' start values, ranges, types, dimensions and value references."""
+    types = _declared_types(root, fmi)
+    starts_of = {v.reference: v.values.get("start") for v in variables}
+    for v in variables:
+        declared = types.get(v.values.get("declaredType"))
+        yield from _range_findings(v, declared)
+        yield from _start_findings(v, declared, v.shape(starts_of))
+        if v.type == "Enumeration":
+            yield from _enumeration_findings(v, declared)
+    yield from _unit_findings(root, variables, types)
+    if fmi == 2:
+        yield from _shared_references(variables)
+    else:
+        yield from _dimension_findings(variables)
+
+
+def _declared_types(root: XmlElement, fmi: int) -> dict[str, XmlElement]:
+    """Return the elements that hold the attributes of declared types, by the types' names."""
+    if fmi == 3:
+        return {t.get("name"): t for group in root.named("TypeDefinitions") for t in group.children}
+    simple = root.named("TypeDefinitions", "SimpleType")
+    return {t.get("name"): t.children[0] for t in simple if t.children}
+
+
+def _range(v: DescribedVariable, declared: XmlElement | None) -> tuple[float, float]:
+    """Return the bounds of a variable's values; those that cannot be read are told elsewhere."""
+    bounds: list[float] = []
+    for name, none in (("min", -math.inf), ("max", math.inf)):
+        text = v.values.attributes.get(name) or (declared.attributes.get(name) if declared else None)
+        try:
+            bounds.append(float(v.parsed(text)) if text else none)
+        except ValueError:
+            bounds.append(none)
+    return bounds[0], bounds[1]
+
+
+def _range_findings(v: DescribedVariable, declared: XmlElement | None) -> Iterator[Finding]:
+    if v.type in ("String", "Boolean", "Binary", "Clock"):
+        return
+    for name in ("min", "max"):
+        if text := v.values.attributes.get(name):
+            try:
+                v.parsed(text)
+            except ValueError as e:
+                yield fault(f"{name} {e}", where=v.where)
+    low, high = _range(v, declared)
+    if low > high:
+        yield fault(f"its min {low:g} is above its max {high:g}", where=v.where)
+
+
+def _start_findings(
+    v: DescribedVariable, declared: XmlElement | None, shape: tuple[int, ...] | None
+) -> Iterator[Finding]:
+    if v.starts is None or v.type == "Clock":
+        return
+    n = math.prod(shape) if shape is not None else None
+    if n is not None and len(v.starts) not in (1, n):
+        told = f"{len(v.starts)} start values for {n} entries, shape [{','.join(map(str, shape or ()))}]"
+        yield fault(told, where=v.where, cure="one for each entry, or one for all")
+    low, high = _range(v, declared)
+    for text in v.starts:
+        try:
+            value = v.parsed(text)
+        except ValueError as e:
+            yield fault(f"start value {e}", where=v.where)
+            return
+        if isinstance(value, str):
+            continue
+        if isinstance(value, float) and not math.isfinite(value):
+            yield warning(f"start value {text} is not finite", where=v.where)
+            return
+        if v.type != "Enumeration" and v.type != "Boolean" and not low <= value <= high:
+            yield fault(f"start value {text} is out of its range, from {low:g} to {high:g}", where=v.where)
+            return
+
+
+def _enumeration_findings(v: DescribedVariable, declared: XmlElement | None) -> Iterator[Finding]:
+    name = v.values.get("declaredType")
+    if declared is None:
+        what = f"its type {name!r} is not defined" if name else "an enumeration without a declaredType"
+        yield fault(what, where=v.where, cure="a type with its items is wanted in TypeDefinitions")
+        return
+    items = [i.get("value") for i in declared.named("Item")]
+    if len(set(items)) < len(items):
+        yield fault(f"its type {name!r} (line {declared.line}) has a value twice", where=v.where)
+    wrong = [s for s in v.starts or () if s not in items]
+    if wrong:
+        cure = f"valid: {', '.join(items[:20])}"
+        yield fault(f"start value {wrong[0]} is no item of its type {name!r}", where=v.where, cure=cure)
+
+
+def _unit_findings(
+    root: XmlElement, variables: Sequence[DescribedVariable], types: dict[str, XmlElement]
+) -> Iterator[Finding]:
+    """Yield display units without a unit: FMPy's validation stops at them without a word."""
+    known = {u.get("name") for u in root.named("UnitDefinitions", "Unit")}
+    for v in variables:
+        declared = types.get(v.values.get("declaredType"))
+        unit = v.values.get("unit") or (declared.get("unit") if declared else "")
+        display = v.values.get("displayUnit")
+        if display and unit not in known:
+            what = (
+                f"has the display unit {display!r}, but its unit {unit!r} is not defined"
+                if unit
+                else (f"has the display unit {display!r}, but no unit")
+            )
+            yield fault(what, where=v.where, cure="define the unit in UnitDefinitions")
+        if v.type not in REALS and v.values.get("unit"):
+            yield fault(f"is of type {v.type} and has a unit", where=v.where, cure="only real variables have one")
+
+
+def _shared_references(variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
+    """Yield what FMI 2 forbids of aliases: value references are shared within a type, and one at most can be set."""
+    groups: dict[tuple[str, str], list[DescribedVariable]] = defaultdict(list)
+    for v in variables:
+        groups[_CLASSES[v.type], v.reference].append(v)
+    for (_, reference), sharing in groups.items():
+        types = {v.type for v in sharing}
+        settable = [v for v in sharing if v.causality in ("input", "parameter")]
+        if len(types) > 1:
+            names = " and ".join(v.name for v in sharing[:3])
+            yield fault(
+                f"{names} share the value reference {reference}, but are of different types", where=sharing[1].where
+            )
+        for first, second in pairwise(settable):
+            what = f"can be set and shares the value reference {reference} with {first.name!r}, which can be set too"
+            yield fault(what, where=second.where, cure="of aliases, one at most is an input or a parameter")
+
+
+def _dimension_findings(variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
+    by_reference = {v.reference: v for v in variables}
+    for v in variables:
+        for d in v.element.named("Dimension"):
+            reference = d.get("valueReference")
+            sizing = by_reference.get(reference)
+            if reference and sizing is None:
+                yield fault(f"its dimension has the value reference {reference}, which no variable has", where=v.where)
+            elif sizing is not None and (sizing.type != "UInt64" or sizing.causality != "structuralParameter"):
+                if not (sizing.type == "UInt64" and sizing.element.get("variability") == "constant"):
+                    what = f"its dimension is {sizing.name!r}, a {sizing.causality} of type {sizing.type}"
+                    yield fault(what, where=v.where, cure="a structural parameter of type UInt64 is right")
+            elif not reference and d.get("start") == "0":
+                yield fault("has a dimension of 0", where=v.where)

@@ -1,0 +1,143 @@
+"""Runs a part of a check in a process of its own, which may crash or hang, and reads what it told."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cosim.check.finding import Finding, Level, fault, warning
+
+_START = """
+import importlib, json, sys
+task = json.loads(sys.argv[1])
+sys.path[:] = task["path"]
+importlib.import_module(task["module"]).main(task)
+"""
+_MOST_LINES = 8
+_MEANINGS = {
+    "SIGSEGV": "it used memory that is not its own",
+    "SIGBUS": "it used memory that is not there",
+    "SIGABRT": "it gave up: abort(), a failed assertion or a C++ exception that nothing caught",
+    "SIGILL": "it has an instruction that this processor does not know",
+    "SIGFPE": "it divided an integer by zero",
+    "SIGKILL": "the system ended it, perhaps for want of memory",
+}
+_WINDOWS = {0xC0000005: "SIGSEGV", 0xC000001D: "SIGILL", 0xC0000094: "SIGFPE", 0xC0000409: "SIGABRT"}
+
+
+@dataclass
+class Watched:
+    """What a process told, and how it ended.
+
+    Attributes:
+        findings: what it found, and how it ended if not as it should.
+        facts: what else it told.
+        ended: whether it carried out everything.
+    """
+
+    findings: list[Finding] = field(default_factory=list[Finding])
+    facts: dict[str, Any] = field(default_factory=dict[str, Any])
+    ended: bool = False
+
+
+def watch(module: str, task: Mapping[str, Any], folder: Path, timeout: float) -> Watched:
+    """Run a module's `main` with a task in a process of its own, for at most `timeout` seconds; `folder` is scratch."""
+    name = module.rpartition(".")[2]
+    journal, output = folder / f"{name}.jsonl", folder / f"{name}.txt"
+    journal.touch()
+    whole = {**task, "module": module, "path": sys.path, "journal": str(journal)}
+    with output.open("wb") as written:
+        process = subprocess.Popen(
+            [sys.executable, "-c", _START, json.dumps(whole)],
+            stdin=subprocess.DEVNULL,
+            stdout=written,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            code = process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            code = None
+        finally:
+            _end(process)
+    return _told(journal, output, code, timeout)
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    """End the process and what it started, if any of it is left."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.wait()
+
+
+def _told(journal: Path, output: Path, code: int | None, timeout: float) -> Watched:
+    watched = Watched()
+    call, t = "the process's start", None
+    logged: list[str] = []
+    for line in journal.read_text(encoding="utf-8").splitlines():
+        try:
+            told: dict[str, Any] = json.loads(line)
+        except ValueError:  # cut off where the process was ended
+            continue
+        if "call" in told:
+            call, t = str(told["call"]), told["t"]
+        elif "log of the unit" in told:
+            logged = [*logged, *str(told["log of the unit"]).splitlines()][-_MOST_LINES:]
+        elif "facts" in told:
+            watched.facts.update(told["facts"])
+        elif "end" in told:
+            watched.ended = True
+        else:
+            watched.findings.append(_finding(told))
+    at = call if t is None else f"{call} at t = {t:.6g} s"
+    if code is None:
+        cure = "if it only needs longer: --timeout"
+        watched.findings.append(
+            fault(f"{at} was not done after {timeout:g} s", cure=cure, log=(*logged, *_last_lines(output)))
+        )
+    elif not watched.ended:
+        watched.findings.append(_end_of_process(at, code, (*logged, *_last_lines(output))))
+    elif code != 0:
+        watched.findings.append(warning(f"{_how(code)} at the end of its process", cure="after everything was freed"))
+    return watched
+
+
+def _finding(told: Mapping[str, Any]) -> Finding:
+    level, log = Level(told["level"]), tuple(told["log"])
+    return Finding(level=level, what=told["what"], where=told["where"], cure=told["cure"], log=log)
+
+
+def _end_of_process(at: str, code: int, lines: tuple[str, ...]) -> Finding:
+    if code == 1 and any(line.startswith("Traceback ") for line in lines):
+        return fault(f"the check itself failed in {at}; this is not the FMU's fault", log=lines)
+    how = _how(code)
+    meaning = _MEANINGS.get(how.removeprefix("crashed with "), "a unit must not end its host's process")
+    return fault(f"{how} in {at}: {meaning}", log=lines)
+
+
+def _how(code: int) -> str:
+    """Return how a process ended, by its status: with a signal's name where it was one."""
+    if code < 0:
+        with contextlib.suppress(ValueError):
+            return f"crashed with {signal.Signals(-code).name}"
+        return f"crashed with signal {-code}"
+    windows = _WINDOWS.get(code & 0xFFFFFFFF)
+    return f"crashed with {windows}" if windows else f"ended its process with status {code}"
+
+
+def _last_lines(output: Path) -> tuple[str, ...]:
+    """Return the last lines that the process wrote."""
+    with output.open("rb") as file:
+        file.seek(0, os.SEEK_END)
+        file.seek(max(0, file.tell() - 8192))
+        lines = file.read().decode("utf-8", "replace").splitlines()
+    kept = [line.rstrip() for line in lines if line.strip()]
+    return tuple(line[:300] for line in kept[-_MOST_LINES:])

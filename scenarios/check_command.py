@@ -1,0 +1,130 @@
+"""`handover check`: tells of FMUs what is wrong with them."""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+from rich.table import Table
+from rich.text import Text
+
+from cosim.check.check_fmu import check_fmu
+from cosim.check.check_report import CheckReport, Section
+from cosim.check.finding import Finding, Level
+from scenarios.console import open_console
+
+_FAULTS, _BAD_CALL = 1, 2
+_MOST_FINDINGS = 20  # of one level in one section
+_STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAULT: "bold red"}
+
+_HELP = """Tell what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
+
+The archive, its model description, by the standard's schema and rules, and its library for this machine are looked at;
+then the unit is loaded and run for ten steps in a process of its own, which may crash.
+
+\b
+Exit status
+  0  no faults; there may be notes and warnings
+  1  faults were found
+  2  bad call: a FILE is not there or cannot be read
+"""
+
+
+class _BadCall(click.ClickException):
+    exit_code = _BAD_CALL
+
+
+@click.command("check", help=_HELP)
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
+@click.option(
+    "--timeout",
+    type=click.FloatRange(min=0, min_open=True),
+    default=60.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Time that loading, and then running, may take of each FILE.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
+def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
+    """Tell what is wrong with files that should be co-simulation FMUs."""
+    _refuse_what_is_not_there(files)
+    reports: list[CheckReport] = []
+    for file in files:
+        reports.append(check_fmu(file, timeout))
+        if not as_json:
+            _print_report(reports[-1])
+    if as_json:
+        click.echo(json.dumps([r.as_json() for r in reports], indent=2))
+    sys.exit(0 if all(r.passed for r in reports) else _FAULTS)
+
+
+def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
+    faults: list[str] = []
+    for file in files:
+        try:
+            if file.is_dir():
+                faults.append(f"{file}: a folder, not a file; zip what is in it, with modelDescription.xml at the top")
+            else:
+                file.open("rb").close()
+        except OSError as e:
+            faults.append(f"{file}: {(e.strerror or str(e)).lower()}")
+    if faults:
+        raise _BadCall("; ".join(faults))
+
+
+def _print_report(report: CheckReport) -> None:
+    shown = open_console()
+    shown.print(Text(_visible(str(report.path)), style="bold"), soft_wrap=True)
+    for section in report.sections:
+        _print_section(section)
+    shown.print(_verdict(report), soft_wrap=True)
+
+
+def _print_section(section: Section) -> None:
+    level = section.level.name.lower() if section.reached else "-"
+    style = _STYLES[section.level] if section.reached else "dim"
+    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.told))
+    open_console().print(line, soft_wrap=True)
+    for wanted in sorted(Level, reverse=True):
+        findings = [f for f in section.findings if f.level is wanted]
+        for finding in findings[:_MOST_FINDINGS]:
+            _print_finding(finding, named=wanted is not section.level)
+        if len(findings) > _MOST_FINDINGS:
+            more = f"and {len(findings) - _MOST_FINDINGS} more; --json shows all"
+            _print_indented("", Text(more), 11)
+
+
+def _print_finding(finding: Finding, *, named: bool) -> None:
+    level = f"{finding.level.name.lower()}: " if named else ""
+    _print_indented("- ", Text(_visible(level + finding.line)), 11)
+    for line in finding.log:
+        _print_indented("| ", Text(_visible(line), style="dim"), 13)
+
+
+def _print_indented(mark: str, text: Text, width: int) -> None:
+    """Print a text behind a mark, wrapped beside both in a terminal and in one line where other programs read it."""
+    shown = open_console()
+    if shown.is_terminal:
+        row = Table.grid()
+        row.add_row(" " * width + mark, text)
+        shown.print(row)
+    else:
+        shown.print(Text(" " * width + mark) + text, soft_wrap=True)
+
+
+def _visible(text: str) -> str:
+    """Return a text without what would steer a terminal: it comes from files that others made."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text.replace("\t", " "))
+
+
+def _verdict(report: CheckReport) -> Text:
+    counted = [
+        f"{n} {level.name.lower()}{'s' if n > 1 else ''}"
+        for level in (Level.FAULT, Level.WARNING, Level.NOTE)
+        if (n := report.count(level))
+    ]
+    told = f" ({', '.join(counted)})" if counted else ""
+    if report.passed:
+        return Text.assemble(("usable", "green"), f": no faults were found{told}")
+    return Text.assemble(("not usable as it is", "bold red"), told)

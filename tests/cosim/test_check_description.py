@@ -1,0 +1,157 @@
+"""What is wrong with a model description: a sound one is edited, and the fault is told with its place."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import decay
+import pytest
+from conftest import FmuOf
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cosim.check.check_fmu import check_fmu
+from cosim.check.check_report import CheckReport
+from cosim.check.finding import Level
+
+NO_LIBRARY = b"\x7fELF\x02\x01\x01" + bytes(11) + b"\xb7\x00"  # of aarch64: the check ends before it is loaded
+
+
+def checked(file: Path, description: str) -> CheckReport:
+    return check_fmu(decay.pack(file, NO_LIBRARY, description), timeout=30.0)
+
+
+def told(report: CheckReport, level: Level = Level.FAULT) -> str:
+    return "\n".join(f.line for s in report.sections[:3] for f in s.findings if f.level is level)
+
+
+def test_a_sound_description_has_no_findings(tmp_path: Path):
+    report = checked(tmp_path / "a.fmu", decay.DESCRIPTION)
+    assert [s.level for s in report.sections[:3]] == [Level.OK] * 3
+    assert not report.sections[4].reached
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ('causality="input"', 'causality="imput"', r"line 12: .*'imput' is not an element of the set"),
+        ('<Integer start="0"', '<Integer start="zero"', r"start value 'zero' is not a whole number"),
+        ('<Integer start="0"', '<Integer start="12"', r"'mode' \(line 1\d\): start value 12 is out of .*from 0 to 11"),
+        ('<Integer start="0"', '<Integer start="3000000000"', r"does not fit Integer: from -2147483648 to 2147483647"),
+        ('<Integer start="0" min="0"', '<Integer start="0" min="20"', r"its min 20 is above its max 11"),
+        ('<Integer start="0"', "<Integer", r'"mode" \(line 1\d\) has no start value'),
+        ('<Real start="0"', "<Real", r'"u" \(line 12\) has no start value'),
+        ('<Real unit="m"/>', '<Real unit="parsec"/>', r'unit "parsec" of variable "x"'),
+        ('<Real unit="m"/>', '<Real displayUnit="mm"/>', r"'x' \(line 10\): has the display unit 'mm', but no unit"),
+        ('<Real unit="m"/>', '<Real unit="m" derivative="9"/>', r"derivative of 9, which leads to no variable"),
+        ('<Real unit="m"/>', '<Real unit="m" declaredType="T"/>', r'declaredType="T" which has not been defined'),
+        ('name="x"', 'name="u"', r'variable name "u" \(line 12\) is not unique'),
+        ('name="x"', 'name="1 x"', r'"1 x" .* is not a legal variable name'),
+        ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', r"index 7 leads to no .*variables 1 to 4"),
+        (
+            '<Outputs><Unknown index="3" dependencies=""/></Outputs>',
+            "",
+            r"'y' \(line 14\): an output that ModelStructure does not list",
+        ),
+        ('dependencies=""/></Outputs>', 'dependencies="0"/></Outputs>', r"dependencies 0 leads to no variable"),
+        ('modelIdentifier="Decay"', 'modelIdentifier="3-decay"', r"'3-decay' is not an identifier of C"),
+        ('stepSize="0.1"', 'stepSize="-1"', r"stepSize '-1'; a positive number"),
+        ('startTime="0" stopTime="1"', 'startTime="2" stopTime="1"', r"stopTime is before startTime"),
+        (' guid="decay"', "", r"attribute 'guid' is required but missing"),
+        ('fmiVersion="2.0"', 'fmiVersion="1.0"', r"an FMU of FMI 1\.0; versions 2\.0 and 3\.0 can be used"),
+        ('fmiVersion="2.0"', "", r"does not say its fmiVersion"),
+        ("fmiModelDescription", "modelDescription", r"begins with <modelDescription>; <fmiModelDescription> is right"),
+        (
+            'name="x" valueReference="0" causality="local"',
+            'name="x" valueReference="1" causality="input"',
+            r"can be set and shares the value reference 1 with 'x'",
+        ),
+    ],
+)  # fmt: skip
+def test_a_fault_is_told_with_its_place(tmp_path: Path, old: str, new: str, wanted: str):
+    report = checked(tmp_path / "a.fmu", decay.edited((old, new)))
+    assert re.search(wanted, told(report)), told(report)
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path):
+    edits = ('causality="input"', 'causality="imput"'), ('<Integer start="0"', '<Integer start="12"')
+    lines = told(checked(tmp_path / "a.fmu", decay.edited(*edits, ('stepSize="0.1"', 'stepSize="0"'))))
+    for wanted in ("imput", "start value 12", "stepSize"):
+        assert wanted in lines
+
+
+@pytest.mark.parametrize(
+    ("flag", "wanted"),
+    [
+        ("needsExecutionTool", "needs other software"),
+        ("canBeInstantiatedOnlyOncePerProcess", "can be in a system only once"),
+    ],
+)
+def test_what_a_unit_needs_is_noted(tmp_path: Path, flag: str, wanted: str):
+    report = checked(tmp_path / "a.fmu", decay.edited(("<CoSimulation ", f'<CoSimulation {flag}="true" ')))
+    assert wanted in told(report, Level.NOTE)
+    assert told(report) == ""
+
+
+def test_an_fmu_for_model_exchange_alone_is_told(tmp_path: Path):
+    edits = ("CoSimulation", "ModelExchange"), ('canHandleVariableCommunicationStepSize="true" ', "")
+    report = checked(tmp_path / "a.fmu", decay.edited(*edits))
+    assert "an FMU for model exchange, without a co-simulation interface" in told(report)
+    assert [s.reached for s in report.sections] == [True, True, True, False, False, False]
+
+
+def edited_copy(fmu: Path, file: Path, old: str, new: str) -> Path:
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(file, "w") as target:
+        for item in source.infolist():
+            content = source.read(item)
+            if item.filename == "modelDescription.xml":
+                assert old in content.decode()
+                content = content.decode().replace(old, new).encode()
+            if not item.filename.startswith("binaries/"):
+                target.writestr(item, content)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ('fmiVersion="3.0"', 'fmiVersion="3.0-beta.2"', None),
+        ('<Dimension start="2" />', '<Dimension valueReference="999" />', r"dimension has the value reference 999"),
+        ('name="pair_back" valueReference="', 'name="pair_back" valueReference="9', r"9\d* leads to no|not list"),
+        ('<Item name="GREEN" value="2"', '<Item name="GREEN" value="1"', r"type '\w+' \(line \d+\) has a value twice"),
+    ],
+)  # fmt: skip
+def test_faults_of_fmi_3_are_told(fmu: FmuOf, tmp_path: Path, old: str, new: str, wanted: str | None):
+    report = check_fmu(edited_copy(fmu("Echo"), tmp_path / "a.fmu", old, new), 30.0)
+    if wanted:
+        assert re.search(wanted, told(report)), told(report)
+    else:
+        assert "a draft of the standard" in told(report, Level.WARNING)
+
+
+def test_start_values_must_fit_the_dimensions(fmu: FmuOf, tmp_path: Path):
+    description = zipfile.ZipFile(fmu("Echo")).read("modelDescription.xml").decode()
+    start = re.search(r'name="pair"[^>]*start="([^"]*)"', description)
+    assert start
+    old = f'start="{start[1]}"'
+    report = check_fmu(edited_copy(fmu("Echo"), tmp_path / "a.fmu", old, 'start="1 2 3"'), 30.0)
+    assert "3 start values for 2 entries, shape [2]" in told(report)
+
+
+VALUES = re.findall(r'"([^"]*)"', decay.DESCRIPTION.partition("?>")[2])
+ODD = st.sampled_from(
+    ["", " ", "-1", "1e999", "nan", "٣", "²", "0x1", "1 2", "a;b", "&lt;", "99999999999999999999", "true"]
+)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150)
+@given(
+    edits=st.lists(st.tuples(st.integers(0, len(VALUES) - 1), ODD | st.text("abc<>&'{}\t 01.", max_size=5)), max_size=4)
+)
+def test_whatever_a_description_says_it_is_checked(tmp_path: Path, edits: list[tuple[int, str]]):
+    head, mark, body = decay.DESCRIPTION.partition("?>")
+    parts = [str(part) for part in body.split('"')]
+    for at, value in edits:
+        parts[2 * at + 1] = value
+    report = checked(tmp_path / "a.fmu", head + mark + '"'.join(parts))
+    assert not report.passed  # the library is for another machine at least

@@ -1,0 +1,173 @@
+import contextlib
+import io
+import struct
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cosim.exceptions import InvalidFmu
+from cosim.fmu_archive import FmuArchive, archive_faults
+
+PLAIN = {"modelDescription.xml": b"<fmiModelDescription/>" * 20, "resources/table.csv": b"1,2,3\n" * 100}
+
+
+def packed(*names: str, adjust: Callable[[zipfile.ZipInfo], None] = lambda _: None) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in (*PLAIN, *names):
+            member = zipfile.ZipInfo(name)
+            member.compress_type = zipfile.ZIP_DEFLATED
+            if name in names:
+                adjust(member)
+            archive.writestr(member, PLAIN.get(name, b"x"))
+    return content.getvalue()
+
+
+def refusal(folder: Path, content: bytes) -> str:
+    """Return why an archive is refused; nothing may have been unpacked."""
+    file, target = folder / "a.fmu", folder / "target"
+    file.write_bytes(content)
+    with pytest.raises(InvalidFmu) as caught:
+        FmuArchive(file).unpack(target)
+    assert not target.exists()
+    return caught.value.fault
+
+
+def test_a_sound_archive_is_unpacked(tmp_path: Path):
+    file = tmp_path / "a.fmu"
+    file.write_bytes(packed("binaries/", "binaries/x86_64-linux/größe.so"))
+    FmuArchive(file).unpack(tmp_path / "target")
+    assert (tmp_path / "target" / "resources" / "table.csv").read_bytes() == PLAIN["resources/table.csv"]
+    assert (tmp_path / "target" / "binaries" / "x86_64-linux" / "größe.so").read_bytes() == b"x"
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "a/../../x", "/etc/x", "C:/x", "C:x", "..\\x", "a\\b", "..", "\\\\host\\share\\x", "."]
+)
+def test_a_path_that_leads_out_is_refused(tmp_path: Path, name: str):
+    told = refusal(tmp_path, packed(name))
+    assert "paths that lead out of it" in told
+    assert name in told
+
+
+def test_links_are_refused(tmp_path: Path):
+    def link(member: zipfile.ZipInfo) -> None:
+        member.create_system, member.external_attr = 3, 0o120777 << 16
+
+    assert "symbolic links" in refusal(tmp_path, packed("binaries/x", adjust=link))
+
+
+def test_one_path_twice_is_refused(tmp_path: Path):
+    with pytest.warns(UserWarning, match="Duplicate name"):
+        content = packed("resources/a", "resources/a")
+    assert "the same path twice: resources/a" in refusal(tmp_path, content)
+
+
+def test_a_file_that_is_also_a_folder_is_refused(tmp_path: Path):
+    assert "files that are folders of other files: a" in refusal(tmp_path, packed("a", "a/b/c"))
+
+
+def test_all_kinds_of_faults_are_told_at_once(tmp_path: Path):
+    told = refusal(tmp_path, packed("../x", "a", "a/b"))
+    assert "paths that lead out" in told
+    assert "folders of other files" in told
+
+
+def test_encrypted_members_are_refused(tmp_path: Path):
+    content = bytearray(packed("secret"))
+    for signature, at in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):
+        begin = content.rindex(signature)
+        content[begin + at] |= 1
+    assert "encrypted files; store them without a password: secret" in refusal(tmp_path, bytes(content))
+
+
+def test_a_compression_that_nobody_knows_is_refused(tmp_path: Path):
+    content = bytearray(packed("odd"))
+    struct.pack_into("<H", content, content.rindex(b"PK\x01\x02") + 10, 99)
+    assert "compression that cannot be read; use deflate: odd" in refusal(tmp_path, bytes(content))
+
+
+def test_a_damaged_member_is_refused_before_anything_is_unpacked(tmp_path: Path):
+    content = bytearray(packed("z_last"))
+    content[content.index(b"z_last") + len("z_last")] ^= 0xFF
+    assert "the archive is damaged" in refusal(tmp_path, bytes(content))
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"", "the file is empty"),
+        (b"\x7fELF and so on", "this file is not one"),
+        (packed()[:200], "its end is missing"),
+    ],
+)
+def test_what_is_no_archive_is_refused(tmp_path: Path, content: bytes, told: str):
+    assert told in refusal(tmp_path, content)
+
+
+def declared(size: int, name: str = "a") -> zipfile.ZipInfo:
+    member = zipfile.ZipInfo(name)
+    member.file_size = size
+    return member
+
+
+def test_a_zip_bomb_is_refused_by_what_it_declares():
+    assert "zip bomb: 1.0 MiB would unpack to 1024 MiB" in archive_faults([declared(1 << 30)], 1 << 20)[0]
+    assert "at most 16 GiB are unpacked" in archive_faults([declared(1 << 40)], 1 << 38)[0]
+    assert "at most 100000 are unpacked" in archive_faults([declared(1, str(i)) for i in range(100_001)], 1 << 30)[0]
+
+
+def test_large_and_dense_archives_are_not_taken_for_bombs():
+    assert archive_faults([declared(2 << 30)], 200 << 20) == []
+    assert archive_faults([declared(200 << 20)], 1 << 18) == []  # a table of zeros
+
+
+def test_a_bomb_costs_no_memory(tmp_path: Path):
+    file = tmp_path / "bomb.fmu"
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("modelDescription.xml", "w") as bomb:
+        for _ in range(300):
+            bomb.write(bytes(1 << 20))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InvalidFmu, match="zip bomb"):
+            FmuArchive(file)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (["unit/modelDescription.xml"], "zip what is in that folder, not the folder"),
+        (["ModelDescription.xml"], "there is ModelDescription.xml; upper and lower case count"),
+        (["readme.txt"], "the archive holds readme.txt"),
+        ([], "the archive holds nothing"),
+    ],
+)
+def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, names: list[str], told: str):
+    file = tmp_path / "a.fmu"
+    with zipfile.ZipFile(file, "w") as archive:
+        for name in names:
+            archive.writestr(name, b"")
+    with pytest.raises(InvalidFmu, match=told):
+        FmuArchive(file).description()
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
+@given(data=st.data())
+def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path, data: st.DataObject):
+    content = bytearray(packed("a", "b/c"))
+    for _ in range(data.draw(st.integers(1, 6))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    file, target = tmp_path / "a.fmu", tmp_path / "target"
+    file.write_bytes(bytes(content[: data.draw(st.integers(0, len(content))) or None]))
+    with contextlib.suppress(InvalidFmu):
+        archive = FmuArchive(file)
+        archive.description()
+        archive.unpack(target)

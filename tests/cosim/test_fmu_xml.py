@@ -1,0 +1,62 @@
+import contextlib
+import tracemalloc
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.fmu_xml import UnsafeXml, parse_xml
+
+LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 11))
+BILLION_LAUGHS = f'<?xml version="1.0"?><!DOCTYPE l [<!ENTITY l0 "ha">{LAUGHS}]><l>&l10;</l>'.encode()
+
+
+def test_elements_know_their_lines_attributes_and_children():
+    root = parse_xml(b'<?xml version="1.0"?>\n<a><!-- b -->\n<b c="1"/><?d e?>\n<b c="2"><f/></b></a>')
+    assert [(b.line, b.get("c")) for b in root.named("b")] == [(3, "1"), (4, "2")]
+    assert [f.tag for f in root.named("b", "f")] == ["f"]
+    assert root.get("missing", "nothing") == "nothing"
+
+
+def test_a_billion_laughs_are_refused_without_being_laughed():
+    tracemalloc.start()
+    try:
+        with pytest.raises(UnsafeXml, match="document type"):
+            parse_xml(BILLION_LAUGHS)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b'<!DOCTYPE a SYSTEM "http://127.0.0.1:9/a.dtd"><a/>', "document type"),
+        (b'<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]><a>&b;</a>', "document type"),
+        (b"<!DOCTYPE a><a/>", "document type"),
+        ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>".encode("utf-16"), "document type"),
+        (b"<a>&b;</a>", "undefined entity"),
+        (b"<a><b></a>", "not well-formed: mismatched tag: line 1"),
+        (b"", "not well-formed: no element found"),
+        (b'<a b="\xff"/>', "not well-formed"),
+        (b'<?xml version="1.0" encoding="klingon"?><a/>', "encoding"),
+        (b"<a>" * 300 + b"</a>" * 300, "not well-formed"),
+    ],
+)
+def test_what_is_not_to_be_read_is_refused(content: bytes, told: str):
+    with pytest.raises(UnsafeXml, match=told):
+        parse_xml(content)
+
+
+@given(st.binary(max_size=200) | st.text(alphabet="<>/=\"'a &;![]-?\n", max_size=80).map(str.encode))
+def test_whatever_the_bytes_they_are_parsed_or_refused(content: bytes):
+    with contextlib.suppress(UnsafeXml):
+        parse_xml(content)
+
+
+@given(st.sampled_from(["utf-8", "utf-16", "iso-8859-1", "us-ascii", "utf-7", "utf-32", "big5", "rot13", "idna", ""]))
+def test_whatever_the_encoding_it_is_read_or_refused(encoding: str):
+    try:
+        assert parse_xml(f'<?xml version="1.0" encoding="{encoding}"?><a/>'.encode()).tag == "a"
+    except UnsafeXml:
+        assert encoding not in ("utf-8", "us-ascii", "iso-8859-1")

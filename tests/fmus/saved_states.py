@@ -1,0 +1,31 @@
+"""Saving an instance's state through the C interface, whatever the standard."""
+
+import ctypes
+
+from ctypes_host import OK, SIZE, CtypesHost
+
+
+def called(host: CtypesHost, name: str) -> str:
+    """Return the standard's spelling of a function's name."""
+    if host.fmi == 3:
+        return name.replace("state", "State")
+    return name.replace("Deserialize", "DeSerialize")
+
+
+def save(host: CtypesHost) -> ctypes.c_void_p:
+    state = ctypes.c_void_p()
+    assert host.call(called(host, "GetFMUstate"), ctypes.byref(state)) == OK
+    return state
+
+
+def serialised(host: CtypesHost, state: ctypes.c_void_p) -> bytes:
+    size = ctypes.c_size_t()
+    assert host.call(called(host, "SerializedFMUstateSize"), state, ctypes.byref(size)) == OK
+    data = ctypes.create_string_buffer(size.value)
+    assert host.call(called(host, "SerializeFMUstate"), state, data, size) == OK
+    return data.raw
+
+
+def deserialise(host: CtypesHost, data: bytes) -> tuple[int, ctypes.c_void_p]:
+    state = ctypes.c_void_p()
+    return host.call(called(host, "DeserializeFMUstate"), data, SIZE(len(data)), ctypes.byref(state)), state

@@ -1,0 +1,154 @@
+"""Partial derivatives of a unit that has them, against differences of its outputs through the same interface."""
+
+import ctypes
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
+from numpy.typing import NDArray
+from workshop import Workshop
+
+TANGENT = "tangent:Tangent"
+INPUTS, OUTPUTS = {"a": 1, "r": 3, "s": 3}, {"y": 1, "p": 3}
+EPSILON = 1e-6
+
+both = pytest.mark.parametrize("fmi", [2, 3])
+
+
+def references(host: CtypesHost, sizes: dict[str, int]) -> "ctypes.Array[ctypes.c_uint32]":
+    found = [host.references[n] + i for n, size in sizes.items() for i in range(size if host.fmi == 2 else 1)]
+    return (ctypes.c_uint32 * len(found))(*found)
+
+
+def derivative(
+    host: CtypesHost,
+    seed: Sequence[float],
+    function: str = "GetDirectionalDerivative",
+    knowns: dict[str, int] = INPUTS,
+    unknowns: dict[str, int] = OUTPUTS,
+) -> tuple[int, list[float]]:
+    k, u = references(host, knowns), references(host, unknowns)
+    result = (DOUBLE * sum((knowns if "Adjoint" in function else unknowns).values()))()
+    values = (DOUBLE * len(seed))(*seed)
+    sizes = (SIZE(len(seed)), SIZE(len(result)))
+    vectors = (values, result) if host.fmi == 2 else (values, sizes[0], result, sizes[1])
+    return host.call(function, u, SIZE(len(u)), k, SIZE(len(k)), *vectors), list(result)
+
+
+def outputs(host: CtypesHost) -> NDArray[np.float64]:
+    return np.array([x for n, size in OUTPUTS.items() for x in host.get(n, size)])
+
+
+def jacobian_by_differences(host: CtypesHost) -> NDArray[np.float64]:
+    """Central differences in initialisation mode, where outputs follow inputs at once."""
+    columns: list[NDArray[np.float64]] = []
+    for name, size in INPUTS.items():
+        at = host.get(name, size)
+        for i in range(size):
+            ends: list[NDArray[np.float64]] = []
+            for sign in (1, -1):
+                host.set(name, [x + sign * EPSILON * (i == j) for j, x in enumerate(at)])
+                ends.append(outputs(host))
+            host.set(name, at)
+            columns.append((ends[0] - ends[1]) / (2 * EPSILON))
+    return np.column_stack(columns)
+
+
+@both
+def test_directional_derivatives_are_the_differences_of_the_outputs(workshop: Workshop, fmi: int):
+    host = workshop.host(TANGENT, fmi)
+    host.enter()
+    J = jacobian_by_differences(host)
+    assert np.linalg.matrix_rank(J) >= 3
+    for seed in [*np.eye(7), np.arange(7.0) - 2.5]:
+        status, dy = derivative(host, seed.tolist())
+        assert status == OK, host.log[-1]
+        assert dy == pytest.approx(J @ seed, abs=1e-7)
+
+
+def test_adjoint_derivatives_are_the_transpose(workshop: Workshop):
+    host = workshop.host(TANGENT, 3)
+    host.enter()
+    J = jacobian_by_differences(host)
+    weights = np.array([0.5, -1.0, 2.0, 3.0])
+    status, result = derivative(host, weights.tolist(), "GetAdjointDerivative")
+    assert status == OK
+    assert result == pytest.approx(weights @ J, abs=1e-7)
+
+
+@both
+def test_some_variables_in_any_order_give_their_part(workshop: Workshop, fmi: int):
+    host = workshop.host(TANGENT, fmi)
+    host.enter()
+    J = jacobian_by_differences(host)
+    seed = [1.0, 2.0, 3.0, 4.0]
+    status, dy = derivative(host, seed, knowns={"s": 3, "a": 1}, unknowns={"p": 3})
+    assert status == OK
+    assert dy == pytest.approx(J[1:, 4:7] @ seed[:3] + J[1:, 0] * 4.0, abs=1e-7)
+
+
+@both
+def test_derivatives_are_there_in_step_mode_and_after_and_not_before(workshop: Workshop, fmi: int):
+    host = workshop.host(TANGENT, fmi)
+    assert derivative(host, [1.0] * 7)[0] == ERROR
+    assert "not allowed now" in host.log[-1]
+    host.initialise()
+    first = derivative(host, [1.0] * 7)
+    host.set("a", [1.0])
+    assert host.step(0.0, 0.1) == OK
+    second = derivative(host, [1.0] * 7)
+    assert first[0] == second[0] == OK
+    assert first[1] != second[1]
+    assert host.call("Terminate") == OK
+    assert derivative(host, [1.0] * 7) == second
+
+
+@both
+def test_what_is_no_real_input_or_output_is_refused(workshop: Workshop, fmi: int):
+    host = workshop.host(TANGENT, fmi)
+    host.initialise()
+    for knowns, unknowns, seed, message in [
+        ({"n": 1}, OUTPUTS, [1.0], "the known with value reference"),
+        ({"y": 1}, OUTPUTS, [1.0], "is no real input"),
+        (INPUTS, {"a": 1}, [1.0] * 7, "is no real output"),
+        ({"gain": 1}, OUTPUTS, [1.0], "is no real input"),
+        (INPUTS, OUTPUTS, [float("nan")] * 7, "entry 1 of seed is nan"),
+    ]:
+        assert derivative(host, seed, knowns=knowns, unknowns=unknowns)[0] == ERROR
+        assert message in host.log[-1]
+    assert derivative(host, [1.0] * 7)[0] == OK
+
+
+def test_sizes_and_null_are_refused(workshop: Workshop):
+    host = workshop.host(TANGENT, 3)
+    host.initialise()
+    assert derivative(host, [1.0] * 6)[0] == ERROR
+    assert "6 values of seed for variables with 7 entries" in host.log[-1]
+    k, u = references(host, INPUTS), references(host, OUTPUTS)
+    result = (DOUBLE * 4)()
+    arguments = (u, SIZE(2), k, SIZE(3), None, SIZE(7), result, SIZE(4))
+    assert host.call("GetDirectionalDerivative", *arguments) == ERROR
+    assert "the argument seed is NULL" in host.log[-1]
+
+
+def test_a_derivative_of_what_is_no_output_is_an_error_and_the_instance_lives(workshop: Workshop):
+    host = workshop.host(TANGENT, 3)
+    host.initialise()
+    assert derivative(host, [666.0] + [0.0] * 6)[0] == ERROR
+    assert "directional_derivative gave 'q': no such real output; it has y, t_y, p" in host.log[-1]
+    assert host.step(0.0, 0.1) == OK
+
+
+@both
+def test_only_a_unit_that_has_derivatives_says_so(workshop: Workshop, fmi: int):
+    names = {2: ["providesDirectionalDerivative"], 3: ["providesDirectionalDerivatives", "providesAdjointDerivatives"]}
+    for block, expected in ((TANGENT, "true"), ("scalars:Scalars", None)):
+        host = workshop.host(block, fmi)
+        interface = ET.parse(host.folder / "modelDescription.xml").getroot().find("CoSimulation")
+        assert interface is not None
+        assert [interface.get(n) for n in names[fmi]] == [expected] * len(names[fmi])
+    host.initialise()
+    assert derivative(host, [1.0], knowns={"u1": 1}, unknowns={"y1": 1})[0] == ERROR
+    assert "not supported: the block has no directional_derivative" in host.log[-1]

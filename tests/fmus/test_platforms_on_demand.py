@@ -1,0 +1,201 @@
+"""Which platforms are compiled, when, and where their libraries go."""
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import fmus.compile
+from fmus.binaries import NotCompiled, binaries
+from fmus.compile import (
+    RUNTIME,
+    TARGETS,
+    CompilationError,
+    UnknownPlatform,
+    cache_folder,
+    compile_runtime,
+    host_platform,
+    is_current,
+    library,
+    named_platforms,
+    wanted_platforms,
+)
+from scenarios.command import main
+
+COMPILE = r"""
+from pathlib import Path
+import sys
+sys.path.insert(0, sys.argv[1])
+from fmus import compile
+compile.RUNTIME = Path(sys.argv[2])
+compile.compile_runtime()
+print(compile.library(compile.host_platform(), 3))
+"""
+
+
+@pytest.fixture
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a copy of the runtime's sources that nothing is compiled of, and that is compiled from."""
+    copy = tmp_path / "runtime"
+    shutil.copytree(RUNTIME, copy, ignore=shutil.ignore_patterns("bin"))
+    (copy / "unused.h").write_text(f"/* {copy} */")  # so that no cache has libraries of these sources
+    monkeypatch.setattr(fmus.compile, "RUNTIME", copy)
+    return copy
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """Let a compiler that only writes down its arguments take zig's place; return what it was given."""
+    calls: list[list[str]] = []
+
+    def compile_nothing(arguments: list[str]) -> "subprocess.CompletedProcess[str]":
+        calls.append(arguments)
+        Path(arguments[arguments.index("-o") + 1]).write_bytes(b"library")
+        return subprocess.CompletedProcess(arguments, 0, "")
+
+    monkeypatch.setattr(fmus.compile, "zig_cc", compile_nothing)
+    return calls
+
+
+@pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    find: Callable[..., object] = importlib.util.find_spec
+
+    def find_all_but_zig(name: str, package: str | None = None) -> object:
+        return None if name == "ziglang" else find(name, package)
+
+    monkeypatch.setattr(importlib.util, "find_spec", find_all_but_zig)
+
+
+def test_platforms_are_named_singly_in_lists_and_together(monkeypatch: pytest.MonkeyPatch):
+    assert named_platforms(["x86_64-windows, x86_64-linux", "x86_64-linux"]) == ("x86_64-linux", "x86_64-windows")
+    assert named_platforms(["host"]) == (host_platform(),)
+    assert named_platforms(["all", "host"]) == tuple(TARGETS)
+    monkeypatch.delenv("HANDOVER_FMI_PLATFORMS", raising=False)
+    assert wanted_platforms() == (host_platform(),)
+    monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "all")
+    assert wanted_platforms() == tuple(TARGETS)
+
+
+@pytest.mark.parametrize("names", [["win64"], ["all,win64"], [""], [",", " "]])
+def test_unknown_names_are_refused_with_the_valid_ones(names: list[str]):
+    with pytest.raises(UnknownPlatform, match=r"x86_64-linux, aarch64-linux, x86_64-windows, .*`host` and `all`"):
+        named_platforms(names)
+
+
+def test_the_environment_variable_is_held_to_the_names_too(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "linux")
+    with pytest.raises(UnknownPlatform, match="'linux'"):
+        compile_runtime()
+
+
+def test_compiling_by_hand_refuses_unknown_names_in_one_line():
+    call = [sys.executable, str(RUNTIME.with_name("compile.py")), "win64"]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("compile.py: no platform 'win64'; there are x86_64-linux, ")
+
+
+def test_what_is_current_is_compiled_once_and_again_after_a_change(sources: Path, compiled: list[list[str]]):
+    compile_runtime(["aarch64-linux"])
+    compile_runtime(["aarch64-linux"])
+    assert [call[call.index("-target") + 1] for call in compiled] == ["aarch64-linux-gnu.2.17"] * 2  # FMI 2, FMI 3
+    assert library("aarch64-linux", 2).is_relative_to(sources)
+    (sources / "text.h").write_text("/* other */")
+    assert not is_current("aarch64-linux")
+    compile_runtime(["aarch64-linux"])
+    assert len(compiled) == 4
+
+
+@pytest.mark.usefixtures("compiled")
+def test_a_place_that_cannot_be_written_is_left_for_the_cache(
+    sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    (sources / "bin").write_text("in the way, for root as well, whom no permission stops")
+    compile_runtime(["x86_64-windows"])
+    assert is_current("x86_64-windows")
+    assert library("x86_64-windows", 3).is_relative_to(cache_folder() / "runtime")
+    assert binaries("Unit", 2, ["x86_64-windows"]) == {"binaries/win64/Unit.dll": b"library"}
+    first = library("x86_64-windows", 3)
+    (sources / "text.h").write_text("/* other */")
+    compile_runtime(["x86_64-windows"])
+    assert library("x86_64-windows", 3).parent != first.parent  # another version of the package keeps its own
+
+
+def test_no_place_at_all_is_told(sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "cache").write_text("in the way")
+    (sources / "bin").write_text("in the way")
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    with pytest.raises(CompilationError, match="HANDOVER_CACHE must be a folder that can be written"):
+        compile_runtime(["x86_64-windows"])
+
+
+def test_a_compiler_that_fails_leaves_nothing(sources: Path):
+    (sources / "text.c").write_text("no C")
+    with pytest.raises(CompilationError, match=r"text\.c:1"):
+        compile_runtime()
+    assert [file for file in sources.rglob("bin/**/*") if file.is_file()] == []
+
+
+@pytest.mark.slow
+def test_two_processes_compile_at_once(sources: Path):
+    root = str(RUNTIME.parents[1])
+    call = [sys.executable, "-c", COMPILE, root, str(sources)]
+    both = [subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for _ in range(2)]
+    told = {process.communicate(timeout=150)[0].strip() for process in both}
+    assert [process.returncode for process in both] == [0, 0]
+    assert told == {str(library(host_platform(), 3))}
+    assert is_current(host_platform())
+    assert (
+        library(host_platform(), 3).read_bytes()
+        == (RUNTIME / library(host_platform(), 3).relative_to(sources)).read_bytes()
+    )
+    assert {file.name for file in library(host_platform(), 3).parent.iterdir()} == {
+        library(host_platform(), 2).name,
+        library(host_platform(), 3).name,
+        "sources.sha256",
+    }
+
+
+@pytest.mark.usefixtures("sources", "no_compiler")
+def test_without_a_compiler_the_extra_is_named():
+    with pytest.raises(NotCompiled, match=r"not compiled for aarch64-linux, .*pip install \"handover-cosim\[cross\]\""):
+        binaries("Unit", 3, ["aarch64-linux"])
+    with pytest.raises(NotCompiled, match=host_platform()):
+        binaries("Unit", 3)
+
+
+@pytest.mark.usefixtures("sources", "no_compiler")
+def test_the_command_tells_it_in_one_line_and_writes_nothing(tmp_path: Path):
+    out = tmp_path / "out"
+    done = CliRunner().invoke(main, ["build", "Push", "--platform", "all", "--out", str(out)])
+    assert done.exit_code == 2
+    assert 'Cure: pip install "handover-cosim[cross]"' in done.output
+    done = CliRunner().invoke(main, ["build", "Push", "--platform", "host,win64", "--out", str(out)])
+    assert done.exit_code == 2
+    assert "no platform 'win64'; there are x86_64-linux" in done.output
+    assert not out.exists()
+
+
+@pytest.mark.usefixtures("sources", "compiled")
+def test_the_command_compiles_what_it_is_told_to_and_packs_that(tmp_path: Path):
+    out = tmp_path / "out"
+    call = ["build", "Push", "--platform", "x86_64-windows,aarch64-darwin", "--platform", "host", "--out", str(out)]
+    done = CliRunner().invoke(main, call)
+    assert done.exit_code == 0, done.output
+    assert "compiling the FMI runtime for x86_64-windows\n" in done.output
+    with zipfile.ZipFile(out / "Push.fmi3.fmu") as archive:
+        folders = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
+    assert folders == {"x86_64-windows", "aarch64-darwin", host_platform()}
+    done = CliRunner().invoke(main, ["build", "Push", "--fmi", "3", "--platform", "host", "--out", str(out)])
+    assert "compiling" not in done.output
+    with zipfile.ZipFile(out / "Push.fmi3.fmu") as archive:
+        assert [name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")] == [host_platform()]

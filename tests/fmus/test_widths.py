@@ -1,0 +1,156 @@
+"""Reals of 32 bits and integers of every width, where a block asks for them."""
+
+import ctypes
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from workshop import Workshop
+
+from fmus.fmi2_description import NoFmi2Form
+
+BLOCK = "every_width:EveryWidth"
+
+C_TYPES: dict[str, Any] = {
+    f"{sign}Int{bits}": getattr(ctypes, f"c_{sign.lower()}int{bits}") for bits in (8, 16, 32, 64) for sign in ("", "U")
+}
+
+
+def port_of(width: str) -> str:
+    return width.lower().replace("uint", "u").replace("int", "i")
+
+
+def transfer(host: CtypesHost, verb: str, width: str, name: str, values: Any) -> int:
+    reference = ctypes.byref(ctypes.c_uint32(host.references[name]))
+    return host.call(f"{verb}{width}", reference, SIZE(1), values, SIZE(len(values)))
+
+
+def get(host: CtypesHost, width: str, name: str) -> int:
+    values = (C_TYPES[width] * 1)()
+    assert transfer(host, "Get", width, name, values) == OK, host.log[-1]
+    return values[0]
+
+
+def extremes(width: str) -> tuple[int, int]:
+    limits = np.iinfo(width.lower())
+    return int(limits.min), int(limits.max)
+
+
+@pytest.mark.parametrize("width", C_TYPES)
+def test_an_integer_of_every_width_passes_with_its_extremes(workshop: Workshop, width: str):
+    host = workshop.host(BLOCK, 3)
+    assert host.initialise() == OK
+    for k, value in enumerate(extremes(width)):
+        assert transfer(host, "Set", width, port_of(width), (C_TYPES[width] * 1)(value)) == OK
+        assert host.step(k * 0.5, 0.5) == OK, host.log[-1]
+        assert get(host, width, f"{port_of(width)}_out") == value
+
+
+def test_a_single_is_widened_on_its_way_in_and_rounded_on_its_way_out(workshop: Workshop):
+    host = workshop.host(BLOCK, 3)
+    stretch, x = np.float32(0.7), np.float32(0.3)
+    assert transfer(host, "Set", "Float32", "stretch", (ctypes.c_float * 1)(stretch)) == OK
+    assert transfer(host, "Set", "Float32", "x", (ctypes.c_float * 1)(x)) == OK
+    assert transfer(host, "Set", "Float32", "v", (ctypes.c_float * 3)(0.1, 0.2, math.pi)) == OK
+    assert host.initialise() == OK
+    one, three = (ctypes.c_float * 1)(), (ctypes.c_float * 3)()
+    assert transfer(host, "Get", "Float32", "x_out", one) == OK
+    assert transfer(host, "Get", "Float32", "v_out", three) == OK
+    assert one[0] == np.float32(float(stretch) * float(x))
+    assert list(three) == [2.0 * float(np.float32(entry)) for entry in (0.1, 0.2, math.pi)]
+
+
+def test_what_a_single_cannot_hold_is_refused_when_it_is_read(workshop: Workshop):
+    host = workshop.host(BLOCK, 3)
+    transfer(host, "Set", "Float32", "stretch", (ctypes.c_float * 1)(1e38))
+    transfer(host, "Set", "Float32", "x", (ctypes.c_float * 1)(1e38))
+    assert host.initialise() == OK
+    assert transfer(host, "Get", "Float32", "x_out", (ctypes.c_float * 1)()) == ERROR
+    assert "the value 1e+76 of 'x_out' is beyond Float32" in host.log[-1]
+
+
+@pytest.mark.parametrize(
+    ("width", "name", "message"),
+    [
+        ("Float64", "x", "'x' (value reference 3) is of type Float32"),
+        ("Float32", "time", "'time' (value reference 0) is of type Float64"),
+        ("Int64", "i16", "is of type Int16"),
+        ("UInt16", "i16", "is of type Int16"),
+        ("Int32", "x", "is of type Float32"),
+        ("Float32", "told", "is of type String"),
+        ("Boolean", "u8", "is of type UInt8"),
+    ],
+)
+def test_a_call_of_another_type_is_told_the_variables_own(workshop: Workshop, width: str, name: str, message: str):
+    host = workshop.host(BLOCK, 3)
+    host.initialise()
+    assert transfer(host, "Get", width, name, (ctypes.c_double * 1)()) == ERROR
+    assert message in host.log[-1]
+    assert transfer(host, "Set", width, name, (ctypes.c_double * 1)()) == ERROR
+    assert message in host.log[-1]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_output_outside_its_width_is_an_error_that_tells_the_range(workshop: Workshop, fmi: int):
+    host = workshop.host(BLOCK, fmi)
+    width = "Integer" if fmi == 2 else "Int16"
+    shift = (ctypes.c_int * 1)(-1) if fmi == 2 else (ctypes.c_int16 * 1)(-1)
+    assert set_integer(host, width, "shift", shift) == OK
+    assert host.initialise() == ERROR
+    told = "output 'i8_out' is declared as Int8 (from -128 to 127); the block gave int: -129"
+    assert told in host.log[-1]
+
+
+def get_integer(host: CtypesHost, name: str) -> int:
+    values = (ctypes.c_int * 1)()
+    assert host.call("GetInteger", ctypes.byref(ctypes.c_uint32(host.references[name])), SIZE(1), values) == OK
+    return values[0]
+
+
+def set_integer(host: CtypesHost, function: str, name: str, values: Any) -> int:
+    if host.fmi == 3:
+        return transfer(host, "Set", function, name, values)
+    return host.call("SetInteger", ctypes.byref(ctypes.c_uint32(host.references[name])), SIZE(1), values)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("i8", 128, "'i8' (value reference 6) takes Int8, from -128 to 127, not 128"),
+        ("u8", -1, "takes UInt8, from 0 to 255, not -1"),
+        ("i16", -40000, "takes Int16, from -32768 to 32767"),
+        ("u16", 65536, "takes UInt16, from 0 to 65535"),
+        ("u32", -1, "takes UInt32, from 0 to 4294967295, not -1"),
+        ("u64", -1, "takes UInt64, from 0 to"),
+    ],
+)
+def test_fmi_2_refuses_what_is_outside_an_inputs_width(workshop: Workshop, name: str, value: int, told: str):
+    host = workshop.host(BLOCK, 2)
+    assert host.initialise() == OK
+    before = get_integer(host, name)
+    assert set_integer(host, "Integer", name, (ctypes.c_int * 1)(value)) == ERROR
+    assert told in host.log[-1]
+    assert get_integer(host, name) == before
+
+
+def test_fmi_2_takes_every_integer_that_fits_and_reals_with_all_their_digits(workshop: Workshop):
+    host = workshop.host(BLOCK, 2)
+    assert host.set("x", [0.3]) == OK
+    assert host.set("v", [0.1, 0.2, math.pi]) == OK
+    values = {"i8": -128, "u8": 255, "i16": 2**15 - 1, "u16": 2**16 - 1, "i32": -(2**31), "u32": 2**31 - 1, "u64": 5}
+    for name, value in values.items():
+        assert set_integer(host, "Integer", name, (ctypes.c_int * 1)(value)) == OK, host.log[-1]
+    assert host.initialise() == OK
+    assert {name: get_integer(host, f"{name}_out") for name in values} == values
+    assert host.get("v_out", 3) == [0.2, 0.4, 2.0 * math.pi]
+    assert host.get("x_out") == [0.3 * float(np.float32(0.1))]
+
+
+def test_fmi_2_refuses_integers_whose_start_has_no_place_in_32_bits(workshop: Workshop):
+    with pytest.raises(NoFmi2Form, match=r"integers have 32 bits, too few for start values \(most\); use FMI 3"):
+        workshop.fmu("every_width:Long", 2)
+    host = workshop.host("every_width:Long", 3)
+    assert host.initialise() == OK
+    assert get(host, "UInt64", "most_out") == get(host, "UInt64", "most") == 2**64 - 1

@@ -1,0 +1,127 @@
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fmus.build import cached
+from fmus.catalog import UNITS
+from fmus.fmi2_description import NoFmi2Form
+from scenarios.command import main
+
+LIGHT = ("Push", "IrReflex", "TrajectoryPlanner")
+
+
+def check(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["check", *(str(a) for a in arguments)])
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> Path:
+    made = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(made, "w") as archive:
+        archive.writestr("../../escaped", b"")
+        archive.writestr("readme.txt", b"")
+    return made
+
+
+def assert_passes(unit: str, fmi: int) -> None:
+    try:
+        result = check(cached(unit, fmi), "--json")
+    except NoFmi2Form:
+        pytest.skip("FMI 2 has no binary variables")
+    assert result.exit_code == 0, result.output
+    (report,) = json.loads(result.output)
+    assert all(c["result"] in ("ok", "note") for c in report["checks"]), result.output
+    assert "second instance, reset" in report["checks"][-1]["told"]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("unit", LIGHT)
+def test_a_light_unit_of_the_catalog_passes(unit: str, fmi: int):
+    assert_passes(unit, fmi)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("unit", [name for name in UNITS if name not in LIGHT])
+def test_every_unit_of_the_catalog_passes(unit: str, fmi: int):
+    assert_passes(unit, fmi)
+
+
+def test_a_fault_is_told_with_status_1(broken: Path):
+    result = check(broken)
+    assert result.exit_code == 1
+    lines = result.output.splitlines()
+    assert lines[0] == str(broken)
+    assert lines[1].split() == ["fault", "archive"]
+    assert lines[2] == " " * 11 + (
+        "- the archive holds paths that lead out of it; they must be relative, with slashes: ../../escaped"
+    )
+    assert "  -        description  not reached: see archive" in lines
+    assert lines[-1] == "not usable as it is (1 fault)"
+
+
+def test_the_worst_of_several_files_decides(broken: Path):
+    result = check(cached("Push", 2), broken)
+    assert result.exit_code == 1
+    assert "usable: no faults were found" in result.output
+    assert "not usable as it is" in result.output
+
+
+def test_files_that_are_not_there_are_all_told_before_anything_is_checked(broken: Path, tmp_path: Path):
+    result = check(broken, tmp_path / "missing.fmu", tmp_path)
+    assert result.exit_code == 2
+    assert "missing.fmu: no such file" in result.output
+    assert f"{tmp_path}: a folder, not a file" in result.output
+    assert "archive" not in result.output
+
+
+@pytest.mark.parametrize("arguments", [[], ["--timeout", "0", "x.fmu"], ["--timeout", "soon", "x.fmu"]])
+def test_a_bad_call_is_refused(arguments: list[str]):
+    assert check(*arguments).exit_code == 2
+
+
+def test_json_holds_what_was_found(broken: Path):
+    result = check("--json", broken)
+    assert result.exit_code == 1
+    (report,) = json.loads(result.output)
+    assert report["file"] == str(broken)
+    assert not report["passed"]
+    assert [c["result"] for c in report["checks"]] == ["fault"] + 5 * ["not reached"]
+    (finding,) = report["checks"][0]["findings"]
+    assert finding["level"] == "fault"
+    assert "lead out" in finding["what"]
+
+
+def test_any_file_is_told_without_a_traceback(tmp_path: Path):
+    for content in (b"", b"PK\x03\x04", b"PK\x05\x06" + bytes(18), os.urandom(5000)):
+        file = tmp_path / "x.fmu"
+        file.write_bytes(content)
+        result = check(file)
+        assert (result.exit_code, result.exception.__class__) == (1, SystemExit)
+        assert "fault    " in result.output
+
+
+def test_what_a_file_says_does_not_steer_the_terminal(tmp_path: Path):
+    file = tmp_path / "x.fmu"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("modelDescription.xml", '<fmiModelDescription fmiVersion="\u009b31m\u202e[bold]"/>')
+    result = check(file)
+    assert result.exit_code == 1
+    assert "an FMU of FMI \ufffd31m\ufffd[bold]" in result.output
+
+
+def test_a_reader_who_leaves_does_not_change_the_status(broken: Path, tmp_path: Path):
+    command = [sys.executable, "-c", "from scenarios.entry import main; main()", "check", str(broken)]
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (1, "")
