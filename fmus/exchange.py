@@ -162,7 +162,7 @@ def _compiled(statement: str, names: dict[str, Any]) -> Callable[[Any], None]:
     A dozen attributes written out are set or read in a third of the time that a loop over their names takes.
     """
     exec(f"def run(x):\n    {statement}\n", names)
-    run: Callable[[Any], None] = names["run"]
+    run: Callable[[Any], None] = names.pop("run")  # else the function and its names would hold each other
     return run
 
 

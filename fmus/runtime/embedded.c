@@ -74,32 +74,44 @@ static PyObject *invoke(const Instance *instance, const char *method, PyObject *
     return result;
 }
 
-/* Runs the loader's source and returns its global names. */
+#define READY "loader is complete"
+
+/* The global names of a loader of this source: instances share them, or each would leave garbage for the collector. */
+static PyObject *loader_names(const char *source) {
+    uint64_t digest = 0xcbf29ce484222325u; /* FNV-1a */
+    for (const char *at = source; *at; at++) digest = (digest ^ (unsigned char)*at) * 0x100000001b3u;
+    Text name = {0};
+    text_add(&name, "_fmu_loader_%016llx", (unsigned long long)digest);
+    PyObject *module = py.PyImport_AddModule(text_of(&name));
+    PyObject *names = module ? py.PyModule_GetDict(module) : NULL;
+    if (names) py.Py_IncRef(names);
+    text_clear(&name);
+    return names;
+}
+
+/* Runs the loader's source, unless an earlier instance has, and returns its global names. */
 static PyObject *run_loader(const Instance *instance, const char *function, const char *resources) {
     Text path = {0};
     text_add(&path, "%s/sources/fmus/loader.py", resources);
     char *source = platform_read_file(text_of(&path));
-    PyObject *globals = NULL;
-    if (source) {
+    PyObject *names = source ? loader_names(source) : NULL;
+    if (!source) refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+    if (names && !py.PyDict_GetItemString(names, READY)) {
         PyObject *code = py.Py_CompileString(source, text_of(&path), FILE_INPUT);
-        PyObject *name = py.PyUnicode_FromString("fmu_loader");
-        globals = py.PyDict_New();
-        py.PyDict_SetItemString(globals, "__name__", name);
-        PyObject *done = code ? py.PyEval_EvalCode(code, globals, globals) : NULL;
-        if (!done) {
+        PyObject *done = code ? py.PyEval_EvalCode(code, names, names) : NULL;
+        if (done) {
+            py.PyDict_SetItemString(names, READY, done);
+        } else {
             log_exception(instance, function);
-            drop(globals);
-            globals = NULL;
+            drop(names);
+            names = NULL;
         }
         drop(done);
-        drop(name);
         drop(code);
-    } else {
-        refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
     }
     free(source);
     text_clear(&path);
-    return globals;
+    return names;
 }
 
 static PyObject *item(PyObject *dictionary, const char *name) {

@@ -87,8 +87,8 @@ fmi3Status fmi3SetString(fmi3Instance handle, References vr, size_t n, const fmi
 fmi3Status fmi3GetBinary(fmi3Instance handle, References vr, size_t n, size_t sizes[], fmi3Binary values[],
                          size_t n_values) {
     Instance *instance = handle;
-    if (!may_get(instance, __func__, BINARY, TYPE_BINARY, vr, n, values, n_values)) return fmi3Error;
     if (n > 0 && !given(instance, __func__, sizes, "valueSizes")) return fmi3Error;
+    if (!may_get(instance, __func__, BINARY, TYPE_BINARY, vr, n, values, n_values)) return fmi3Error;
     for (size_t i = 0; i < n; i++) {
         uint32_t index = variable_of(instance, vr[i])->offset;
         values[i] = (fmi3Binary)(uintptr_t)instance->binaries[index].address;
@@ -116,6 +116,7 @@ fmi3Status fmi3SetBinary(fmi3Instance handle, References vr, size_t n, const siz
     if (n > 0 && !given(instance, __func__, sizes, "valueSizes")) return fmi3Error;
     for (size_t i = 0; i < n; i++)
         if (!fits(instance, __func__, variable_of(instance, vr[i]), sizes[i], values[i])) return fmi3Error;
+    if (n > 0) instance->outputs_stale = true;
     for (size_t i = 0; i < n; i++) {
         uint32_t index = variable_of(instance, vr[i])->offset;
         const BinaryBuffer *buffer = &instance->binaries[index];

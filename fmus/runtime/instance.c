@@ -88,11 +88,12 @@ double time_tolerance(const Instance *instance) {
 }
 
 Status plain_step(Instance *instance, const char *function, double t, double dt) {
-    double before = instance->floats[0];
+    double before = instance->floats[0], dt_before = instance->floats[1];
     instance->floats[0] = t;
     instance->floats[1] = dt;
     if (slave_step(instance, function) != STATUS_OK) {
         instance->floats[0] = before;
+        instance->floats[1] = dt_before;
         return STATUS_ERROR;
     }
     instance->floats[0] = t + dt;

@@ -37,6 +37,8 @@ typedef ptrdiff_t Py_ssize_t;
     F(PyObject *, PyDict_New, (void))                                         \
     F(PyObject *, PyDict_GetItemString, (PyObject *, const char *))           \
     F(int, PyDict_SetItemString, (PyObject *, const char *, PyObject *))      \
+    F(PyObject *, PyImport_AddModule, (const char *))                         \
+    F(PyObject *, PyModule_GetDict, (PyObject *))                             \
     F(PyObject *, PyLong_FromSize_t, (size_t))                                \
     F(PyObject *, PyUnicode_FromString, (const char *))                       \
     F(PyObject *, PyUnicode_AsUTF8String, (PyObject *))                       \

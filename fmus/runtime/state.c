@@ -14,6 +14,7 @@ typedef struct {
     double stop_time;
     Events events;
     uint64_t size;
+    uint64_t digest; /* of a serialised state; it is 0 while it is worked out, and in memory */
 } StateHeader;
 
 struct SavedState {
@@ -21,6 +22,26 @@ struct SavedState {
     StateHeader header;
     char *bytes; /* what fmus/slave.py made: the buffers with the time, and the block's own state */
 };
+
+/* FNV-1a by words, with the upper half folded in: else what only differs in the highest bits of two words is the same. */
+static uint64_t digest_on(uint64_t digest, const void *bytes, size_t size) {
+    for (const char *at = bytes; size > 0;) {
+        uint64_t word = 0;
+        size_t n = size < sizeof word ? size : sizeof word;
+        memcpy(&word, at, n);
+        digest = (digest ^ word) * 0x100000001b3u;
+        digest ^= digest >> 32;
+        at += n;
+        size -= n;
+    }
+    return digest;
+}
+
+/* A block's state is what its own code made; it is not asked to recognise one that was damaged on its way. */
+static uint64_t digest_of(StateHeader header, const char *bytes) {
+    header.digest = 0;
+    return digest_on(digest_on(0xcbf29ce484222325u, &header, sizeof header), bytes, header.size);
+}
 
 static void release(SavedState *state) {
     free(state->bytes);
@@ -130,7 +151,9 @@ Status state_serialise(Instance *instance, const char *function, void *state, vo
     if (size < sizeof *header + header->size)
         return refuse(instance, function, "%zu bytes where the state has %zu", size,
                       sizeof *header + (size_t)header->size);
-    memcpy(bytes, header, sizeof *header);
+    StateHeader written = *header;
+    written.digest = digest_of(written, (*at)->bytes);
+    memcpy(bytes, &written, sizeof written);
     memcpy((char *)bytes + sizeof *header, (*at)->bytes, header->size);
     return STATUS_OK;
 }
@@ -147,15 +170,19 @@ Status state_deserialise(Instance *instance, const char *function, const void *b
         return STATUS_ERROR;
     StateHeader header;
     if (size >= sizeof header) memcpy(&header, bytes, sizeof header);
+    const char *rest = (const char *)bytes + sizeof header;
     if (size < sizeof header || !plausible(&header, size))
         return refuse(instance, function, "these %zu bytes are not a state that this unit serialised", size);
+    if (header.digest != digest_of(header, rest))
+        return refuse(instance, function, "these %zu bytes were changed since this unit serialised them", size);
     char *copy = malloc(header.size ? header.size : 1);
     SavedState *saved = copy ? add(instance, function) : NULL;
     if (!saved) {
         free(copy);
         return STATUS_ERROR;
     }
-    memcpy(copy, (const char *)bytes + sizeof header, header.size);
+    memcpy(copy, rest, header.size);
+    header.digest = 0;
     saved->header = header;
     saved->bytes = copy;
     *state = saved;

@@ -1,5 +1,6 @@
 #include "text.h"
 
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,4 +36,22 @@ char *copy_of(const char *string) {
     size_t size = strlen(string) + 1;
     char *copy = malloc(size);
     return copy ? memcpy(copy, string, size) : NULL;
+}
+
+bool is_utf8(const char *string) {
+    const unsigned char *at = (const unsigned char *)string;
+    while (*at) {
+        unsigned lead = *at++;
+        if (lead < 0x80) continue;
+        unsigned more = lead >= 0xf0 ? 3 : lead >= 0xe0 ? 2 : 1;
+        uint32_t code = lead & (0x3fu >> more);
+        if (lead < 0xc2 || lead > 0xf4) return false;
+        for (unsigned i = 0; i < more; i++, at++) {
+            if ((*at & 0xc0) != 0x80) return false; /* this is also where a string ends too early */
+            code = code << 6 | (*at & 0x3fu);
+        }
+        static const uint32_t least[] = {0, 0x80, 0x800, 0x10000};
+        if (code < least[more] || code > 0x10ffff || (code >= 0xd800 && code <= 0xdfff)) return false;
+    }
+    return true;
 }

@@ -3,6 +3,7 @@
 #define TEXT_H
 
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 
 typedef struct {
@@ -15,5 +16,6 @@ void text_add_list(Text *text, const char *format, va_list arguments);
 void text_clear(Text *text);
 const char *text_of(const Text *text);
 char *copy_of(const char *string);
+bool is_utf8(const char *string);
 
 #endif

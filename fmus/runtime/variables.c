@@ -97,7 +97,8 @@ bool may_set(Instance *instance, const char *function, Kind kind, Type type, con
         count += variable->count;
     }
     if (!counted(instance, function, count, values, n_values)) return false;
-    instance->outputs_stale = true;
+    bool may_yet_be_refused = kind == STRING || kind == BINARY; /* one value by one, by whoever sets them */
+    if (n > 0 && !may_yet_be_refused) instance->outputs_stale = true;
     return true;
 }
 
@@ -181,8 +182,12 @@ Status get_strings(Instance *instance, const char *function, Type type, const ui
 Status set_strings(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
                    const char *const values[], size_t n_values) {
     if (!may_set(instance, function, STRING, type, vr, n, values, n_values)) return STATUS_ERROR;
-    for (size_t i = 0; i < n; i++)
-        if (!given(instance, function, values[i], name_of(instance, variable_of(instance, vr[i])))) return STATUS_ERROR;
+    for (size_t i = 0; i < n; i++) {
+        const char *name = name_of(instance, variable_of(instance, vr[i]));
+        if (!given(instance, function, values[i], name)) return STATUS_ERROR;
+        if (!is_utf8(values[i])) return refuse(instance, function, "the value for '%s' is not UTF-8", name);
+    }
+    if (n > 0) instance->outputs_stale = true;
     for (size_t i = 0; i < n; i++)
         if (slave_set_string(instance, function, variable_of(instance, vr[i])->offset, values[i]) != STATUS_OK)
             return STATUS_ERROR;

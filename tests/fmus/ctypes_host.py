@@ -41,10 +41,10 @@ class CtypesHost:
         event_needed, terminate, early, last_time: what the last step answered (FMI 3).
     """
 
-    def __init__(self, fmu: Path, fmi: int) -> None:
+    def __init__(self, fmu: Path, fmi: int, prefix: str = "a 100% größerer Ordner ") -> None:
         self.fmi = fmi
         self.log: list[str] = []
-        self.folder = Path(tempfile.mkdtemp(prefix="a 100% größerer Ordner "))
+        self.folder = Path(tempfile.mkdtemp(prefix=prefix))
         with zipfile.ZipFile(fmu) as archive:
             archive.extractall(self.folder)
         root = ET.parse(self.folder / "modelDescription.xml").getroot()
@@ -62,7 +62,7 @@ class CtypesHost:
         self.logging = False
         self._log2 = Log2(self._take_2)
         self.logger3 = Log3(self._take_3)
-        self._callbacks = Callbacks(logger=self._log2)
+        self.callbacks = Callbacks(logger=self._log2)
 
     def instantiate(self, token: str | None = None, *, event_mode: bool = False, early_return: bool = False) -> bool:
         """Make the instance; tell whether it was made."""
@@ -75,7 +75,7 @@ class CtypesHost:
                 1,
                 given,
                 resources.as_uri().encode(),
-                ctypes.byref(self._callbacks),
+                ctypes.byref(self.callbacks),
                 0,
                 int(self.logging),
             )

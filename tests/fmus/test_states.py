@@ -25,6 +25,18 @@ def ten_steps(host: CtypesHost) -> list[list[float]]:
     return seen
 
 
+def resealed(data: bytes) -> bytes:
+    """Return a serialised state that was changed with the digest that fits, as another writer would give it."""
+    head, mask = 64, (1 << 64) - 1
+    blank = data[: head - 8] + bytes(8)
+    digest = 0xCBF29CE484222325
+    for part in (blank, data[head:]):
+        for at in range(0, len(part), 8):
+            digest = ((digest ^ int.from_bytes(part[at : at + 8], "little")) * 0x100000001B3) & mask
+            digest ^= digest >> 32
+    return data[: head - 8] + struct.pack("=Q", digest) + data[head:]
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_what_follows_a_restored_state_is_the_same_bit_for_bit(workshop: Workshop, fmi: int):
     host = ready(workshop, fmi)
@@ -88,7 +100,21 @@ def test_bytes_that_are_no_state_are_refused(workshop: Workshop, damage: bytes):
     assert "not a state that this unit serialised" in host.log[-1]
 
 
-def test_a_damaged_or_foreign_state_is_refused_when_set(workshop: Workshop):
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_serialised_state_with_flipped_bits_is_refused(workshop: Workshop, fmi: int):
+    host = ready(workshop, fmi)
+    good = serialised(host, save(host))
+    assert resealed(good) == good
+    for bits in [(7, 71), *((bit,) for bit in range(0, 8 * len(good), 97))]:
+        damaged = bytearray(good)
+        for bit in bits:
+            damaged[bit // 8] ^= 1 << bit % 8
+        assert deserialise(host, bytes(damaged))[0] == ERROR
+    assert "changed since" in host.log[-1]
+    assert deserialise(host, good)[0] == OK
+
+
+def test_a_foreign_state_is_refused_when_set(workshop: Workshop):
     host, other = ready(workshop, 3), workshop.host("scalars:Scalars", 3)
     other.initialise()
     data = serialised(host, save(host))
@@ -102,9 +128,8 @@ def test_a_damaged_or_foreign_state_is_refused_when_set(workshop: Workshop):
 def test_a_state_with_a_parameter_out_of_range_changes_nothing(workshop: Workshop):
     host, other = ready(workshop, 3), ready(workshop, 3)
     expected = ten_steps(ready(workshop, 3))
-    state = deserialise(other, serialised(host, save(host)).replace(struct.pack("d", 2.0), struct.pack("d", 12.0), 1))[
-        1
-    ]
+    data = serialised(host, save(host)).replace(struct.pack("d", 2.0), struct.pack("d", 12.0), 1)
+    state = deserialise(other, resealed(data))[1]
     assert other.call("SetFMUState", state) == ERROR
     assert "parameter 'gain'" in other.log[-1]
     assert ten_steps(other) == expected
@@ -113,7 +138,7 @@ def test_a_state_with_a_parameter_out_of_range_changes_nothing(workshop: Worksho
 def test_an_instance_whose_block_fails_to_take_a_state_has_failed(workshop: Workshop):
     host, other = ready(workshop, 3), ready(workshop, 3)
     data = serialised(host, save(host))
-    state = deserialise(other, data[:-40] + bytes(40))[1]
+    state = deserialise(other, resealed(data[:-40] + bytes(40)))[1]
     assert other.call("SetFMUState", state) == ERROR
     assert other.step(3 * DT, DT) == ERROR
     assert "failed: only reset" in other.log[-1]

@@ -1,0 +1,79 @@
+"""Sequences of calls that the standards forbid: each is refused, named in the log, and changes nothing."""
+
+import random
+from collections.abc import Callable
+
+import illegal_instances
+import illegal_states
+import illegal_times
+import illegal_variables
+from legal_calls import Effort, LegalCalls
+from subject import Fault, Saved, Subject
+
+Offence = Callable[[Subject, random.Random], None]
+
+REFUSALS: tuple[Offence, ...] = (
+    *illegal_variables.REFUSALS,
+    *illegal_times.REFUSALS,
+    *illegal_states.REFUSALS,
+    *illegal_instances.REFUSALS,
+)
+"""Calls that are refused at once."""
+
+POISONS: tuple[Offence, ...] = (*illegal_variables.POISONS, *illegal_times.POISONS)
+"""Values that may be set, but with which the unit refuses to go on."""
+
+
+class IllegalCalls:
+    """A few offences against an instance in any mode; after them it goes on as if nothing had happened.
+
+    Args:
+        subject: whom they are against.
+        other: another instance of the same unit, and `foreign` a state of it.
+        ready: a state of `subject` after initialisation with start values.
+    """
+
+    def __init__(self, subject: Subject, foreign: Saved, ready: Saved, rng: random.Random, effort: Effort) -> None:
+        self.subject, self.foreign, self.ready, self.rng, self.effort = subject, foreign, ready, rng, effort
+
+    def run(self) -> None:
+        """Make the sequence."""
+        s, rng = self.subject, self.rng
+        self._take_position()
+        place = s.save()
+        before = s.serialised(place) if rng.random() < self.effort.bytes else None
+        for _ in range(rng.randint(3, 8)):
+            rng.choice(REFUSALS)(s, rng)
+        illegal_states.refuse_foreign_state(s, self.foreign)
+        if before is not None:
+            illegal_states.refuse_corrupted_state(s, before, rng)
+            self._expect_unchanged(before)
+        if rng.random() < max(0.05, 0.5 * self.effort.from_scratch):
+            rng.choice(POISONS)(s, rng)
+            s.restore(place)
+        s.forget(place)
+        if rng.random() < self.effort.from_scratch:
+            LegalCalls(s, self.ready, rng, self.effort).one()
+
+    def _take_position(self) -> None:
+        s, mode = self.subject, self.rng.choice(["instantiated", "initialisation", "ready", "ready", "terminated"])
+        if mode in ("instantiated", "initialisation"):
+            s.reset()
+        else:
+            s.restore(self.ready)
+        if mode == "initialisation":
+            s.enter()
+        if mode == "ready" and s.mode == "event" and self.rng.random() < 0.5:
+            s.demand("EnterStepMode")
+            s.mode = "stepping"
+        if mode == "terminated":
+            s.demand("Terminate")
+            s.mode = "terminated"
+
+    def _expect_unchanged(self, before: bytes) -> None:
+        saved = self.subject.save()
+        after = self.subject.serialised(saved)
+        self.subject.forget(saved)
+        if after != before:
+            at = next((i for i, (x, y) in enumerate(zip(before, after, strict=False)) if x != y), len(before))
+            raise Fault(f"refused calls changed the instance, from byte {at} of its {len(before)} bytes of state on")

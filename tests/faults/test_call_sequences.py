@@ -1,0 +1,132 @@
+"""Every unit stands thousands of random calls, legal ones and illegal ones, in a process of its own.
+
+A failure names the sequence by its seed and number, and the last calls; `python tests/faults/driver.py` plays it again.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from call_ring import count_of, lines_of
+
+from fmus.build import build_block, cached
+from fmus.catalog import UNITS
+
+DRIVER = Path(__file__).with_name("driver.py")
+SEED = 20
+FEW, MANY = 60, 2000
+HUNG = 60
+"""Seconds without another call."""
+
+KINDS = ("legal", "illegal")
+LIGHT = ("Push", "HybridKinematics")
+ONLY_FMI3 = ("StereoCamera", "HandoverVision")
+
+
+@dataclass
+class Job:
+    """A process: one unit, one standard, one kind of sequences."""
+
+    fmu: Path
+    fmi: int
+    kind: str
+    count: int
+    ring: Path
+    process: "subprocess.Popen[str] | None" = field(default=None, init=False)
+
+    def run(self) -> dict[str, Any]:
+        """Return what the driver found; a crash or a hang is a fault, too."""
+        given = [self.fmu, self.fmi, self.kind, self.count, SEED, self.ring]
+        self.process = subprocess.Popen(
+            [sys.executable, str(DRIVER), *map(str, given)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        seen = -1
+        while True:
+            try:
+                out, errors = self.process.communicate(timeout=HUNG)
+                break
+            except subprocess.TimeoutExpired:
+                count = count_of(self.ring) if self.ring.is_file() else 0
+                if count == seen:
+                    return self._lost(f"no call ended for {HUNG} s")
+                seen = count
+        if self.process.returncode not in (0, 1) or not out:
+            return self._lost(f"the process ended with {self.process.returncode}: {errors[-3000:]}")
+        return json.loads(out)
+
+    def _lost(self, fault: str) -> dict[str, Any]:
+        calls = lines_of(self.ring) if self.ring.is_file() else []
+        sequence = next((c for c in reversed(calls) if c.startswith("---")), "before the first sequence")
+        return {"faults": [{"sequence": sequence, "fault": fault, "calls": calls}], "calls": len(calls)}
+
+
+class Crew:
+    """Runs jobs two at a time and ends what is left of them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.jobs: list[Job] = []
+
+    def run(self, fmus: list[tuple[Path, int]], count: int) -> None:
+        """Run both kinds of sequences on every FMU, print a line for each, and expect no fault."""
+        self.jobs = [
+            Job(fmu, fmi, kind, count, self.folder / f"{i}-{kind}.ring")
+            for i, (fmu, fmi) in enumerate(fmus)
+            for kind in KINDS
+        ]
+        with ThreadPoolExecutor(2) as pool:
+            found = list(pool.map(Job.run, self.jobs))
+        told: list[str] = []
+        for job, result in zip(self.jobs, found, strict=True):
+            line = f"{job.fmu.name} {job.kind}: {count} sequences of seed {SEED}, {result['calls']} calls"
+            print(f"{line}, {result.get('refused', 0)} refused by the block, {result.get('cpu', 0.0):.1f} s of CPU")
+            for fault in result["faults"]:
+                calls = "\n    ".join(fault["calls"])
+                told.append(f"{line}; sequence {fault['sequence']}: {fault['fault']}\n    {calls}")
+            enough = job.kind == "illegal" or result.get("refused", 0) < 0.02 * result["calls"]
+            if not enough:
+                told.append(f"{line}: {result['refused']} legal calls were refused")
+        assert not told, "\n".join(told)
+
+    def end(self) -> None:
+        """Kill what still runs."""
+        for process in (job.process for job in self.jobs if job.process):
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+
+
+@pytest.fixture
+def crew(tmp_path: Path) -> Iterator[Crew]:
+    made = Crew(tmp_path)
+    yield made
+    made.end()
+
+
+def sample_fmus(folder: Path) -> list[tuple[Path, int]]:
+    return [(build_block("sample_units.every_kind:EveryKind", fmi, folder), fmi) for fmi in (2, 3)]
+
+
+def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
+    return [(cached(n, fmi), fmi) for n in names for fmi in ((3,) if n in ONLY_FMI3 else (2, 3))]
+
+
+def test_a_few_sequences_on_light_units(crew: Crew, tmp_path: Path):
+    crew.run([*sample_fmus(tmp_path), *catalog_fmus(LIGHT)], FEW)
+
+
+@pytest.mark.slow
+def test_thousands_of_sequences_on_every_unit(crew: Crew, tmp_path: Path):
+    slowest_first = sorted(UNITS, key=lambda n: (n not in ONLY_FMI3, n != "TendonArm"))
+    crew.run([*catalog_fmus(tuple(slowest_first)), *sample_fmus(tmp_path)], MANY)
