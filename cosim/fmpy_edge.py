@@ -1,7 +1,9 @@
 """The typed edge to FMPy: reading model descriptions, unpacking, and loading FMUs of both standards."""
 
 import ctypes
+import itertools
 import os
+import weakref
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
@@ -192,22 +194,37 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
     Raises:
         InvalidFmu: the library does not load, lacks a function, or does not instantiate.
     """
-
-    def log_message(_component: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-        log(status, message.decode("utf-8", "replace"))
-
+    place = next(_places)
     callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(log_message)
+    callbacks.logger = _dispatch_fmi2
     callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    callbacks.componentEnvironment = place
     fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
     with _loading(path):
         fmu = fmpy.fmi2.FMU2Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
+        _loggers[place] = log
+        weakref.finalize(fmu, _loggers.pop, place, None)
         with _unloading(fmu):
             fmu.instantiate(callbacks=callbacks, loggingOn=True)
         return fmu
+
+
+_places = itertools.count(1)
+_loggers: dict[int, Logger] = {}
+
+
+def _log_fmi2(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+    log = _loggers.get(environment or 0)
+    if log is not None:
+        log(status, message.decode("utf-8", "replace"))
+
+
+_dispatch_fmi2 = fmpy.fmi2.fmi2CallbackLoggerTYPE(_log_fmi2)
+"""The logger of all FMI 2 units. FMPy's proxy, which puts the arguments into messages, knows one logger in a process,
+the last that it was given, and calls it ever after: so it must be one that tells units apart and that stays."""
 
 
 @contextmanager

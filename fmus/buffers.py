@@ -2,7 +2,7 @@
 
 import struct
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from cosim.block import Causality, Variable
 from cosim.ports import Floats, Raster
 from fmus.layout import Buffer, Layout, Slot, capacity
+
+ALIGNMENT = 64
+"""Bytes: arrays begin at multiples of a cache line in their memory."""
 
 
 class UnfitState(ValueError):
@@ -30,17 +33,26 @@ class Buffers:
         integers: int64 whatever the width; a UInt64 variable's 64 bits are read as int64.
         strings: UTF-8, as the host sees them.
         binaries: a buffer of fixed capacity for each of `binary_variables`, of which `sizes` are in use.
+
+    Args:
+        layout: of the variables.
+        memory: gives memory of that many bytes for all but the strings, such as some that is shared with a host in
+            another process; its content does not matter. Without it the memory is this process's own.
     """
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: Layout, memory: Callable[[int], Any] | None = None) -> None:
         self.layout = layout
-        self.floats = np.zeros(layout.lengths[Buffer.FLOAT64])
-        self.integers = np.zeros(layout.lengths[Buffer.INT64], dtype=np.int64)
-        self.booleans = np.zeros(layout.lengths[Buffer.BOOLEAN], dtype=np.bool_)
         self.strings = [b""] * layout.lengths[Buffer.STRING]
         self.binary_variables = [slot.variable for slot in layout.in_buffer(Buffer.BINARY)]
-        self.binaries = [np.zeros(capacity(v), dtype=np.uint8) for v in self.binary_variables]
-        self.sizes = np.zeros(len(self.binaries), dtype=np.uint64)
+        wanted: list[tuple[int, type[np.generic]]] = [
+            (layout.lengths[Buffer.FLOAT64], np.float64),
+            (layout.lengths[Buffer.INT64], np.int64),
+            (layout.lengths[Buffer.BOOLEAN], np.bool_),
+            (len(self.binary_variables), np.uint64),
+            *((capacity(v), np.uint8) for v in self.binary_variables),
+        ]
+        arrays = _arrays(wanted, memory or (lambda size: np.zeros(size, dtype=np.uint8)))
+        self.floats, self.integers, self.booleans, self.sizes, *self.binaries = arrays
         self.reset()
 
     def reset(self) -> None:
@@ -106,6 +118,18 @@ class Buffers:
             self.binaries[i][: len(part)] = np.frombuffer(part, dtype=np.uint8)
             self.sizes[i] = len(part)
         self.strings[:] = strings
+
+
+def _arrays(wanted: list[tuple[int, type[np.generic]]], memory: Callable[[int], Any]) -> list[NDArray[Any]]:
+    """Return arrays of these lengths and types, one behind the other in one piece of memory."""
+    places = [0]
+    for n, kind in wanted:
+        end = places[-1] + n * np.dtype(kind).itemsize
+        places.append(end + -end % ALIGNMENT)
+    whole = np.frombuffer(memory(places[-1]), dtype=np.uint8)
+    return [
+        whole[at : at + n * np.dtype(kind).itemsize].view(kind) for at, (n, kind) in zip(places, wanted, strict=False)
+    ]
 
 
 def to_signed(number: int) -> int:

@@ -19,13 +19,18 @@ RUNTIME = Path(__file__).with_name("runtime")
 
 SHARED_SOURCES = (
     "derivatives.c",
+    "embedded.c",
     "events.c",
     "instance.c",
     "log.c",
     "platform.c",
     "process_lock.c",
+    "process_posix.c",
+    "process_windows.c",
     "python_api.c",
+    "remote.c",
     "sampling.c",
+    "shared_memory.c",
     "slave.c",
     "state.c",
     "text.c",

@@ -4,12 +4,14 @@ There is one buffer per kind. The real one begins with the time and the step siz
 parameters, the inputs and the outputs. Scalars stand before arrays, so that all real input scalars are one slice.
 """
 
+import dataclasses
 import enum
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cosim.block import Causality, Description, Kind, Variable
+from cosim.width import Width
 
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""
@@ -180,11 +182,15 @@ class Layout:
         return form is Form.FMI3 and self.description.period is not None
 
     def shown(self, form: Form) -> list[HostVariable]:
-        """Return the variables as a host sees them, by value reference. FMI 3's value reference 0 is the time."""
+        """Return the variables as a host sees them, by value reference. FMI 3's value reference 0 is the time.
+
+        In FMI 3's scalar form integers are Int32 if what is declared of them allows it: Ecos, for which that form is
+        made, has 32 bits for each and writes beyond its memory when it reads several Int64 at once.
+        """
         made: list[HostVariable] = []
         first = 0 if form is Form.FMI2 else 1
         for name, slot in self.slots.items():
-            v = slot.variable
+            v = _narrow(slot.variable) if form is Form.FMI3_SCALAR else slot.variable
             if form.has_arrays:
                 made.append(HostVariable(v, name, first + len(made), slot.buffer, slot.offset, range(v.size), v.shape))
                 continue
@@ -200,6 +206,12 @@ class Layout:
             name = shown.variable.name
             references[name] = (*references.get(name, ()), shown.reference)
         return references
+
+
+def _narrow(v: Variable) -> Variable:
+    declared = [n for n in (v.start, v.minimum, v.maximum) if n is not None]
+    fits = v.width is Width.INT64 and all(map(Width.INT32.holds, declared))
+    return dataclasses.replace(v, width=Width.INT32) if fits else v
 
 
 def element_names(variable: Variable) -> list[str]:

@@ -19,7 +19,7 @@ import sys
 import threading
 import traceback
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 _builtin_import = builtins.__import__
@@ -31,12 +31,13 @@ class Refusal(Exception):
     is_refusal = True
 
 
-def start(resources: str, token: str) -> Any:
+def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = None) -> Any:
     """Make an instance's Python side, a `fmus.slave.Slave`.
 
     Args:
         resources: the FMU's folder of that name, unpacked.
         token: the GUID or instantiation token that the host read in the model description.
+        memory: gives the memory for that many bytes of variables; without it they lie in this process's own.
 
     Raises:
         Refusal: the token is that of another FMU, or packages are missing.
@@ -48,7 +49,7 @@ def start(resources: str, token: str) -> Any:
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
-    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["form"])
+    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["form"], memory)
 
 
 def warning(resources: str) -> str:
@@ -89,7 +90,7 @@ def _require(unit: dict[str, Any], resources: str) -> None:
             f"unit {unit['unit']} needs packages that this Python does not have: {names}."
             f" This is Python {sys.version.split()[0]}, prefix {sys.prefix}, executable {sys.executable or 'unknown'}."
             f" Cure: install them into it, for instance with `python -m pip install {wanted}`,"
-            " or choose another Python with the environment variable FMU_LIBPYTHON (hosts that are not Python)."
+            " or choose another Python with the environment variable FMU_PYTHON (hosts that are not Python)."
         )
 
 

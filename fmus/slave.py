@@ -1,6 +1,7 @@
 """The Python side of an FMU's instance: what the C runtime calls (runtime/slave.c)."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from cosim.block import describe
@@ -21,15 +22,16 @@ class Slave:
     Args:
         block: the block's class.
         form: a value of `Form`; it decides what a value reference stands for.
+        memory: where the variables lie, see `Buffers`.
     """
 
     _block: Any  # a cosim.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
 
-    def __init__(self, block: type[Any], form: str) -> None:
+    def __init__(self, block: type[Any], form: str, memory: Callable[[int], Any] | None = None) -> None:
         self._type = block
         self._form = Form(form)
         description = describe(block)
-        self._buffers = Buffers(Layout(description))
+        self._buffers = Buffers(Layout(description), memory)
         self._clock = self._buffers.floats[:2]
         self._read = input_reader(self._buffers)
         self._write = output_writer(self._buffers)

@@ -16,7 +16,7 @@ from pathlib import Path
 HOUSE = ("cosim", "plants", "controllers", "fmus")
 """Packages that every FMU carries as sources."""
 
-SLAVE_SIDE = ("fmus.slave", "fmus.loader", "fmus.interpreter")
+SLAVE_SIDE = ("fmus.slave", "fmus.loader", "fmus.server", "fmus.interpreter")
 """Modules that every FMU carries, whatever its block imports."""
 
 

@@ -1,16 +1,21 @@
 """The README's commands and programs do what it says."""
 
+import importlib.util
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+import zipfile
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
+from fmus import interpreter
 from fmus.build import cached
 from fmus.catalog import UNITS
+from fmus.compile import TARGETS
 from fmus.fmi2_description import NoFmi2Form
 from scenarios.catalog import SYSTEMS
 
@@ -35,7 +40,8 @@ def program(text: str, folder: Path) -> str:
 
 def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " run " in c]) == 9
-    assert len([c for c in COMMANDS if " build " in c]) == 1
+    assert len([c for c in COMMANDS if " build " in c]) == 2
+    assert len([c for c in COMMANDS if " check " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
     assert len(PROGRAMS) == 3
 
@@ -68,7 +74,7 @@ def is_plant(unit: str) -> bool:
 
 
 def test_the_table_of_units_has_their_steps_and_standards():
-    cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `\w+`", row)]
+    cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `[A-Z][a-z]\w+`", row)]
     told = {unit: (step.strip(), fmi.strip()) for units, step, fmi in cells for unit in re.findall(r"`(\w+)`", units)}
     assert set(told) == set(UNITS)
     for name, entry in UNITS.items():
@@ -82,13 +88,78 @@ def test_the_table_of_units_has_their_steps_and_standards():
             assert fmi == "3"
 
 
-def test_a_unit_runs_in_fmpy(tmp_path: Path):
-    (build,) = (c for c in COMMANDS if " build " in c)
-    done = handover(build, tmp_path)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a tree that looks like the repository's, in which the units have been built."""
+    made = tmp_path_factory.mktemp("repository")
+    for name, target in ((".venv", Path(sys.prefix)), ("docs", ROOT / "docs"), ("fmus", ROOT / "fmus")):
+        (made / name).symlink_to(target)
+    done = handover(command_with(" build TendonArm "), made)
     assert done.returncode == 0, done.stderr
-    printed = program(PROGRAMS[0], tmp_path)
+    return made
+
+
+def test_a_unit_runs_in_fmpy(folder: Path):
+    printed = program(PROGRAMS[0], folder)
     x, y, z = (float(n) for n in printed.strip().strip("[]").split())
     assert (x, y, z) == pytest.approx((0.0, 0.0, -0.7), abs=1e-6)
+
+
+@pytest.mark.skipif(sys.platform != "linux" or not interpreter.library(), reason="the program looks for linux64")
+def test_a_unit_runs_in_a_c_program(folder: Path):
+    script = block_with("./c_host")
+    if shutil.which("cc") is None:
+        assert ".venv/bin/python -m ziglang cc" in README
+        script = script.replace("\ncc ", "\n.venv/bin/python -m ziglang cc ")
+    printed = shell(script, folder)
+    assert f"prints `{printed.strip()}`" in README
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ecospy") is None, reason="ecospy has wheels for few platforms")
+@pytest.mark.skipif(shutil.which("unzip") is None, reason="Ecos calls unzip")
+@pytest.mark.skipif(not interpreter.library(), reason="this Python has no shared library that Ecos can load")
+def test_a_unit_runs_in_ecos(folder: Path):
+    install, *commands = block_with("./ecos ").splitlines(keepends=True)
+    assert install == ".venv/bin/python -m pip install ecospy tbb\n"  # the tests' environment has them
+    shell("".join(commands), folder)
+    header, *rows = (folder / "TendonArm.fmi2.csv").read_text().splitlines()
+    column = header.split(", ").index("instance::p_WG[3][REAL]")
+    assert len(rows) >= 50
+    assert {row.split(", ")[column] for row in rows} == {"-0.700000"}
+    (scalar,) = re.findall(r"`(handover build [^`]*--scalar[^`]*)`", README)
+    assert handover(scalar, folder).returncode == 0
+    assert (folder / "units" / "TendonArm.fmi3-scalar.fmu").is_file()
+
+
+def test_the_unit_passes_its_check(folder: Path):
+    done = handover(command_with(" check "), folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_a_unit_is_built_for_all_platforms(folder: Path):
+    done = handover(command_with(" --platform all "), folder)
+    assert done.returncode == 0, done.stderr
+    with zipfile.ZipFile(folder / "units" / "Push.fmi3.fmu") as archive:
+        libraries = [name for name in archive.namelist() if name.startswith("binaries/")]
+    assert len(libraries) == len(TARGETS)
+
+
+def command_with(part: str) -> str:
+    (command,) = (c for c in COMMANDS if part in c)
+    return command
+
+
+def block_with(part: str) -> str:
+    (block,) = (text for kind, text in BLOCKS if not kind and part in text)
+    return block
+
+
+def shell(script: str, folder: Path) -> str:
+    call = ["sh", "-e", "-c", script]
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 def test_a_block_of_ones_own_is_built(tmp_path: Path):
@@ -100,7 +171,7 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in COMMANDS if " run " in c])
 def test_the_runs_succeed(command: str, tmp_path: Path):
-    needed = [" build ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
+    needed = [" build TendonArm ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
     for before in (c for c in COMMANDS if any(word in c for word in needed)):
         assert handover(before, tmp_path).returncode == 0
     done = handover(command, tmp_path)

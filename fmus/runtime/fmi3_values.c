@@ -22,13 +22,25 @@ fmi3Status fmi3SetFloat32(fmi3Instance handle, References vr, size_t n, const fm
     return (fmi3Status)set_singles(handle, __func__, vr, n, values, n_values);
 }
 
-/* The buffer's int64 are within the variable's width: the Python side sees to it. UInt64 keeps its 64 bits. */
+static bool kept(const Instance *instance, const char *function, uint32_t reference, int64_t number,
+                 int64_t as_told) {
+    if (number == as_told) return true;
+    const Variable *variable = variable_of(instance, reference);
+    refuse(instance, function, "the value %lld of '%s' (value reference %u) does not fit its type", (long long)number,
+           instance->names + variable->name, reference);
+    return false;
+}
+
+/* The buffer's int64 are within the block's width, but the scalar form may tell of fewer bits. UInt64 keeps its 64. */
 #define INTEGER(Name, TYPE)                                                                                            \
     fmi3Status fmi3Get##Name(fmi3Instance handle, References vr, size_t n, fmi3##Name values[], size_t n_values) {     \
         Instance *instance = handle;                                                                                   \
         if (!may_get(instance, __func__, INT64, TYPE, vr, n, values, n_values)) return fmi3Error;                      \
-        for (size_t i = 0; i < n; i++)                                                                                 \
-            values[i] = (fmi3##Name)instance->integers[variable_of(instance, vr[i])->offset];                          \
+        for (size_t i = 0; i < n; i++) {                                                                               \
+            int64_t number = instance->integers[variable_of(instance, vr[i])->offset];                                 \
+            values[i] = (fmi3##Name)number;                                                                            \
+            if (!kept(instance, __func__, vr[i], number, (int64_t)values[i])) return fmi3Error;                        \
+        }                                                                                                              \
         return fmi3OK;                                                                                                 \
     }                                                                                                                  \
     fmi3Status fmi3Set##Name(fmi3Instance handle, References vr, size_t n, const fmi3##Name values[],                  \

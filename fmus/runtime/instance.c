@@ -124,7 +124,7 @@ Status instance_terminate(Instance *instance, const char *function) {
 }
 
 Status instance_reset(Instance *instance, const char *function) {
-    if (slave_call(instance, function, "reset") != STATUS_OK) return STATUS_ERROR;
+    if (!slave_revive(instance, function) || slave_call(instance, function, "reset") != STATUS_OK) return STATUS_ERROR;
     instance->mode = INSTANTIATED;
     instance->has_outputs = instance->outputs_stale = false;
     instance->stop_time = INFINITY;

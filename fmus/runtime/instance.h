@@ -14,7 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "python_api.h"
+#include "text.h"
 
 /* The values are those of fmi2Status and fmi3Status. */
 typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR } Status;
@@ -95,6 +95,7 @@ typedef struct {
 
 typedef struct Instance Instance;
 typedef struct SavedState SavedState;
+typedef struct Side Side;
 typedef void Logger(const Instance *instance, Status status, const char *category, const char *message);
 
 struct Instance {
@@ -111,7 +112,10 @@ struct Instance {
     double stop_time;   /* infinity if there is none */
     Events events;
 
-    PyObject *slave, *step, *explain;
+    const Side *side; /* where Python runs, */
+    void *python;     /* and what that way of running it has of this instance */
+    char **strings;   /* those that the host got, until it gets them again */
+    size_t n_strings;
 
     char *table; /* owns what the following point into */
     const Variable *variables;
@@ -146,11 +150,12 @@ bool allowed(const Instance *instance, const char *function, unsigned modes);
 bool given(const Instance *instance, const char *function, const void *pointer, const char *what);
 Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]);
 
-/* slave.c: calls into Python. Each takes and releases the interpreter's lock. Those that change the block (call, step,
- * set_state) put the instance into the mode FAILED if they fail otherwise than by a refusal. */
+/* slave.c: calls into Python, wherever it runs (side.h). Those that change the block (call, step, set_state) put the
+ * instance into the mode FAILED if they fail otherwise than by a refusal; all do if the interpreter is gone. */
 
 bool slave_start(Instance *instance, const char *function, const char *resources, const char *token);
 void slave_release(Instance *instance);
+bool slave_revive(Instance *instance, const char *function); /* so that a call can be made, if there is a way */
 Status slave_call(Instance *instance, const char *function, const char *method);
 Status slave_step(Instance *instance, const char *function);
 Status slave_get_state(Instance *instance, const char *function, char **bytes, size_t *size);

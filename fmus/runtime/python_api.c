@@ -49,7 +49,8 @@ static bool load_functions(void *library, const char *from, Text *tried) {
         py = found;
         return true;
     }
-    text_add(tried, "\n  %s: Python %.6s is too old, 3.%d or later is needed", from, version, OLDEST_MINOR);
+    text_add(tried, "\n  %s: Python %.*s is too old, 3.%d or later is needed", from, (int)strcspn(version, " "), version,
+             OLDEST_MINOR);
     return false;
 }
 
@@ -182,6 +183,27 @@ static bool use_description(char *lines, const char *from, Text *tried) {
     return done;
 }
 
+char *python_noted(const char *resources) {
+    Text path = {0};
+    text_add(&path, "%s/python.txt", resources);
+    char *lines = platform_read_file(text_of(&path));
+    text_clear(&path);
+    Interpreter found = lines ? interpreter_of(lines) : (Interpreter){0};
+    char *executable = found.executable;
+    found.executable = NULL;
+    interpreter_clear(&found);
+    free(lines);
+    return executable;
+}
+
+/* The library of the interpreter that the user chose; what else there is he does not want. */
+static bool use_chosen(const char *interpreter, const char *script, Text *tried) {
+    char *lines = platform_run(interpreter, script);
+    if (lines) return use_description(lines, "FMU_PYTHON", tried);
+    text_add(tried, "\n  FMU_PYTHON: %s cannot be run, or is older than Python 3.6", interpreter);
+    return false;
+}
+
 static bool search(const char *resources, Text *tried) {
     text_add(tried, "no usable Python; tried in this order:");
     void *process = platform_loaded_python();
@@ -190,9 +212,14 @@ static bool search(const char *resources, Text *tried) {
     Text noted = {0}, script = {0};
     text_add(&noted, "%s/python.txt", resources);
     text_add(&script, "%s/sources/fmus/interpreter.py", resources);
-    bool done = use_environment(tried) ||
-                use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
-                use_description(platform_run(PYTHON_ON_PATH, text_of(&script)), PYTHON_ON_PATH " on the PATH", tried);
+    char *chosen = platform_environment("FMU_PYTHON");
+    bool done = use_environment(tried);
+    if (!done && chosen)
+        done = use_chosen(chosen, text_of(&script), tried);
+    else if (!done)
+        done = use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
+               use_description(platform_run(PYTHON_ON_PATH, text_of(&script)), PYTHON_ON_PATH " on the PATH", tried);
+    free(chosen);
     text_clear(&noted);
     text_clear(&script);
     text_add(tried,

@@ -27,6 +27,7 @@ typedef ptrdiff_t Py_ssize_t;
     F(void, PyErr_Fetch, (PyObject **, PyObject **, PyObject **))             \
     F(void, PyErr_NormalizeException, (PyObject **, PyObject **, PyObject **)) \
     F(void, PyErr_Clear, (void))                                              \
+    F(PyObject *, PyErr_NoMemory, (void))                                     \
     F(int, PyException_SetTraceback, (PyObject *, PyObject *))                \
     F(PyObject *, PyObject_GetAttrString, (PyObject *, const char *))         \
     F(int, PyObject_IsTrue, (PyObject *))                                     \
@@ -56,5 +57,8 @@ extern PythonApi py; /* filled by python_attach */
 
 /* Makes `py` usable and the interpreter run. On failure `tried` says what was tried, and what would cure it. */
 bool python_attach(const char *resources, Text *tried);
+
+/* The path of the interpreter that resources/python.txt notes, or NULL. */
+char *python_noted(const char *resources);
 
 #endif

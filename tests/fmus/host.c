@@ -37,7 +37,8 @@ int main(int argc, char **argv) { /* library, GUID, resource URI, value referenc
     LOAD(fmi2FreeInstance);
     for (int round = 0; round < 2; round++) {
         fmi2CallbackFunctions callbacks = {.logger = log_message};
-        fmi2Component unit = f_fmi2Instantiate("unit", fmi2CoSimulation, argv[2], argv[3], &callbacks, 0, 0);
+        fmi2Component unit = f_fmi2Instantiate("unit", fmi2CoSimulation, argv[2], argv[3], &callbacks, 0,
+                                                !!getenv("HOST_LOGS"));
         if (!unit) return 1;
         int status = f_fmi2SetupExperiment(unit, 0, 0.0, 0.0, 0, 0.0) || f_fmi2EnterInitializationMode(unit) ||
                      f_fmi2ExitInitializationMode(unit);

@@ -1,8 +1,10 @@
 """A unit in a host that is not Python finds an interpreter by itself, or says what is missing."""
 
 import os
+import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from fmus.compile import RUNTIME, zig_cc
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="host.c loads libraries with dlopen")
 
 LIBRARY = interpreter.library()
+VALUE = f"b = {2.0 * 99 + 25.0:.17g}"
 
 
 def compiled(source: str, folder: Path, *flags: str) -> Path:
@@ -74,13 +77,16 @@ def call(command: "list[str | Path]", environment: Mapping[str, str]) -> "subpro
 
 
 def expect_values(done: "subprocess.CompletedProcess[str]") -> None:
-    if LIBRARY:
-        values = [line for line in done.stdout.splitlines() if ": built with " not in line]
-        assert values == [f"b = {2.0 * 99 + 25.0:.17g}"] * 2
-        assert done.returncode == 0
-    else:
-        assert "is built without a shared library of Python" in done.stdout
-        assert done.returncode == 1
+    """Fail unless the unit ran, wherever its Python did: without a shared library that is a process of its own."""
+    assert done.stdout.splitlines() == [VALUE] * 2
+    assert done.returncode == 0
+
+
+def expect_separate_process(done: "subprocess.CompletedProcess[str]") -> None:
+    assert "[unit 1] fmi2Instantiate: no usable Python" in done.stdout
+    assert f"So the unit runs in a Python process of its own, {sys.executable}" in done.stdout
+    assert done.stdout.splitlines().count(VALUE) == 2
+    assert done.returncode == 0
 
 
 def test_by_the_note_of_the_environment_that_built_the_unit(program: Path, unpacked: CtypesHost):
@@ -132,11 +138,87 @@ def test_a_fragment_of_a_python_is_refused_and_the_host_lives(program: Path, unp
 
 
 def test_no_second_python_is_loaded_beside_an_unfit_one(program: Path, unpacked: CtypesHost, fragment: Path):
-    done = run(program, unpacked, PATH="/nonexistent", HOST_LOADS_BEFORE=str(fragment))
+    done = run(program, unpacked, PATH="/nonexistent", HOST_LOADS_BEFORE=str(fragment), HOST_LOGS="1")
     assert "the Python in this process: has no function Py_GetVersion" in done.stdout
     assert "Cure: there cannot be a second Python beside it" in done.stdout
     assert "FMU_LIBPYTHON" not in done.stdout
+    expect_separate_process(done)
+
+
+def test_a_python_without_shared_library_runs_in_a_process_of_its_own_with_a_warning(
+    program: Path, unpacked: CtypesHost
+):
+    note = unpacked.folder / "resources" / "python.txt"
+    note.write_text(f"executable = {sys.executable}\nlibrary = \n")
+    done = run(program, unpacked, PATH="/nonexistent", HOST_LOGS="1")
+    assert f"resources/python.txt: {sys.executable} is built without a shared library of Python" in done.stdout
+    assert "--enable-shared" in done.stdout
+    expect_separate_process(done)
+
+
+def test_a_process_of_its_own_can_be_asked_for_and_be_forbidden(program: Path, unpacked: CtypesHost):
+    done = run(program, unpacked, PATH="/nonexistent", FMU_PYTHON_PROCESS="1")
+    assert done.stdout.splitlines() == [VALUE] * 2
+    note = unpacked.folder / "resources" / "python.txt"
+    note.write_text(f"executable = {sys.executable}\nlibrary = \n")
+    done = run(program, unpacked, PATH="/nonexistent", FMU_PYTHON_PROCESS="0")
+    assert "process of its own" not in done.stdout
     assert done.returncode == 1
+
+
+def test_the_chosen_interpreter_is_the_only_one_that_is_tried(program: Path, unpacked: CtypesHost, tmp_path: Path):
+    expect_values(run(program, unpacked, PATH="/nonexistent", FMU_PYTHON=sys.executable))
+    done = run(program, unpacked, PATH="/nonexistent", FMU_PYTHON="/no/python3")
+    assert done.returncode == 1
+    for part in ("FMU_PYTHON: /no/python3 cannot be run", "FMU_PYTHON: /no/python3: No such file or directory"):
+        assert part in done.stdout
+    assert "python.txt" not in done.stdout
+    old = tmp_path / "python3"
+    old.write_text("#!/bin/sh\nexit 86\n")
+    old.chmod(0o755)
+    done = run(program, unpacked, PATH="/bin:/usr/bin", FMU_PYTHON=str(old))
+    assert f"FMU_PYTHON: {old}: it is older than Python 3.10" in done.stdout
+    assert "Cure: set the environment variable FMU_PYTHON to the interpreter of a Python 3.10 or later" in done.stdout
+
+
+def python_like(folder: Path, version: str) -> Path:
+    """Return a library with all of Python's functions that the runtime wants, none of which does anything."""
+    declared = (RUNTIME / "python_api.h").read_text()
+    names = set(re.findall(r"F\(.*?, (\w+), \(", declared)) - {"Py_GetVersion"}
+    functions = "".join(f"void *{name}(void) {{ return 0; }}\n" for name in sorted(names))
+    made, standard_library = folder / "libalike.so", folder / "lib" / "python3.11" / "os.py"
+    standard_library.parent.mkdir(parents=True)
+    standard_library.touch()
+    (folder / "alike.c").write_text(f'{functions}const char *Py_GetVersion(void) {{ return "{version}"; }}\n')
+    done = zig_cc(["-shared", "-fPIC", str(folder / "alike.c"), "-o", str(made)])
+    assert done.returncode == 0, done.stdout
+    return made
+
+
+@pytest.mark.parametrize(
+    ("version", "fault"),
+    [("3.9.1 (main)", "Python 3.9.1 is too old, 3.10 or later is needed"), ("3.11.2 ", "PYTHONHOME is set, to /x; it")],
+)
+def test_a_library_that_cannot_serve_says_why(
+    program: Path, unpacked: CtypesHost, tmp_path: Path, version: str, fault: str
+):
+    (unpacked.folder / "resources" / "python.txt").unlink()
+    library = python_like(tmp_path, version)
+    done = run(program, unpacked, PATH="/nonexistent", FMU_LIBPYTHON=str(library), PYTHONHOME="/x")
+    assert fault in done.stdout
+    assert done.returncode == 1
+
+
+@pytest.mark.skipif(not LIBRARY, reason="there is no Python in the host's process that could end")
+def test_calls_after_the_hosts_python_has_ended_are_errors(
+    tmp_path_factory: pytest.TempPathFactory, unpacked: CtypesHost
+):
+    program = compiled("finalising_host.c", tmp_path_factory.mktemp("finalising_host"))
+    done = run(program, unpacked, PATH="/nonexistent")
+    assert done.returncode == 0, done.stdout
+    statuses = [line for line in done.stdout.splitlines() if " = " in line]
+    assert statuses == ["step = 0", "step = 3", "state = 3", "string = 3", "reset = 3", "freed = 1"]
+    assert done.stdout.count("the host has ended its Python while this instance lives. Cure: ") == 2
 
 
 @pytest.mark.parametrize("setting", ["PYTHONHOME=/nonexistent", "PYTHONMALLOC=nonsense"])
@@ -165,10 +247,7 @@ def test_units_may_be_instantiated_from_several_threads_at_once(
         command += [unit.library._name, unit.token, (unit.folder / "resources").as_uri()]
     for _ in range(6):
         done = call(command, {"PATH": "/nonexistent", "TMPDIR": str(tmp_path)})
-        if LIBRARY:
-            assert (done.stdout, done.returncode) == ("all done\n", 0)
-        else:
-            assert done.stdout.count("is built without a shared library of Python") == len(units)
+        assert (done.stdout, done.returncode) == ("all done\n", 0)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,54 +1,71 @@
-"""Every catalogued unit goes on from a restored state as if it had never stopped, bit for bit."""
+"""Every catalogued unit goes on from a restored state as if it had never stopped, bit for bit, wherever that is."""
 
-import dataclasses
-import importlib
+import multiprocessing
+from collections.abc import Iterator
+from multiprocessing.pool import Pool
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from fmpy_host import FmpyHost
+from state_runs import STEPS, inputs_at, other_parameters, run, run_on
 
-from cosim.block import Description, Kind, Variable, describe
+from fmus.build import cached
 from fmus.catalog import UNITS
 
-STEPS = 12
-"""Steps before the state is taken, and after."""
+LIMIT = 60.0
+"""Seconds that another process has for a run."""
+
+PICTURES = ("StereoCamera", "HandoverVision")
+"""Units with picture ports, which FMI 2 does not know."""
+
+IN_BOTH = ("FreeFlyer", "HandoverStateMachine")
+"""Units whose FMI 2 form is tried in the fast tier too; what differs between the forms is not the unit's."""
 
 
-def varied(v: Variable, rng: np.random.Generator) -> Any:
-    """Return an input near its start value: a unit must take it, and its state must depend on it."""
-    if v.kind is Kind.REAL:
-        span = 0.02 if v.maximum is None or v.minimum is None else 0.02 * (v.maximum - v.minimum)
-        moved = np.asarray(v.start) + rng.normal(0.0, span, v.shape)
-        moved = np.clip(moved, v.minimum, v.maximum) if v.minimum is not None or v.maximum is not None else moved
-        if v.name.startswith("q_") and v.shape == (4,):
-            moved = moved / np.linalg.norm(moved)
-        return moved if v.shape else float(moved)
-    if v.kind is Kind.BOOLEAN:
-        return bool(rng.integers(4) > 0)
-    return v.start
+def forms() -> list[Any]:
+    """Return names and versions of all units' forms, the long ones marked."""
+    long = pytest.mark.slow
+    of_fmi3 = [pytest.param(name, 3, marks=[long] if name in PICTURES else []) for name in UNITS]
+    has_fmi2 = [name for name in UNITS if name not in PICTURES]
+    return of_fmi3 + [pytest.param(name, 2, marks=[] if name in IN_BOTH else [long]) for name in has_fmi2]
 
 
-def run(block: Any, d: Description, seed: int, first: int) -> list[dict[str, bytes]]:
-    rng, step, seen = np.random.default_rng(seed), UNITS[d.name].step, list[dict[str, bytes]]()
-    for k in range(first, first + STEPS):
-        u = d.inputs_type(**{v.name: varied(v, rng) for v in d.inputs if v.kind is not Kind.BINARY})
-        y = block.step(float(k * step), float(step), u)
-        seen.append({f.name: np.asarray(getattr(y, f.name)).tobytes() for f in dataclasses.fields(y)})
-    return seen
+@pytest.fixture(scope="module")
+def other_process() -> Iterator[Pool]:
+    """A Python that shares nothing with this one; it is ended after the module's last test, whatever it does."""
+    with multiprocessing.get_context("spawn").Pool(1) as process:
+        yield process
 
 
-@pytest.mark.parametrize("name", UNITS)
-def test_a_unit_goes_on_from_a_restored_state_bit_for_bit(name: str):
-    module, _, attribute = UNITS[name].block.partition(":")
-    cls = getattr(importlib.import_module(module), attribute)
-    d = describe(cls)
-    one = cls(d.params_type())
-    one.outputs(0.0, d.inputs_type())
-    run(one, d, seed=1, first=0)
-    state = one.get_state()
-    after = run(one, d, seed=2, first=STEPS)
-    one.set_state(state)
-    assert run(one, d, seed=2, first=STEPS) == after
-    other = cls(d.params_type())
-    other.set_state(state)
-    assert run(other, d, seed=2, first=STEPS) == after
+@pytest.mark.parametrize(("name", "fmi"), forms())
+def test_a_unit_goes_on_from_a_restored_state_bit_for_bit(name: str, fmi: int, tmp_path: Path, other_process: Pool):
+    fmu = cached(name, fmi)
+    initialising, at_start, later = (tmp_path / n for n in ("initialising", "at start", "later"))
+    with FmpyHost(fmu) as host:
+        host.set(other_parameters(host.description))
+        host.enter()
+        host.set(inputs_at(host.description, 1))
+        initialising.write_bytes(host.saved())
+        host.leave()
+        at_start.write_bytes(host.saved())
+        before = [host.outputs(), *run(host, 0)]
+        later.write_bytes(host.saved())
+        kept = host.fmu.getFMUState()
+        after = [host.outputs(), *run(host, STEPS)]
+
+        host.fmu.setFMUState(kept)
+        assert [host.outputs(), *run(host, STEPS)] == after
+        host.fmu.freeFMUState(kept)
+
+    assert before[1:] != after[1:]
+    assert run_on(fmu, later, STEPS) == after
+    assert run_on(fmu, at_start, 0) == before
+    assert run_on(fmu, initialising, 0, initialising=True) == before
+
+    def there(state: Path, first: int, *, initialising: bool = False) -> object:
+        return other_process.apply_async(run_on, (fmu, state, first), {"initialising": initialising}).get(LIMIT)
+
+    assert there(later, STEPS) == after
+    assert there(at_start, 0) == before
+    assert there(initialising, 0, initialising=True) == before

@@ -11,10 +11,11 @@ import pytest
 from ctypes_host import BOOL, DOUBLE, ERROR, OK, SIZE, CtypesHost
 from fmpy.validation import validate_fmu
 from saved_states import deserialise, save, serialised
-from test_catalog_states import varied
+from state_runs import varied
 from workshop import Workshop
 
 from cosim.block import Kind, describe
+from cosim.fmu_description import describe_fmu
 from fmus.build import cached, import_block
 from fmus.catalog import UNITS
 from fmus.layout import DuplicateName, Layout
@@ -318,13 +319,14 @@ def simulated(name: str, *, event_mode: bool) -> list[list[float]]:
     """Return the real outputs of a catalogued unit after each of some steps of its period, with inputs that vary."""
     d = describe(import_block(UNITS[name].block))
     rng, period = np.random.default_rng(1), float(d.period or 0)
+    inputs = [port for port in describe_fmu(cached(name, 3)).inputs.values() if port.kind is Kind.REAL]
     host = CtypesHost(cached(name, 3), 3)
     assert host.instantiate(event_mode=event_mode)
     assert host.initialise() == OK
     seen: list[list[float]] = []
     for k in range(300):
-        for v in (v for v in d.inputs if v.kind is Kind.REAL):
-            assert host.set(v.name, np.ravel(varied(v, rng)).tolist()) == OK
+        for port in inputs:
+            assert host.set(port.name, np.ravel(varied(port, rng)).tolist()) == OK
         if event_mode:
             assert k == 0 or host.call("EnterEventMode") == OK
             tick(host)

@@ -1,5 +1,6 @@
 """FMI 3 with a variable for every entry of an array, for hosts that know no arrays."""
 
+import ctypes
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from fmpy.validation import validate_fmu
 
 from cosim.fmu_description import describe_fmu, indices_of
@@ -59,6 +61,32 @@ def test_each_entry_of_an_output_depends_on_every_entry_of_its_inputs(every_kind
     assert now[reference["p[2]"]] == ""
     assert entries in first[reference["N[2,1]"]]
     assert now.keys() == first.keys()
+
+
+def test_integers_have_32_bits_if_their_declaration_allows_it(every_kind: Path, fmu_folder: Path):
+    types = {
+        v.attrib["name"]: v.tag for v in root_of(every_kind).iter() if {"name", "valueReference"} <= v.attrib.keys()
+    }
+    assert [types[name] for name in ("n", "seed", "k", "total")] == ["Int32"] * 4
+    wide = root_of(build_block("sample_units.every_width:EveryWidth", 3, fmu_folder, scalar=True))
+    assert {"Int8", "UInt16", "UInt64"} <= {v.tag for v in wide.iter()}
+
+
+def test_an_integer_that_outgrows_32_bits_is_refused_not_cut(every_kind: Path):
+    host = CtypesHost(every_kind, 3)
+    try:
+        assert host.instantiate()
+        assert host.initialise() == OK
+        k, total = (ctypes.byref(ctypes.c_uint32(host.references[name])) for name in ("k", "total"))
+        number = ctypes.c_int32(2**31 - 1)
+        assert host.call("SetInt32", k, SIZE(1), ctypes.byref(number), SIZE(1)) == OK
+        assert host.step(0.0, 0.25) == OK
+        assert host.call("GetInt32", total, SIZE(1), ctypes.byref(number), SIZE(1)) == OK
+        assert host.step(0.25, 0.25) == OK
+        assert host.call("GetInt32", total, SIZE(1), ctypes.byref(number), SIZE(1)) == ERROR
+        assert "the value 4294967294 of 'total' (value reference" in host.log[-1]
+    finally:
+        host.close()
 
 
 def test_the_same_sources_give_the_same_bytes(every_kind: Path, tmp_path: Path):

@@ -128,10 +128,10 @@ def test_a_folder_in_use_is_refused_before_anything_runs(tmp_path: Path):
 def test_a_broken_fmu_is_refused(tmp_path: Path):
     out, broken = tmp_path / "out", tmp_path / "broken.fmu"
     broken.write_bytes(cached("TendonArm", 3).read_bytes()[:5000])
-    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "not one", out)
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "its end is missing", out)
     with zipfile.ZipFile(broken, "w") as archive:
         archive.writestr("modelDescription.xml", "<fmiModelDescription")
-    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "not valid", out)
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "not well-formed", out)
 
 
 def test_an_fmu_that_does_not_fit_is_refused_with_every_fault(tmp_path: Path):

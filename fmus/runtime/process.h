@@ -1,0 +1,37 @@
+/* A Python process of an instance's own, and the channel to it. */
+#ifndef PROCESS_H
+#define PROCESS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "shared_memory.h"
+#include "text.h"
+
+typedef struct Process Process;
+
+typedef enum {
+    TRANSFERRED,
+    ENDED,   /* the process has ended, or closed its end of the channel */
+    TOO_LATE /* the deadline passed */
+} Transfer;
+
+/* Starts `interpreter arguments... CHANNEL MEMORY`: the last two, numbers, are its ends of the channel and of the shared
+ * memory (descriptors; on Windows handles). It inherits nothing else but, on POSIX, standard output and standard error.
+ * On failure returns NULL and adds why to `fault`. */
+Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault);
+
+/* Seconds of a clock that never goes back. */
+double process_clock(void);
+
+/* All of `size` bytes, or what kept them; `deadline` is of the clock above, infinity is none. */
+Transfer process_send(Process *process, const void *bytes, size_t size, double deadline);
+Transfer process_receive(Process *process, void *bytes, size_t size, double deadline);
+
+bool process_runs(const Process *process);
+
+/* Closes the channel, at which the process ends by itself; after `patience` seconds it is killed. Frees `process` and
+ * says how it ended; returns its exit status, or -1 if it was ended by something else. */
+int process_end(Process *process, double patience, Text *how);
+
+#endif

@@ -1,0 +1,217 @@
+#ifndef _WIN32
+#define _GNU_SOURCE
+#include "process.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#ifdef __APPLE__
+#include <crt_externs.h>
+#define environ (*_NSGetEnviron())
+#else
+extern char **environ;
+#endif
+
+#ifndef MSG_NOSIGNAL
+#define MSG_NOSIGNAL 0 /* a Mac has the option SO_NOSIGPIPE instead */
+#endif
+
+#define CHANNEL 3 /* the descriptors' numbers in the process */
+#define MEMORY 4
+#define MOST_ARGUMENTS 8
+#define LOOK_AFTER 500 /* ms: how often a silent process is looked after; one that it made may hold the channel open */
+
+struct Process {
+    pid_t id, host; /* a host may fork: only the one that started the process ends it */
+    int channel;
+};
+
+double process_clock(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* Two ends of a channel that no process inherits by accident; -1 in both if there are none. */
+static void open_channel(int ends[2]) {
+#ifdef SOCK_CLOEXEC
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0) return;
+#else
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0) {
+        int on = 1;
+        for (int i = 0; i < 2; i++) {
+            fcntl(ends[i], F_SETFD, FD_CLOEXEC);
+            setsockopt(ends[i], SOL_SOCKET, SO_NOSIGPIPE, &on, sizeof on);
+        }
+        return;
+    }
+#endif
+    ends[0] = ends[1] = -1;
+}
+
+/* The process begins with no signal blocked and none ignored; in a group of its own, so that what it starts ends with
+ * it, and the terminal's Ctrl-C is the host's business. */
+static void set_attributes(posix_spawnattr_t *attributes) {
+    sigset_t none, all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    sigdelset(&all, SIGKILL);
+    sigdelset(&all, SIGSTOP);
+    short flags = POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF;
+#ifdef POSIX_SPAWN_CLOEXEC_DEFAULT
+    flags |= POSIX_SPAWN_CLOEXEC_DEFAULT;
+#endif
+    posix_spawnattr_setflags(attributes, flags);
+    posix_spawnattr_setpgroup(attributes, 0);
+    posix_spawnattr_setsigmask(attributes, &none);
+    posix_spawnattr_setsigdefault(attributes, &all);
+}
+
+/* `channel` and `memory` are not among the numbers that they get: dup2 onto itself would not let them be inherited. */
+static int spawn(pid_t *id, const char *interpreter, char *const arguments[], int channel, int memory) {
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions, channel, CHANNEL);
+    posix_spawn_file_actions_adddup2(&actions, memory, MEMORY);
+#ifdef POSIX_SPAWN_CLOEXEC_DEFAULT
+    for (int i = 1; i <= 2; i++)
+        if (fcntl(i, F_GETFD) >= 0) posix_spawn_file_actions_adddup2(&actions, i, i);
+#endif
+    set_attributes(&attributes);
+    int fault = posix_spawnp(id, interpreter, &actions, &attributes, arguments, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    posix_spawnattr_destroy(&attributes);
+    return fault;
+}
+
+Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+    char *list[MOST_ARGUMENTS + 4] = {(char *)interpreter};
+    int n = 1;
+    for (; *arguments && n <= MOST_ARGUMENTS; arguments++) list[n++] = (char *)*arguments;
+    list[n++] = "3";
+    list[n++] = "4";
+    int ends[2];
+    open_channel(ends);
+    int channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 10), shared = fcntl((int)memory->file, F_DUPFD_CLOEXEC, 10);
+    Process *process = calloc(1, sizeof *process);
+    int why = channel < 0 || shared < 0 ? errno : process ? 0 : ENOMEM;
+    if (!why) why = spawn(&process->id, interpreter, list, channel, shared);
+    if (ends[1] >= 0) close(ends[1]);
+    if (channel >= 0) close(channel);
+    if (shared >= 0) close(shared);
+    if (!why) {
+        process->channel = ends[0];
+        process->host = getpid();
+        return process;
+    }
+    if (ends[0] >= 0) close(ends[0]);
+    free(process);
+    text_add(fault, "%s", strerror(why));
+    return NULL;
+}
+
+typedef enum { RUNS, IS_OVER, IS_REAPED } Life;
+
+/* A process that is over stays to be reaped, unless the host reaps whatever it can. */
+static Life life_of(const Process *process) {
+    siginfo_t info = {0};
+    if (waitid(P_PID, (id_t)process->id, &info, WEXITED | WNOHANG | WNOWAIT) != 0)
+        return errno == ECHILD ? IS_REAPED : RUNS;
+    return info.si_pid == process->id ? IS_OVER : RUNS;
+}
+
+bool process_runs(const Process *process) { return life_of(process) == RUNS; }
+
+/* Waits until the channel is ready for what `events` says. */
+static Transfer await_channel(const Process *process, short events, double deadline) {
+    for (;;) {
+        double left = ceil(1e3 * (deadline - process_clock()));
+        struct pollfd channel = {.fd = process->channel, .events = events};
+        int n = poll(&channel, 1, left < LOOK_AFTER ? (left > 0 ? (int)left : 0) : LOOK_AFTER);
+        if (n > 0) return TRANSFERRED;
+        if (n < 0 && errno != EINTR && errno != EAGAIN) return ENDED;
+        if (n == 0 && life_of(process) != RUNS) return ENDED;
+        if (n == 0 && left <= LOOK_AFTER) return TOO_LATE;
+    }
+}
+
+static bool is_passing(int fault) { return fault == EAGAIN || fault == EWOULDBLOCK || fault == EINTR; }
+
+Transfer process_send(Process *process, const void *bytes, size_t size, double deadline) {
+    for (const char *from = bytes; size > 0;) {
+        ssize_t n = send(process->channel, from, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (n < 0 && !is_passing(errno)) return ENDED;
+        if (n > 0) {
+            from += n;
+            size -= (size_t)n;
+            continue;
+        }
+        Transfer ready = await_channel(process, POLLOUT, deadline);
+        if (ready != TRANSFERRED) return ready;
+    }
+    return TRANSFERRED;
+}
+
+Transfer process_receive(Process *process, void *bytes, size_t size, double deadline) {
+    for (char *to = bytes; size > 0;) {
+        Transfer ready = await_channel(process, POLLIN, deadline);
+        if (ready != TRANSFERRED) return ready;
+        ssize_t n = recv(process->channel, to, size, MSG_DONTWAIT);
+        if (n == 0 || (n < 0 && !is_passing(errno))) return ENDED;
+        if (n < 0) continue;
+        to += n;
+        size -= (size_t)n;
+    }
+    return TRANSFERRED;
+}
+
+static void describe(int status, Text *how) {
+    if (WIFSIGNALED(status)) {
+        int number = WTERMSIG(status);
+        const char *meaning = number == SIGSEGV || number == SIGBUS || number == SIGILL || number == SIGFPE
+                                  ? "; compiled code of a package has crashed"
+                                  : "";
+        text_add(how, "ended by signal %d (%s)%s", number, strsignal(number), meaning);
+    } else {
+        text_add(how, "ended with exit status %d", WEXITSTATUS(status));
+    }
+}
+
+int process_end(Process *process, double patience, Text *how) {
+    bool ours = process->host == getpid();
+    if (ours) shutdown(process->channel, SHUT_RDWR); /* also for those who have it by a fork of the host */
+    close(process->channel);
+    double deadline = process_clock() + patience;
+    while (ours && life_of(process) == RUNS && process_clock() < deadline)
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    int status = 0;
+    pid_t reaped = 0;
+    if (ours && life_of(process) != IS_REAPED) {
+        kill(-process->id, SIGKILL); /* also what it started; until it is reaped its number is no one else's */
+        do {
+            reaped = waitpid(process->id, &status, 0);
+        } while (reaped < 0 && errno == EINTR);
+    }
+    if (reaped == process->id)
+        describe(status, how);
+    else
+        text_add(how, "ended; the host took note of how for itself");
+    free(process);
+    return reaped > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+#endif

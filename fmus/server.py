@@ -1,0 +1,187 @@
+"""Runs an FMU's Python side in a process of its own: the script that runtime/remote.c starts.
+
+It answers the host's calls, one after another, until the host closes the channel or ends. Standard library only.
+"""
+
+import ctypes
+import mmap
+import os
+import runpy
+import signal
+import struct
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+CALL = struct.Struct("=32sqQQ")
+"""CallHead of remote.c: the method, its index or -1, the number of bytes that follow, whether they are an argument."""
+
+ANSWER = struct.Struct("=QQ")
+"""AnswerHead: outcome, the number of bytes that follow."""
+
+BEGUN = struct.Struct("=QQQ")
+"""Begun: address and size of the buffers' memory, the number of bytes of a warning."""
+
+ANSWERED, REFUSED, RAISED = 0, 1, 2
+
+PATIENCE = 5.0
+"""Seconds that a block has for coming back once the host has gone."""
+
+
+class Channel:
+    """Bytes from and to the host: a socket, or on Windows a pipe.
+
+    Args:
+        number: of the descriptor; on Windows of the handle.
+    """
+
+    def __init__(self, number: int) -> None:
+        self._file = _descriptor(number)
+
+    def receive(self, size: int) -> bytes:
+        """Return that many bytes.
+
+        Raises:
+            SystemExit: the host has closed the channel, or has ended.
+        """
+        parts: list[bytes] = []
+        while size > 0:
+            try:
+                part = os.read(self._file, min(size, 1 << 20))
+            except OSError:
+                part = b""
+            if not part:
+                raise SystemExit
+            parts.append(part)
+            size -= len(part)
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def send(self, data: bytes) -> None:
+        """Send all of them.
+
+        Raises:
+            SystemExit: the host has closed the channel, or has ended.
+        """
+        rest = memoryview(data)
+        while rest:
+            try:
+                rest = rest[os.write(self._file, rest) :]
+            except OSError:
+                raise SystemExit from None
+
+
+class Server:
+    """One instance's Python side.
+
+    Args:
+        channel: to the host.
+        memory: number of the file that is shared with the host, empty or left by a process that has ended.
+    """
+
+    def __init__(self, channel: Channel, memory: int) -> None:
+        self._channel = channel
+        self._file = _descriptor(memory)
+        self._memory = mmap.mmap(-1, 1)
+        self._explain: Callable[[BaseException], str] = _trace
+        self._methods: dict[bytes, Callable[..., Any]] = {}
+        self._slave: Any = None
+
+    def run(self) -> None:
+        """Answer calls until the host closes the channel."""
+        while True:
+            method, index, size, given = CALL.unpack(self._channel.receive(CALL.size))
+            arguments: list[Any] = [] if index < 0 else [index]
+            data = self._channel.receive(size)
+            if given:
+                arguments.append(data)
+            outcome, answer = self._answer(method, arguments)
+            self._channel.send(ANSWER.pack(outcome, len(answer)) + answer)
+
+    def _answer(self, method: bytes, arguments: list[Any]) -> tuple[int, bytes]:
+        try:
+            answer = self._find(method)(*arguments)
+        except BaseException as error:  # SystemExit, too, is the block's failure
+            error.__traceback__ = error.__traceback__ and error.__traceback__.tb_next
+            outcome = REFUSED if getattr(error, "is_refusal", False) else RAISED
+            return outcome, self._explain(error).encode(errors="backslashreplace")
+        return ANSWERED, answer or b""
+
+    def _find(self, method: bytes) -> Callable[..., Any]:
+        if method not in self._methods:
+            name = method.rstrip(b"\0").decode()
+            self._methods[method] = self._start if name == "start" else getattr(self._slave, name)
+        return self._methods[method]
+
+    def _start(self, wanted: bytes) -> bytes:
+        token, _, resources = wanted.decode(errors="surrogateescape").partition("\n")
+        loader = runpy.run_path(os.path.join(resources, "sources", "fmus", "loader.py"), run_name="fmu_loader")
+        self._explain = loader["explain"]
+        self._slave = loader["start"](resources, token, self._share)
+        warning: bytes = loader["warning"](resources).encode()
+        table: bytes = self._slave.table()
+        address = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
+        return BEGUN.pack(address, len(self._memory), len(warning)) + warning + table
+
+    def _share(self, size: int) -> mmap.mmap:
+        """Return the memory that is shared with the host; the file gets its size."""
+        os.ftruncate(self._file, size)
+        if hasattr(os, "posix_fallocate"):  # an error here, where writing would end the process
+            os.posix_fallocate(self._file, 0, size)
+        self._memory = mmap.mmap(self._file, size)
+        return self._memory
+
+
+def _trace(error: BaseException) -> str:
+    return "".join(traceback.format_exception(type(error), error, error.__traceback__))
+
+
+def _descriptor(number: int) -> int:
+    if sys.platform != "win32":
+        os.set_inheritable(number, False)
+        return number
+    msvcrt: Any = _module("msvcrt")
+    return msvcrt.open_osfhandle(number, os.O_RDWR | getattr(os, "O_BINARY", 0))
+
+
+def _module(name: str) -> ModuleType:
+    return __import__(name)
+
+
+def _close_all_but(kept: tuple[int, ...]) -> None:
+    """Close what the host let be inherited: its files and sockets are not to live on here."""
+    if os.path.isdir("/dev/fd"):
+        for name in os.listdir("/dev/fd"):
+            if int(name) not in kept:
+                try:
+                    os.close(int(name))
+                except OSError:  # that of the folder itself
+                    continue
+
+
+def _end_with_the_host(number: int) -> None:
+    """Watch the channel: a block that never comes back must not outlive the host."""
+    select: Any = _module("select")
+    watch = select.poll()
+    watch.register(number, 0)  # hang-ups are reported, whatever is asked for
+    while not any(event & (select.POLLHUP | select.POLLERR) for _, event in watch.poll()):
+        pass
+    threading.Event().wait(PATIENCE)
+    os._exit(1)
+
+
+def main() -> None:
+    """Serve the host; the arguments are the script, the channel, the shared memory."""
+    channel, memory = (int(number) for number in sys.argv[-2:])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the host
+    if sys.platform != "win32":  # where the host's job ends this process
+        _close_all_but((0, 1, 2, channel, memory))
+        threading.Thread(target=_end_with_the_host, args=(channel,), daemon=True).start()
+    sys.argv[1:] = []
+    Server(Channel(channel), memory).run()
+
+
+if __name__ == "__main__":
+    main()

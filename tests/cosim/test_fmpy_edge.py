@@ -1,0 +1,30 @@
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from cosim.fmpy_edge import load_fmi2, load_fmi3, unpack
+from cosim.fmu_description import describe_fmu
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_log_line_goes_to_the_unit_that_wrote_it_however_many_are_loaded(
+    fmu: Callable[..., Path], fmi: int, tmp_path: Path
+):
+    d = describe_fmu(fmu("Mass", fmi))
+    unpack(d.path, tmp_path, d.fmi, d.identifier)
+    load = load_fmi2 if fmi == 2 else load_fmi3
+    logs: list[list[str]] = [[], []]
+
+    def loaded(log: list[str]) -> Any:
+        return load(d.path, tmp_path, d.identifier, d.token, "mass", lambda _status, message: log.append(message))
+
+    units = [loaded(log) for log in logs]
+    with pytest.raises(FMICallException):
+        units[0].doStep(0.0, 0.1)
+    assert any("DoStep" in line for line in logs[0])
+    assert logs[1] == []
+    for unit in units:
+        unit.freeInstance()

@@ -1,0 +1,113 @@
+"""What libcosim is asked to run, and what it answers, by variables' names."""
+
+import json
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from own_master import Connections, Placed
+from reference import Record
+
+from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu, indices_of
+
+LIMIT = 120.0
+"""Seconds after which a run is ended."""
+
+KINDS = {"Real": "real", "Integer": "integer", "Boolean": "boolean", "String": "string"}
+"""libcosim's words for FMI 2's types; it leaves out enumerations, saying so in its log."""
+
+Row = dict[str, float]
+
+
+@dataclass
+class Job:
+    """Units by name, how they are connected, how far to go, and by unit the values that are set before each step."""
+
+    units: Mapping[str, Placed]
+    step: Fraction
+    steps: int
+    connections: Connections = ()
+    driven: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict[str, Any])
+
+    def run(self, folder: Path) -> dict[str, list[Row]]:
+        """Run in a process of its own; return each unit's scalar outputs at every step's end.
+
+        Raises:
+            AssertionError: libcosim gave up; with what it wrote.
+        """
+        job, result = folder / "job.json", folder / "result.json"
+        job.write_text(json.dumps(self._as_json()))
+        host = Path(__file__).with_name("libcosim_host.py")
+        command = [sys.executable, str(host), str(job), str(result)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, cwd=folder, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        rows = json.loads(result.read_text())
+        return {name: [self._row(name, row[i]) for row in rows] for i, name in enumerate(self.units)}
+
+    def description(self, unit: str) -> FmuDescription:
+        """Return what a unit's FMU says of itself."""
+        return describe_fmu(self.units[unit].fmu)
+
+    def _as_json(self) -> dict[str, Any]:
+        numbers = {name: i for i, name in enumerate(self.units)}
+        connections: list[Any] = []
+        for source, target in self.connections:
+            (a, y), (b, u) = source.split("."), target.split(".")
+            output, input_ = self.description(a).outputs[y], self.description(b).inputs[u]
+            for r, s in zip(output.references, input_.references, strict=True):
+                connections.append((KINDS[output.fmi_type], numbers[a], r, numbers[b], s))
+        return {
+            "step": round(self.step * 10**9),
+            "steps": self.steps,
+            "units": [self._unit(name, placed) for name, placed in self.units.items()],
+            "connections": connections,
+        }
+
+    def _unit(self, name: str, placed: Placed) -> dict[str, Any]:
+        d = self.description(name)
+        ports = {**d.parameters, **d.inputs}
+        outputs: dict[str, list[int]] = defaultdict(list)
+        for port in known(d.outputs):
+            outputs[KINDS[port.fmi_type]] += port.references
+        values_by_step = self.driven[name] if name in self.driven else [dict[str, Any]()] * self.steps
+        driven = [_by_kind(ports, values) for values in values_by_step]
+        initial = _by_kind(ports, placed.start)
+        return {"name": name, "fmu": str(placed.fmu), "initial": initial, "driven": driven, "outputs": outputs}
+
+    def _row(self, unit: str, by_kind: Mapping[str, Sequence[Any]]) -> Row:
+        values = {kind: iter(numbers) for kind, numbers in by_kind.items()}
+        row: Row = {}
+        for port in known(self.description(unit).outputs):
+            for index in indices_of(port.shape):
+                value = next(values[KINDS[port.fmi_type]])
+                if port.fmi_type != "String":
+                    row[f"{port.name}[{','.join(map(str, index))}]" if index else port.name] = float(value)
+        return row
+
+
+def known(ports: Mapping[str, FmuPort]) -> list[FmuPort]:
+    """Return the ports of types that libcosim knows."""
+    return [port for port in ports.values() if port.fmi_type in KINDS]
+
+
+def without_enumerations(record: Record, d: FmuDescription) -> Record:
+    """Return a unit's record with only the outputs that libcosim knows."""
+    left_out = {name for name, port in d.outputs.items() if port not in known(d.outputs)}
+    return Record([{n: x for n, x in row.items() if n not in left_out} for row in record.rows], [])
+
+
+def _by_kind(ports: Mapping[str, FmuPort], values: Mapping[str, Any]) -> dict[str, list[tuple[int, Any]]]:
+    made: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+    for name, value in values.items():
+        port = ports[name]
+        if port.fmi_type == "Enumeration":
+            continue
+        entries = [value] if isinstance(value, str) else np.ravel(value).tolist()
+        made[KINDS[port.fmi_type]] += zip(port.references, entries, strict=True)
+    return made

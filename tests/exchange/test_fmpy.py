@@ -1,0 +1,114 @@
+"""Units in FMPy: its `simulate_fmu` with signals as inputs, and its classes for FMI 3 call by call."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from drive import STEPS, inputs, parameters, scalars
+from reference import FMI2_UNITS, Record, References, description, expect_same, variables
+
+from cosim.block import Kind, Variable
+from fmus.build import cached
+from fmus.catalog import UNITS
+from fmus.layout import element_names
+
+HOST: Any = fmpy
+LIGHT = ("HandoverPartner", "Thrusters")
+"""Units whose tests are quick."""
+
+TYPES = {
+    Kind.REAL: "Float64",
+    Kind.INTEGER: "Int64",
+    Kind.ENUMERATION: "Int64",
+    Kind.BOOLEAN: "Boolean",
+    Kind.STRING: "String",
+    Kind.BINARY: "Binary",
+}
+
+
+def tiered(units: "list[str]") -> list[Any]:
+    return [name if name in LIGHT else pytest.param(name, marks=pytest.mark.slow) for name in units]
+
+
+@pytest.mark.parametrize("unit", tiered(FMI2_UNITS))
+def test_fmi2_gives_the_same_in_simulate_fmu(references: References, unit: str):
+    expect_same(simulated(unit, cached(unit, 2)), references.varying(unit, 2))
+
+
+@pytest.mark.parametrize("unit", tiered(FMI2_UNITS))
+def test_scalar_fmi3_gives_the_same_in_simulate_fmu(references: References, unit: str):
+    expect_same(simulated(unit, cached(unit, 3, scalar=True)), references.varying(unit, 3))
+
+
+@pytest.mark.parametrize("unit", tiered(list(UNITS)))
+def test_fmi3_gives_the_same_call_by_call(references: References, unit: str, tmp_path: Path):
+    found, wanted = called(unit, cached(unit, 3), tmp_path), references.varying(unit, 3)
+    expect_same(found.rows, wanted)
+    assert found.pictures == wanted.pictures
+
+
+def simulated(unit: str, fmu: Path) -> list[Mapping[str, float]]:
+    """Simulate with signals for all inputs; return the outputs, all of which are scalars."""
+    d, known, step = description(unit), variables(unit), float(UNITS[unit].step)
+    rows = [scalars(known, inputs(d, k)) for k in range(STEPS + 1)]
+    times = [k * step for k in range(STEPS + 1)]
+    signals = None
+    if rows[0]:
+        columns: list[tuple[str, Any]] = [("time", float), *((name, type(value)) for name, value in rows[0].items())]
+        signals = np.array([(t, *row.values()) for t, row in zip(times, rows, strict=True)], dtype=columns)
+    outputs = [name for v in d.outputs for name in element_names(v)]
+    result = HOST.simulate_fmu(
+        str(fmu),
+        stop_time=times[-1],
+        output_interval=step,
+        start_values=scalars(known, parameters(d)),
+        input=signals,
+        output=outputs,
+    )
+    assert result["time"] == pytest.approx(times, abs=1e-12)
+    return [{name: float(row[name]) for name in outputs} for row in result]
+
+
+def called(unit: str, fmu: Path, folder: Path) -> Record:
+    """Drive an FMI 3 unit through FMPy's class, arrays and pictures whole."""
+    HOST.extract(str(fmu), str(folder))
+    told = HOST.read_model_description(str(folder))
+    slave = HOST.instantiate_fmu(str(folder), told, "CoSimulation")
+    references = {v.name: v.valueReference for v in told.modelVariables}
+    d, step = description(unit), float(UNITS[unit].step)
+    known = variables(unit)
+    rows: list[Mapping[str, float]] = []
+    pictures: list[Mapping[str, bytes]] = []
+
+    def give(values: Mapping[str, Any]) -> None:
+        for name, value in values.items():
+            entries = [value.tobytes()] if known[name].kind is Kind.BINARY else flat(known[name], value)
+            getattr(slave, f"set{TYPES[known[name].kind]}")([references[name]], entries)
+
+    def take() -> None:
+        found = {v.name: getattr(slave, f"get{TYPES[v.kind]}")([references[v.name]], v.size) for v in d.outputs}
+        binaries = [v.name for v in d.outputs if v.kind is Kind.BINARY]
+        pictures.append({name: found.pop(name)[0] for name in binaries})
+        rows.append(scalars(known, found))
+
+    try:
+        give(parameters(d))
+        slave.enterInitializationMode()
+        give(inputs(d, 0))
+        slave.exitInitializationMode()
+        take()
+        for k in range(STEPS):
+            give(inputs(d, k))
+            slave.doStep(k * step, step)
+            take()
+        slave.terminate()
+    finally:
+        slave.freeInstance()
+    return Record(rows, pictures)
+
+
+def flat(v: Variable, value: Any) -> list[Any]:
+    return [value] if v.kind is Kind.STRING else np.ravel(value).tolist()
