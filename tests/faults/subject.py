@@ -261,8 +261,8 @@ def shown(arguments: Sequence[Any]) -> str:
 
 
 def _shown(argument: Any) -> str:
-    if isinstance(argument, ctypes.Array):
-        return f"<{type(argument).__name__} {argument[:4]!r:.60}>"  # not all: it may have megabytes
+    if issubclass(type(argument), ctypes.Array):
+        return f"<{type(argument).__name__} {argument[:4]!r:.60}>"
     return f"{argument!r:.60}"
 
 
