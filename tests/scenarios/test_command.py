@@ -153,7 +153,7 @@ def test_a_platform_that_is_not_known_is_told_in_one_line(tmp_path: Path, monkey
     monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "foo")
     for arguments in (("build", "TendonArm", "--out", tmp_path / "u"), ("run", "helix_handover", "--out", tmp_path)):
         result = call(*arguments)
-        assert_refused(result, "for foo: unknown platform; known: x86_64-linux", tmp_path / "u")
+        assert_refused(result, "no platform 'foo'; there are x86_64-linux", tmp_path / "u")
         assert len(result.output.splitlines()) == 1
 
 
