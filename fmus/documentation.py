@@ -6,7 +6,7 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
-from cosim.block import Kind, Variable
+from cosim.variable import Kind, Variable
 from fmus.model_description import Model
 from fmus.sources import Package
 

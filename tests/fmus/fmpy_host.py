@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind
 from cosim.fmpy_edge import load_fmi2, load_fmi3, unpack
 from cosim.fmu_description import FmuPort, describe_fmu
+from cosim.variable import Kind
 
 Digests = dict[str, str]
 """A digest of every output's bytes, by name."""

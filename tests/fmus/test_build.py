@@ -107,7 +107,7 @@ def test_an_fmu_carries_its_sources_and_lists_its_packages(workshop: Workshop):
         names = set(archive.namelist())
         unit = json.loads(archive.read("resources/unit.json"))
         page = archive.read("documentation/index.html").decode()
-    assert {"resources/sources/sample_units/every_kind.py", "resources/sources/cosim/block.py"} <= names
+    assert {"resources/sources/sample_units/every_kind.py", "resources/sources/cosim/block_description.py"} <= names
     assert not any("build" in name or "catalog" in name for name in names)
     assert [p["module"] for p in unit["packages"]] == ["numpy", "typing_extensions"]
     assert all(p["version"] for p in unit["packages"])
