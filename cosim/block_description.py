@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import inspect
+import sys
 import typing
 from collections.abc import Mapping
 from fractions import Fraction
@@ -16,10 +17,22 @@ _EVENT_METHODS = ("advance", "handle_event", "next_event")
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Description:
-    """What a block class declares."""
+    """What a block class declares.
+
+    Attributes:
+        name: the class's name.
+        doc, module_doc: docstrings of the class and of its module; empty where there is none.
+        params_type, inputs_type, outputs_type: the dataclasses of declared fields.
+        parameters, inputs, outputs: their fields, in the order of their declaration.
+        feedthrough: by output, the inputs that act on it at once.
+        period: of a sampled block, in seconds.
+        has_events: whether it is an `EventfulBlock`.
+        has_derivatives: whether it is a `DifferentiableBlock`.
+    """
 
     name: str
     doc: str
+    module_doc: str
     params_type: type[Any]
     inputs_type: type[Any]
     outputs_type: type[Any]
@@ -64,6 +77,7 @@ def describe(block: type[Any]) -> Description:
     return Description(
         name=block.__name__,
         doc=inspect.getdoc(block) or "",
+        module_doc=_module_doc(block),
         params_type=params_type,
         inputs_type=inputs_type,
         outputs_type=outputs_type,
@@ -75,6 +89,11 @@ def describe(block: type[Any]) -> Description:
         has_events=_has_events(block),
         has_derivatives=hasattr(block, "directional_derivative"),
     )
+
+
+def _module_doc(block: type[Any]) -> str:
+    module = sys.modules.get(block.__module__)
+    return inspect.cleandoc(module.__doc__ or "") if module else ""
 
 
 def _has_events(block: type[Any]) -> bool:
