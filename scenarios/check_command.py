@@ -85,6 +85,7 @@ def _print_section(section: Section) -> None:
     level = section.level.name.lower() if section.reached else "-"
     style = _STYLES[section.level] if section.reached else "dim"
     line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.told))
+    line.rstrip()
     open_console().print(line, soft_wrap=True)
     for wanted in sorted(Level, reverse=True):
         findings = [f for f in section.findings if f.level is wanted]
@@ -127,4 +128,8 @@ def _verdict(report: CheckReport) -> Text:
     told = f" ({', '.join(counted)})" if counted else ""
     if report.passed:
         return Text.assemble(("usable", "green"), f": no faults were found{told}")
+    if report.ran:
+        return Text.assemble(
+            ("against the standard", "bold red"), f": it runs here, but another tool may refuse it{told}"
+        )
     return Text.assemble(("not usable as it is", "bold red"), told)
