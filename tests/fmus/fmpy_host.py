@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.fmpy_edge import load_fmi2, load_fmi3, unpack
+from cosim.fmpy_edge import unpack
+from cosim.fmpy_loading import load_fmi2, load_fmi3
 from cosim.fmu_description import FmuPort, describe_fmu
 from cosim.variable import Kind
 
