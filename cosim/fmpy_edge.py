@@ -12,6 +12,7 @@ from fmpy.validation import validate_model_description
 from cosim.exceptions import InvalidFmu, one_line
 from cosim.fmu_archive import DESCRIPTION, FmuArchive
 from cosim.fmu_xml import UnsafeXml, XmlElement, check_xml, parse_xml
+from cosim.library_format import HEAD, shortage
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
 
@@ -143,10 +144,11 @@ def library_path(fmi: int, identifier: str) -> str:
 
 
 def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
-    """Unpack an FMU into a folder, after checking that it has a binary for this machine.
+    """Unpack an FMU into a folder, after checking that it has a whole binary for this machine.
 
     Raises:
-        InvalidFmu: damaged archive, a path that leads out of the folder, or no binary for this platform.
+        InvalidFmu: damaged archive, a path that leads out of the folder, or no binary for this platform,
+            or one that is cut off: the system would load it and end this process.
     """
     archive = FmuArchive(path)
     if library_path(fmi, identifier) not in archive.names:
@@ -155,4 +157,9 @@ def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
         raise InvalidFmu(
             path, f"no binary for this machine ({platform_folder(fmi)}); it has {', '.join(has) or 'none'}"
         )
+    for name in archive.names:
+        here = name.startswith(f"binaries/{platform_folder(fmi)}/") and name.endswith(fmpy.sharedLibraryExtension)
+        short = shortage(archive.head(name, HEAD), archive.size(name)) if here else ""
+        if short:
+            raise InvalidFmu(path, f"{name}: {short}")
     archive.unpack(folder)

@@ -8,6 +8,8 @@ from cosim.archive_faults import STANDARD_METHODS, archive_faults, listed
 from cosim.exceptions import InvalidFmu, one_line
 
 DESCRIPTION = "modelDescription.xml"
+FOLDER_FAULT = f"a folder, not a file; zip what is in it, with {DESCRIPTION} at the top"
+NO_FILE_FAULT = "not a regular file"
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError, ValueError)
 _MIB = 1 << 20
@@ -70,6 +72,10 @@ class FmuArchive:
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"the archive is damaged: {name}: {one_line(e)}") from e
 
+    def size(self, name: str) -> int:
+        """Return the number of bytes of a member, unpacked."""
+        return next(m.file_size for m in self._members if m.orig_filename == name)
+
     def head(self, name: str, size: int) -> bytes:
         """Return the first bytes of a member.
 
@@ -115,8 +121,10 @@ class FmuArchive:
 
 
 def _members(path: Path) -> list[zipfile.ZipInfo]:
+    if path.is_dir():
+        raise InvalidFmu(path, FOLDER_FAULT)
     if not path.is_file():
-        raise InvalidFmu(path, "there is no such file" if not path.exists() else "not a file but a folder")
+        raise InvalidFmu(path, NO_FILE_FAULT if path.exists() else "there is no such file")
     try:
         with path.open("rb") as file:
             begin = file.read(4)

@@ -12,6 +12,7 @@ from rich.text import Text
 from cosim.check.check_fmu import check_fmu
 from cosim.check.check_report import CheckReport, Section
 from cosim.check.finding import Finding, Level
+from cosim.fmu_archive import FOLDER_FAULT, NO_FILE_FAULT
 from scenarios.bad_call import BadCall
 from scenarios.console import open_console
 
@@ -62,7 +63,9 @@ def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
     for file in files:
         try:
             if file.is_dir():
-                faults.append(f"{file}: a folder, not a file; zip what is in it, with modelDescription.xml at the top")
+                faults.append(f"{file}: {FOLDER_FAULT}")
+            elif file.exists() and not file.is_file():  # opening a pipe would wait for its writer
+                faults.append(f"{file}: {NO_FILE_FAULT}")
             else:
                 file.open("rb").close()
         except OSError as e:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 
 from cosim.check.finding import Finding, fault, warning
-from cosim.check.library_format import HEAD, platforms_of
+from cosim.library_format import HEAD, platforms_of, shortage
 from cosim.fmpy_edge import library_path, platform_folder
 from cosim.fmu_archive import FmuArchive
 
@@ -24,13 +24,16 @@ def platforms_in(archive: FmuArchive) -> list[str]:
 
 
 def binary_findings(archive: FmuArchive, fmi: int, identifier: str) -> Iterator[Finding]:
-    """Yield what is wrong with the libraries' names, folders and formats."""
+    """Yield what is wrong with the libraries' names, folders, formats and lengths."""
     wanted = library_path(fmi, identifier)
     if wanted not in archive.names:
         yield _missing(archive, fmi, identifier)
     for library in _libraries(archive):
         if library.stem == identifier:
             yield from _format_findings(archive, library, fmi, here=str(library) == wanted)
+        if short := shortage(archive.head(str(library), HEAD), archive.size(str(library))):
+            tell = fault if library.parts[1] == platform_folder(fmi) else warning
+            yield tell(short, where=str(library))
 
 
 def _libraries(archive: FmuArchive) -> list[PurePosixPath]:

@@ -11,6 +11,8 @@ from cosim.check.check_fmu import check_fmu
 from cosim.check.check_report import CheckReport
 from cosim.check.finding import Level
 from cosim.check.load_probe import load_fault
+from cosim.exceptions import InvalidFmu
+from cosim.fmpy_edge import unpack
 from fmus.compile import host_platform
 
 pytestmark = pytest.mark.skipif(not host_platform().endswith("linux"), reason="signals and messages of Linux")
@@ -64,6 +66,18 @@ def test_a_refused_instantiation_is_told_with_the_log(decay_library: bytes, tmp_
     found, lines = told(checked(tmp_path, decay_library, decay.edited(('guid="decay"', 'guid="x"'))), "run")
     assert found is Level.FAULT
     assert "instantiation: wrong guid x" in lines.replace("[Error] ", "")
+
+
+@pytest.mark.parametrize("part", [0.3, 0.9, 0.999])
+def test_a_library_that_is_cut_off_is_not_loaded(decay_library: bytes, tmp_path: Path, part: float):
+    report = checked(tmp_path, decay_library[: int(part * len(decay_library))])
+    found, lines = told(report, "binaries")
+    assert found is Level.FAULT
+    assert f"{decay.LIBRARY}: the library is shorter than its headers say (it has " in lines
+    assert not report.sections[-1].reached
+    with pytest.raises(InvalidFmu, match="shorter than its headers say"):
+        unpack(report.path, tmp_path / "unpacked", 2, "Decay")
+    assert not (tmp_path / "unpacked").exists()
 
 
 def test_one_instance_is_enough_where_there_may_be_only_one(decay_library: bytes, tmp_path: Path):

@@ -1,5 +1,6 @@
 import contextlib
 import io
+import os
 import struct
 import tracemalloc
 import zipfile
@@ -172,3 +173,9 @@ def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path
         archive = FmuArchive(file)
         archive.description()
         archive.unpack(target)
+
+
+def test_what_is_no_file_is_told(tmp_path: Path):
+    for path, told in ((tmp_path, "zip what is in it"), (Path(os.devnull), "not a regular file")):
+        with pytest.raises(InvalidFmu, match=told):
+            FmuArchive(path)

@@ -97,10 +97,11 @@ def test_the_worst_of_several_files_decides(broken: Path):
 
 
 def test_files_that_are_not_there_are_all_told_before_anything_is_checked(broken: Path, tmp_path: Path):
-    result = check(broken, tmp_path / "missing.fmu", tmp_path)
+    result = check(broken, tmp_path / "missing.fmu", tmp_path, Path(os.devnull))
     assert result.exit_code == 2
     assert "missing.fmu: no such file" in result.output
     assert f"{tmp_path}: a folder, not a file" in result.output
+    assert f"{os.devnull}: not a regular file" in result.output
     assert "archive" not in result.output
 
 
