@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
+_SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
+_PLACE = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
@@ -19,10 +21,20 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     return f"valid: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}"
 
 
+def log_lines(log: Iterable[str]) -> list[str]:
+    """Return the lines of a log that say anything; an entry may have several."""
+    return [line for entry in log for line in entry.splitlines() if line.strip()]
+
+
 def last_line(log: Iterable[str]) -> str:
-    """Return the last line of a log that says anything, without status and call: of a traceback, what was raised."""
-    lines = [line.strip() for entry in log for line in entry.splitlines() if line.strip()]
-    return _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
+    """Return the last line of a log that says anything, without status and call: of a traceback, what was raised.
+
+    What is wrong with a source is told with its file and line, which a traceback tells before.
+    """
+    lines = [line.strip() for line in log_lines(log)]
+    told = _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
+    places = [place for line in lines if (place := _PLACE.search(line))]
+    return f"{told} ({places[-1][1]}, line {places[-1][2]})" if places and _SYNTAX.match(told) else told
 
 
 def one_line(e: BaseException) -> str:
@@ -35,11 +47,14 @@ class CosimError(Exception):
 
 
 class InvalidFmu(CosimError):
-    """A file that should be an FMU is missing, damaged, or not one that this machine can run."""
+    """A file that should be an FMU is missing, damaged, or not one that this machine can run.
 
-    def __init__(self, path: Path, fault: str) -> None:
+    `log` holds what its unit logged, if it came so far.
+    """
+
+    def __init__(self, path: Path, fault: str, log: Sequence[str] = ()) -> None:
         super().__init__(f"{path}: {fault}")
-        self.path, self.fault = path, fault
+        self.path, self.fault, self.log = path, fault, tuple(log)
 
 
 class WiringError(CosimError):

@@ -36,7 +36,7 @@ class Instance:
         try:
             self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
         except InvalidFmu as e:
-            raise InvalidFmu(e.path, last_line(self.log) or e.fault) from e
+            raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
         self._component = self._fmu.component
         self._failed: int | None = None
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])

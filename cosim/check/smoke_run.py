@@ -1,6 +1,6 @@
 """A short run of one unit through the calls that a master makes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,11 +10,12 @@ import numpy as np
 from cosim.check.finding import Finding, fault, warning
 from cosim.check.journal import Journal
 from cosim.check.probed_instance import ProbedInstance
-from cosim.exceptions import InvalidFmu, UnitFailure
+from cosim.exceptions import InvalidFmu, UnitFailure, log_lines
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.variable import Kind
 
 STEPS = 10
+_MOST_LINES = 24  # of a unit's log
 _REPEATED = 5  # steps that are done again from a state
 
 
@@ -48,14 +49,15 @@ class SmokeRun:
         try:
             unit = self._instance("unit")
         except InvalidFmu as e:
-            self.journal.found(fault(e.fault, where="instantiation"))
+            self.journal.found(fault(e.fault, where="instantiation", log=_told(e.log)))
             return
         try:
             self._run(unit)
         except UnitFailure as e:
             self.journal.found(failure(e))
         except InvalidFmu as e:
-            self.journal.found(fault(f"a second instance beside the first: {e.fault}", where="instantiation"))
+            what = f"a second instance beside the first: {e.fault}"
+            self.journal.found(fault(what, where="instantiation", log=_told(e.log)))
         finally:
             unit.free()
 
@@ -164,8 +166,12 @@ class SmokeRun:
 
 def failure(e: UnitFailure) -> Finding:
     """Return a failed call as a finding, with the unit's log."""
-    lines = tuple(line for entry in e.log for line in entry.splitlines() if line.strip())
-    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=lines[-12:])
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=_told(e.log))
+
+
+def _told(log: Sequence[str]) -> tuple[str, ...]:
+    """Return the end of a unit's log: of a traceback, where it ended and what was raised."""
+    return tuple(log_lines(log)[-_MOST_LINES:])
 
 
 def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
