@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
+from cosim.block_form import check_form
 from cosim.declared_fields import DeclarationError, declared_variables
 from cosim.variable import Causality, Variable
 
@@ -56,19 +57,15 @@ def describe(block: type[Any]) -> Description:
 
     Raises:
         DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
-            declaration, or a type that is no port's, or a start value or bound that its type cannot hold; the
-            period is not positive.
+            declaration, or a type that is no port's, or a start value or bound that its type cannot hold; period or
+            feedthrough are not what they are to be.
     """
-    for name in ("feedthrough", "period", "step"):
-        if not hasattr(block, name):
-            raise DeclarationError(block.__name__, name, "a block has this attribute; see cosim.block.Block")
-    if block.period is not None and block.period <= 0:
-        raise DeclarationError(block.__name__, "period", f"{block.period} s is not positive")
+    check_form(block)
     params_type = _annotation(block, "__init__", "params")
     inputs_type = _annotation(block, "step", "u")
     outputs_type = _annotation(block, "step", "return")
-    inputs = declared_variables(inputs_type, Causality.INPUT)
-    outputs = declared_variables(outputs_type, Causality.OUTPUT)
+    inputs = declared_variables(inputs_type, Causality.INPUT, block.__name__)
+    outputs = declared_variables(outputs_type, Causality.OUTPUT, block.__name__)
     feedthrough: Mapping[str, tuple[str, ...]] = block.feedthrough
     for y, us in feedthrough.items():
         for name, known in [(y, outputs)] + [(u, inputs) for u in us]:
@@ -81,7 +78,7 @@ def describe(block: type[Any]) -> Description:
         params_type=params_type,
         inputs_type=inputs_type,
         outputs_type=outputs_type,
-        parameters=declared_variables(params_type, Causality.PARAMETER),
+        parameters=declared_variables(params_type, Causality.PARAMETER, block.__name__),
         inputs=inputs,
         outputs=outputs,
         feedthrough=feedthrough,

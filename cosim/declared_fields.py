@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.declared_values import bounds_fault, start_fault
 from cosim.ports import Declaration, Raster, Shape
 from cosim.units import Unit
 from cosim.variable import Causality, Kind, Variable
@@ -22,14 +23,15 @@ class DeclarationError(TypeError):
         self.owner, self.field, self.fault = owner, field, fault
 
 
-def declared_variables(owner: type[Any], causality: Causality) -> tuple[Variable, ...]:
-    """Read the fields of one dataclass of declarations.
+def declared_variables(owner: type[Any], causality: Causality, block: str = "") -> tuple[Variable, ...]:
+    """Read the fields of one dataclass of declarations; `block` names the block that it belongs to, if to one.
 
     Raises:
         DeclarationError: see `describe`.
     """
     hints = typing.get_type_hints(owner, include_extras=True)
-    return tuple(_variable(owner.__name__, f, hints[f.name], causality) for f in dataclasses.fields(owner))
+    told = f"{block}: {owner.__name__}" if block else owner.__name__
+    return tuple(_variable(told, f, hints[f.name], causality) for f in dataclasses.fields(owner))
 
 
 def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality: Causality) -> Variable:
@@ -49,6 +51,9 @@ def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality:
         maximum=declaration.maximum,
         **facts,
     )
+    fault = bounds_fault(made) or ("" if causality is Causality.OUTPUT else start_fault(made))
+    if fault:
+        raise DeclarationError(owner, made.name, fault)
     made = _with_width(owner, made)
     made = dataclasses.replace(made, start=_start(made))
     _check_range(owner, made)
@@ -128,10 +133,7 @@ def _start(v: Variable) -> Any:
     if v.kind is Kind.BINARY:
         return b""
     if v.kind is Kind.REAL and v.shape:
-        given = np.zeros(v.shape) if v.start is None else np.asarray(v.start, dtype=np.float64)
-        if given.shape != v.shape:
-            raise DeclarationError(v.name, "start", f"shape {given.shape} where {v.shape} is declared")
-        return given
+        return np.zeros(v.shape) if v.start is None else np.asarray(v.start, dtype=np.float64)
     if v.start is not None:
         return v.start
     if v.enumeration is not None:

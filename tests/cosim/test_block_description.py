@@ -48,8 +48,16 @@ class Gripper:
     def __init__(self, params: Params) -> None:
         self.params = params
 
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         return Outputs(phase=Phase.CLOSED if u.f_G[2] > 0 else Phase.OPEN)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None: ...
 
 
 def by_name(block: type[Any]) -> dict[str, Variable]:
@@ -110,8 +118,38 @@ def test_a_block_without_what_a_block_has_is_refused():
     class Bare:
         feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
-    with pytest.raises(DeclarationError, match=r"Bare\.period"):
+        def step(self, t: float, dt: float, u: Inputs) -> Outputs: ...
+
+    with pytest.raises(DeclarationError, match=r"Bare\.period, outputs, get_state, set_state: a block has these"):
         describe(Bare)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "told"),
+    [
+        ("period", 0.1, r"0\.1 is not a fraction of seconds; Fraction\(1, 10\) is right, or None"),
+        ("period", 2, r"2 is not a fraction of seconds; Fraction\(2, 1\) is right"),
+        ("period", "soon", r"'soon' is not a fraction of seconds; Fraction\(1, 100\) is right"),
+        ("period", Fraction(0), "0 s is not positive"),
+        ("feedthrough", ("phase",), r"\('phase',\) is not a mapping of outputs' names"),
+        ("feedthrough", {"phase": "f_G"}, r"'phase': 'f_G' is a text, not a tuple of inputs' names; \('f_G',\) is"),
+        ("feedthrough", {"phase": 3}, "'phase': 3 is not a tuple"),
+    ],
+)
+def test_an_attribute_that_is_not_what_it_is_to_be_is_refused(attribute: str, value: Any, told: str):
+    with pytest.raises(DeclarationError, match=rf"Wrong\.{attribute}: {told}"):
+        describe(type("Wrong", (Gripper,), {attribute: value}))
+
+
+def test_a_fault_of_a_field_names_the_block_too():
+    made = dataclasses.make_dataclass("Made", [("x", Vector3[Metre], port(np.zeros(2), "x"))])
+
+    class Wrong(Gripper):
+        def step(self, t: float, dt: float, u: Any) -> Outputs: ...
+
+    Wrong.step.__annotations__["u"] = made
+    with pytest.raises(DeclarationError, match=r"Wrong: Made\.x: start has the shape \(2,\) where \(3,\) is declared"):
+        describe(Wrong)
 
 
 def declared(hint: Any, field: Any) -> Variable:
@@ -149,6 +187,23 @@ def test_start_and_bounds_of_a_single_are_what_a_host_sees_of_them():
         (Phase, port(Phase.CLOSED, "x", maximum=0), "start 1 is not between"),
         (Single[int], port(0, "x"), "Float32 is not the type of integer values"),
         (Single[bool], port(start=False, description="x"), "Float32 is not the type of boolean values"),
+        (Metre, port("abc", "x"), r"Made\.x: start 'abc' is not a number, such as 0\.0"),
+        (Metre, port(None, "x"), "start None is not a number"),
+        (Metre, port(start=True, description="x"), "start True is not a number"),
+        (int, port(0.5, "x"), r"start 0\.5 is not a whole number"),
+        (bool, port(1, "x"), "start 1 is not True or False"),
+        (str, port(1, "x"), "start 1 is not a text"),
+        (bytes, port("x", "x"), "start 'x' is not bytes"),
+        (Phase, port(1, "x"), r"start 1 is not an item of Phase, such as Phase\.OPEN"),
+        (Vector3[Metre], port("abc", "x"), r"start 'abc' is not an array of numbers, such as np\.zeros\(\(3,\)\)"),
+        (Picture1280x720, port(np.zeros((2, 2, 3)), "x"), r"shape \(2, 2, 3\) where \(720, 1280, 3\) is declared"),
+        (
+            Metre,
+            port(3.0, "x", minimum=4.0, maximum=2.0),
+            r"minimum 4\.0 is above its maximum 2\.0; are they swapped\?",
+        ),
+        (Metre, output("x", minimum=4.0, maximum=2.0), "are they swapped"),
+        (Metre, port(3.0, "x", maximum=float("nan")), "maximum nan is not a number"),
         (Vector3[Int8], port(np.zeros(3), "x"), "arrays have real entries"),
     ],
 )
