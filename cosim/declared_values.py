@@ -44,14 +44,17 @@ def start_fault(v: Variable) -> str:
 
 def _array_fault(start: Any, shape: tuple[int, ...]) -> str:
     try:
-        is_whole = isinstance(start, np.ndarray) and start.dtype.kind in "iu"  # a picture, too large to be converted
-        array: Any = start if is_whole or start is None else np.asarray(start, dtype=np.float64)
-        given = None if array is None else array.shape
+        given = None if start is None else _shape(start)
     except (TypeError, ValueError):
         given = None
     if given is None:
         return f"start {_told(start)} is not an array of numbers, such as np.zeros({shape})"
     return f"start has the shape {given} where {shape} is declared" if given != shape else ""
+
+
+def _shape(start: Any) -> tuple[int, ...]:
+    """Return the shape of what can be made an array of numbers; a picture, which is large, is left as it is."""
+    return np.shape(start) if getattr(start, "dtype", None) == np.uint8 else np.asarray(start, dtype=np.float64).shape
 
 
 def _told(value: Any) -> str:

@@ -9,6 +9,7 @@ import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from fractions import Fraction
+from numbers import Rational
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,15 @@ class UnusableName(ValueError):
         self.name = name
 
 
+class UnusableStep(ValueError):
+    """A communication step is a positive number of seconds, and exact."""
+
+    def __init__(self, step: object) -> None:
+        wanted = "an int or a Fraction above 0, such as Fraction(1, 100), is right"
+        super().__init__(f"a communication step of {step!r} s; {wanted}")
+        self.step = step
+
+
 def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
     """Return a catalog unit's FMU, built unless the cache has the one of the present sources; see `build`.
 
@@ -67,6 +77,7 @@ def build_block(
     summary: str = "",
     name: str = "",
     scalar: bool = False,
+    platforms: Sequence[str] | None = None,
 ) -> Path:
     """Build an FMU of any block class, wherever its module lies.
 
@@ -78,8 +89,13 @@ def build_block(
         summary: one line of description; without it the first line of the class's docstring.
         name: the FMU's name, without it the class's.
         scalar: see `build`.
+        platforms: see `build`.
+
+    Raises:
+        what `build` raises.
     """
-    return build(Entry(name or block.rpartition(":")[2], block, step, summary), fmi, out_dir, scalar=scalar)
+    entry = Entry(name or block.rpartition(":")[2], block, step, summary)
+    return build(entry, fmi, out_dir, scalar=scalar, platforms=platforms)
 
 
 def build(
@@ -98,7 +114,7 @@ def build(
 
     Raises:
         UnknownBlock: the entry's block does not exist.
-        UnknownVersion, UnusableName: the standard's version or the name is not one that can be.
+        UnknownVersion, UnusableName, UnusableStep: the standard's version, the name or the step is not one that can be.
         DeclarationError, DuplicateName, AmbiguousName, UnusableText: the block's declarations are not in order.
         NoFmi2Form: FMI 2 and the block has binary ports, or integers that start beyond 32 bits.
         UnknownPlatform: the runtime is not made for a platform.
@@ -108,6 +124,8 @@ def build(
     carried = closure(entry.block)
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise UnusableName(entry.name)
+    if not isinstance(entry.step, Rational) or entry.step <= 0:
+        raise UnusableStep(entry.step)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     packages = carried.packages()
     describe_in_xml = fmi2_description if fmi == 2 else fmi3_description

@@ -8,15 +8,19 @@ import click
 
 from cosim.exceptions import nearest
 from fmus.binaries import NotCompiled
-from fmus.build import build
+from fmus.build import UnusableName, UnusableStep, build
 from fmus.catalog import UNITS, Entry
 from fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from fmus.fmi2_description import NoFmi2Form
+from fmus.layout import DuplicateName
+from fmus.model_description import AmbiguousName, UnusableText
 from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.interruption import Interruption
-from scenarios.run_folder import check_place
+from scenarios.own_unit import own_unit
+from scenarios.run_folder import BadRunFolder, check_place
 
-_HELP = """Build UNITs (all by default) as FMUs for other tools.
+_HELP = """Build UNITs (all by default) as FMUs for other tools. A unit of your own is named MODULE:CLASS, such as
+spring:Spring for the class Spring in spring.py; modules are looked for in the working directory first.
 
 A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
 
@@ -54,6 +58,11 @@ Environment, when a tool loads the units
     help="Folder for the files.",
 )
 @click.option(
+    "--step",
+    metavar="SECONDS",
+    help="Communication step that suits a unit of your own, such as 0.01 or 1/30  [default: its period, or 0.01]",
+)
+@click.option(
     "--platform",
     "platforms",
     multiple=True,
@@ -61,16 +70,23 @@ Environment, when a tool loads the units
     help="Platforms to run on: " + ", ".join(TARGETS) + ", `host` or `all`; missing ones are compiled, which takes a "
     "minute the first time  [default: all that are compiled]",
 )
-def build_command(units: Sequence[str], fmi: str, out: Path, platforms: Sequence[str], *, scalar: bool) -> None:
+def build_command(
+    units: Sequence[str], fmi: str, out: Path, step: str | None, platforms: Sequence[str], *, scalar: bool
+) -> None:
     """Build units as FMUs for other tools."""
-    unknown = [u for u in units if u not in UNITS]
+    named = list(dict.fromkeys(units))
+    unknown = [u for u in named if u not in UNITS and ":" not in u]
     if unknown:
-        raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown))
+        cure = "a unit of your own is named MODULE:CLASS"
+        raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown) + f"; {cure}")
     with Interruption(), told_in_one_line():
         check_place(out)
+        entries = [UNITS[u] if u in UNITS else own_unit(u, step) for u in named or UNITS]
+        if step is not None and all(entry in UNITS.values() for entry in entries):
+            raise BadCall("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
         _compile_missing(platforms)
         make = partial(build, out_dir=out, scalar=scalar, platforms=platforms or None)
-        for line in _build_all(units or list(UNITS), fmi, make, named=bool(units)):
+        for line in _build_all(entries, fmi, make, out, named=bool(units)):
             click.echo(line)
 
 
@@ -83,13 +99,19 @@ def _compile_missing(platforms: Sequence[str]) -> None:
         compile_runtime([target])
 
 
-def _build_all(units: Sequence[str], fmi: str, make: Callable[[Entry, int], Path], *, named: bool) -> Iterator[str]:
-    for name in units:
+def _build_all(
+    entries: Sequence[Entry], fmi: str, make: Callable[[Entry, int], Path], out: Path, *, named: bool
+) -> Iterator[str]:
+    for entry in entries:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
             try:
-                yield str(make(UNITS[name], version))
+                yield str(make(entry, version))
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise BadCall(str(e)) from e
+            except (UnusableName, UnusableStep, DuplicateName, AmbiguousName, UnusableText) as e:
+                raise BadCall(f"{entry.block}: {e}") from e
             except OSError as e:
-                raise BadCall(f"{name} cannot be built: {e}") from e
+                if e.filename and Path(e.filename).absolute().is_relative_to(out.absolute()):
+                    raise BadRunFolder(out, f"it cannot be written to: {e.strerror}") from e
+                raise BadCall(f"{entry.name} cannot be built: {e}") from e

@@ -2,14 +2,15 @@ import json
 import zipfile
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import pytest
 from workshop import Workshop
 from written_blocks import write_block
 
-from fmus.build import UnknownVersion, UnusableName, build_block, cached
+from fmus.build import UnknownVersion, UnusableName, UnusableStep, build_block, cached
 from fmus.catalog import UNITS, Entry, UnknownUnit, find_unit
+from fmus.compile import UnknownPlatform, host_platform
 from fmus.sources import UnknownBlock, closure
 from fmus.universal import universal
 
@@ -37,6 +38,23 @@ def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_pat
         build_block("sample_units.every_kind:EveryKind", 3, tmp_path, name="two words")
     with pytest.raises(UnknownVersion, match="there are 2"):
         build_block("sample_units.every_kind:EveryKind", 1, tmp_path)
+
+
+@pytest.mark.parametrize("step", [Fraction(0), Fraction(-1), 0, 0.1, "soon"])
+def test_a_step_that_is_none_is_refused_before_anything_is_written(tmp_path: Path, step: Any):
+    with pytest.raises(UnusableStep, match=r"such as Fraction\(1, 100\), is right") as caught:
+        build_block("sample_units.every_kind:EveryKind", 3, tmp_path / "out", step=step)
+    assert f"step of {step!r} s" in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_block_is_built_for_the_platforms_that_are_named(tmp_path: Path):
+    with pytest.raises(UnknownPlatform, match="no platform 'amiga'"):
+        build_block("sample_units.every_kind:EveryKind", 3, tmp_path, platforms=["amiga"])
+    made = build_block("sample_units.every_kind:EveryKind", 3, tmp_path, platforms=["host"])
+    with zipfile.ZipFile(made) as archive:
+        folders = {n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/")}
+    assert folders == {host_platform()}
 
 
 def test_the_same_sources_give_the_same_bytes(workshop: Workshop, tmp_path: Path):

@@ -111,6 +111,12 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("run", "helix_handover", "--unit", "arm=a.fmu", "--unit", "arm=b.fmu"), "arm is given twice"),
         (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
         (("build", "TendonArms"), "did you mean TendonArm?"),
+        (("build", "spring"), "a unit of your own is named MODULE:CLASS"),
+        (("build", "nowhere:Spring"), "module 'nowhere' cannot be found"),
+        (("build", "failing_arm:Nothing"), "has no class 'Nothing'"),
+        (("build", "failing_arm:RunTime", "--step", "soon"), "--step 'soon' is not a positive number of seconds"),
+        (("build", "failing_arm:Inputs"), "failing_arm:Inputs: Inputs.feedthrough, period, outputs, step, get_state"),
+        (("build", "Push", "--step", "0.1"), "--step is for units of your own"),
         (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
     ],
 )
@@ -171,6 +177,74 @@ def test_build_writes_the_files_it_names(tmp_path: Path):
     names = sorted(Path(line).name for line in result.output.split())
     assert names == ["TendonArm.fmi2.fmu", "TendonArm.fmi3.fmu", "VisualServo.fmi2.fmu", "VisualServo.fmi3.fmu"]
     assert sorted(p.name for p in tmp_path.iterdir()) == names
+
+
+OWN = """
+from dataclasses import dataclass
+from fractions import Fraction
+from cosim.ports import output
+from cosim.units import Metre
+
+@dataclass(frozen=True)
+class Params: ...
+
+@dataclass
+class Inputs: ...
+
+@dataclass
+class Outputs:
+    x: Metre = output("place")
+
+class Spring:
+    "A spring."
+    feedthrough = {}
+    period = None
+    def __init__(self, params: Params) -> None: ...
+    def outputs(self, t: float, u: Inputs) -> Outputs: return Outputs(x=t)
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs: return Outputs(x=t + dt)
+    def get_state(self) -> bytes: return b""
+    def set_state(self, state: bytes) -> None: ...
+"""
+
+
+def test_build_makes_a_unit_of_ones_own_from_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "own_spring.py").write_text(OWN)
+    result = call("build", "own_spring:Spring", "--step", "1/50", "--out", "made")
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in (tmp_path / "made").iterdir()) == ["Spring.fmi2.fmu", "Spring.fmi3.fmu"]
+    with zipfile.ZipFile(tmp_path / "made" / "Spring.fmi3.fmu") as archive:
+        assert 'stepSize="0.02"' in archive.read("modelDescription.xml").decode()
+    assert call("check", "made/Spring.fmi3.fmu").exit_code == 0
+
+
+def test_a_module_of_ones_own_that_does_not_load_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    (tmp_path / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
+    result = call("build", "own_broken:Spring", "--out", "made")
+    assert_refused(result, "own_broken:Spring: its module cannot be loaded: ZeroDivisionError", tmp_path / "made")
+    assert len(result.output.splitlines()) == 1
+
+
+def test_a_unit_that_is_named_twice_is_built_once(tmp_path: Path):
+    result = call("build", "Push", "Push", "--fmi", "3", "--out", tmp_path)
+    assert [Path(line).name for line in result.output.split()] == ["Push.fmi3.fmu"]
+
+
+def test_a_folder_that_the_system_does_not_make_is_told_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refuse(path: Path, **_: object) -> None:
+        raise FileNotFoundError(2, "No such file or directory", str(path))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)  # as /proc does, though it says that it can be written to
+    result = call("build", "Push", "--fmi", "3", "--out", tmp_path / "out")
+    assert_refused(result, f"output folder {tmp_path / 'out'}: it cannot be written to: No such file or directory")
+
+
+def test_a_folder_in_the_place_of_an_fmu_is_told_with_what_to_do(tmp_path: Path):
+    result = call("run", "helix_handover", "--unit", f"arm={tmp_path}", "--out", tmp_path / "out")
+    assert_refused(result, "a folder, not a file; zip what is in it", tmp_path / "out")
 
 
 def test_build_scalar_writes_fmi_3_without_arrays(tmp_path: Path):
