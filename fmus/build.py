@@ -124,8 +124,9 @@ def build(
     carried = closure(entry.block)
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise UnusableName(entry.name)
-    if not isinstance(entry.step, Rational) or entry.step <= 0:
-        raise UnusableStep(entry.step)
+    step: object = entry.step  # of whatever type the caller gave
+    if not isinstance(step, Rational) or step <= 0:
+        raise UnusableStep(step)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     packages = carried.packages()
     describe_in_xml = fmi2_description if fmi == 2 else fmi3_description
