@@ -14,8 +14,9 @@ from saved_states import deserialise, save, serialised
 from state_runs import varied
 from workshop import Workshop
 
-from cosim.block import Kind, describe
+from cosim.block_description import describe
 from cosim.fmu_description import describe_fmu
+from cosim.variable import Kind
 from fmus.build import cached, import_block
 from fmus.catalog import UNITS
 from fmus.layout import DuplicateName, Layout

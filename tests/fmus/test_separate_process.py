@@ -9,15 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from binary_values import SIZE_OF_PICTURE, put, take
 from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
 from sample_units.trouble import Deed
-from test_pictures import SIZE_OF_PICTURE, put, take
-from test_states import DT, called, deserialise, save, serialised
+from saved_states import called, deserialise, save, serialised
 from workshop import Workshop
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="looks after processes as POSIX has them")
 
 TROUBLE = "trouble:Trouble"
+DT = 1 / 64
 
 
 @pytest.fixture(autouse=True)
