@@ -2,7 +2,7 @@
 
 `python tests/fmus/step_speed.py LOOPS ROUNDS NAME=FMU ...`; LOOPS is the library made of step_loop.c. A NAME
 begins with `FMI 2`, `FMI 3`, `pythonfmu` or `pythonfmu3`; with ` apart` at its end Python
-runs in a process of its own. It prints microseconds of CPU of the calling thread a step and of wall time, medians of the rounds.
+runs in a process of its own. It prints microseconds a step: of CPU of the calling thread, and of wall time; medians.
 Other packages' libraries share no process with the tests: what they leave in the heap is not the tests' concern.
 """
 
