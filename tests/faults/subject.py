@@ -245,7 +245,7 @@ class Subject:
         """Advance; tell whether the block did. The time goes on, if the unit returns early not by all of `dt`."""
         if not self.attempt("DoStep", *self.step_arguments(self.t, dt)):
             return False
-        early = False
+        last, early = self.t + dt, False
         if self.unit.fmi == 3:
             last, needs_event, _, early = struct.unpack_from("=d???", self.kept)
             self.needs_event = self.event_mode and needs_event
