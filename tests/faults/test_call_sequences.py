@@ -151,7 +151,7 @@ def test_a_unit_that_crashes_or_hangs_is_told_with_its_last_calls(crew: Crew, tm
     assert f"no call ended for {SOON:g} s" in hang
     for told in (crash, hang):
         assert re.search(rf"sequence --- legal sequence \d+ of seed {SEED}: ", told), told
-        assert re.fullmatch(r"x\d \[stepping\] DoStep\(.+", re.findall(r"^    (.+)$", told, re.MULTILINE)[-1]), told
+        assert re.fullmatch(r"x\d \[stepping\] DoStep\(.+", re.findall(r"^ +(x\d .+)$", told, re.MULTILINE)[-1]), told
     assert [job.process.poll() is None for job in crew.jobs if job.process] == [False, False]
 
 
