@@ -86,7 +86,7 @@ def measured_apart(loops: Path, rounds: int, fmus: Mapping[str, Path]) -> dict[s
         text=True,
         check=False,
     )
-    # how it ends says nothing: the peers' exit handlers read the freed interpreter, which glibc may answer with an abort
+    # how it ends says nothing: the peers' exit handlers use the freed interpreter, which may end in an abort
     assert done.stdout, f"ended with {done.returncode}: {done.stderr}"
     return json.loads(done.stdout)
 
