@@ -61,7 +61,8 @@ class IllegalCalls:
             LegalCalls(s, self.ready, rng, self.effort).one()
 
     def _take_position(self) -> None:
-        s, mode = self.subject, self.rng.choice(["instantiated", "initialisation", "ready", "ready", "terminated"])
+        s, afresh = self.subject, self.rng.random() < min(0.4, 0.1 + 2.0 * self.effort.from_scratch)
+        mode = self.rng.choice(["instantiated", "initialisation"] if afresh else ["ready", "ready", "terminated"])
         if mode in ("instantiated", "initialisation"):
             s.reset()
         else:

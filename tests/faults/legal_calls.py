@@ -50,7 +50,8 @@ class Effort:
     Attributes:
         from_scratch: share of sequences that make the block anew; the others go on from a saved state.
         steps: most steps in a sequence.
-        bytes: share of the occasions at which a state's bytes are looked at; two pictures make megabytes of them.
+        bytes: share of the occasions at which a state's bytes are looked at, or it is gone back to; two pictures make
+            megabytes of them, and going back draws them again.
     """
 
     from_scratch: float = 0.5
@@ -152,7 +153,7 @@ class LegalCalls:
             if s.serialised(again) != data:
                 raise Fault("a restored state's bytes differ from those that it was restored from")
             s.forget(again)
-        elif self.rng.random() < 0.8:
+        elif self.rng.random() < 0.8 * max(0.25, self.effort.bytes):
             s.restore(saved)
         s.forget(saved)
 
