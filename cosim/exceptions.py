@@ -25,6 +25,11 @@ def last_line(log: Iterable[str]) -> str:
     return _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
 
 
+def one_line(e: BaseException) -> str:
+    """Return an exception's message in one line; the name of its type where it has none."""
+    return " ".join(str(e).split()) or type(e).__name__
+
+
 class CosimError(Exception):
     """Base of what this engine raises on purpose."""
 

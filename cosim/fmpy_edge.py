@@ -1,11 +1,5 @@
-"""The typed edge to FMPy: reading model descriptions, unpacking, and loading FMUs of both standards."""
+"""The typed edge to FMPy: reading model descriptions, and unpacking. FMUs are loaded in `cosim.fmpy_loading`."""
 
-import ctypes
-import itertools
-import os
-import weakref
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, cast
 
@@ -15,16 +9,11 @@ import fmpy.fmi3
 from fmpy.model_description import ValidationError
 from fmpy.validation import validate_model_description
 
-from cosim.exceptions import InvalidFmu
+from cosim.exceptions import InvalidFmu, one_line
 from cosim.fmu_archive import DESCRIPTION, FmuArchive
 from cosim.fmu_xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
-Logger = Callable[[int, str], None]
-"""Takes an FMI status and a message."""
-
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
-
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
 class ModelVariable(Protocol):
@@ -70,7 +59,7 @@ def read_description(path: Path) -> ModelDescription:
     except (
         Exception
     ) as e:  # FMPy raises plain Exception for what it does not know, lxml its own for what it cannot parse
-        raise InvalidFmu(path, f"its modelDescription.xml is not valid: {_one_line(e)}") from e
+        raise InvalidFmu(path, f"its modelDescription.xml is not valid: {one_line(e)}") from e
     if md.coSimulation is None:
         raise InvalidFmu(path, "it has no co-simulation interface")
     return cast(ModelDescription, md)
@@ -120,14 +109,14 @@ def problems_of(path: Path) -> tuple[list[str], str]:
     except ValidationError as e:
         problems = [str(p) for p in cast(list[Any], e.problems)]
     except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... where it does not understand a description
-        return [], f"{type(e).__name__}: {_one_line(e)}"
+        return [], f"{type(e).__name__}: {one_line(e)}"
     else:
         return [], ""
     try:
         md: Any = fmpy.read_model_description(str(path), validate=False)
         problems += validate_model_description(md, validate_variable_names=True, validate_model_structure=True)
     except Exception as e:
-        return problems, f"{type(e).__name__}: {_one_line(e)}"
+        return problems, f"{type(e).__name__}: {one_line(e)}"
     return problems, ""
 
 
@@ -167,87 +156,3 @@ def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
             path, f"no binary for this machine ({platform_folder(fmi)}); it has {', '.join(has) or 'none'}"
         )
     archive.unpack(folder)
-
-
-def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger) -> Any:
-    """Load and instantiate an FMI 3 co-simulation FMU; return FMPy's `FMU3Slave`.
-
-    Raises:
-        InvalidFmu: the library does not load, lacks a function, or does not instantiate.
-    """
-
-    def log_message(_environment: Any, status: int, _category: bytes, message: bytes) -> None:
-        log(status, message.decode("utf-8", "replace"))
-
-    with _loading(path):
-        fmu = fmpy.fmi3.FMU3Slave(
-            guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
-        )
-        with _unloading(fmu):
-            fmu.instantiate(loggingOn=True, logMessage=log_message)
-        return fmu
-
-
-def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger) -> Any:
-    """Load and instantiate an FMI 2 co-simulation FMU; return FMPy's `FMU2Slave`.
-
-    Raises:
-        InvalidFmu: the library does not load, lacks a function, or does not instantiate.
-    """
-    place = next(_places)
-    callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-    callbacks.logger = _dispatch_fmi2
-    callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    callbacks.componentEnvironment = place
-    fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
-    with _loading(path):
-        fmu = fmpy.fmi2.FMU2Slave(
-            guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
-        )
-        _loggers[place] = log
-        weakref.finalize(fmu, _loggers.pop, place, None)
-        with _unloading(fmu):
-            fmu.instantiate(callbacks=callbacks, loggingOn=True)
-        return fmu
-
-
-_places = itertools.count(1)
-_loggers: dict[int, Logger] = {}
-
-
-def _log_fmi2(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-    log = _loggers.get(environment or 0)
-    if log is not None:
-        log(status, message.decode("utf-8", "replace"))
-
-
-_dispatch_fmi2 = fmpy.fmi2.fmi2CallbackLoggerTYPE(_log_fmi2)
-"""The logger of all FMI 2 units. FMPy's proxy, which puts the arguments into messages, knows one logger in a process,
-the last that it was given, and calls it ever after: so it must be one that tells units apart and that stays."""
-
-
-@contextmanager
-def _loading(path: Path) -> Generator[None, None, None]:
-    """Tell a failed loading as InvalidFmu, and stay in the working directory, which FMPy leaves when it fails."""
-    before = Path.cwd()
-    try:
-        yield
-    except Exception as e:  # FMPy raises plain Exception when a library does not load or instantiate
-        raise InvalidFmu(path, f"could not be instantiated: {_one_line(e)}") from e
-    finally:
-        os.chdir(before)
-
-
-@contextmanager
-def _unloading(fmu: Any) -> Generator[None, None, None]:
-    """Unload the library if the instance cannot be made."""
-    try:
-        yield
-    except BaseException:
-        fmu.freeLibrary()
-        raise
-
-
-def _one_line(e: BaseException) -> str:
-    return " ".join(str(e).split()) or type(e).__name__

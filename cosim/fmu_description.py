@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cosim.block import Causality, Declared, Kind
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
 from cosim.units import UNKNOWN, BaseExponents, Unit
+from cosim.variable import Causality, Declared, Kind
 from cosim.width import Width
 
 _KINDS = {

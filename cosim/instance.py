@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cosim.block import Kind
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from cosim.fmpy_edge import STATUS, load_fmi2, load_fmi3
+from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
+from cosim.variable import Kind
 
 _LOG_LINES = 30
 _FATAL = 4

@@ -5,9 +5,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from cosim.block import Kind
 from cosim.exceptions import UnitFailure
 from cosim.fmu_description import FmuPort
+from cosim.variable import Kind
 from cosim.width import Width
 
 

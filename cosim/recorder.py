@@ -9,8 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from cosim.block import Kind
 from cosim.signals import Column, Signals
+from cosim.variable import Kind
 from cosim.width import Width
 
 _ROWS = 256

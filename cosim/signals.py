@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Kind
 from cosim.exceptions import nearest
 from cosim.fmu_description import FmuPort, indices_of
 from cosim.signal_buffer import Views
+from cosim.variable import Kind
 
 
 @dataclass(frozen=True)

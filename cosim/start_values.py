@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Causality, Declared, Kind, declared_variables
+from cosim.declared_fields import declared_variables
+from cosim.variable import Causality, Declared, Kind
 
 
 def fault_of(port: Declared, value: Any) -> str | None:

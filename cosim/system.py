@@ -6,11 +6,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from cosim.block import Kind
 from cosim.exceptions import WiringError, nearest
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from cosim.start_values import fault_of
 from cosim.units import UNKNOWN, Unit
+from cosim.variable import Kind
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Causality, Variable
 from cosim.ports import Floats, Raster
+from cosim.variable import Causality, Variable
 from fmus.layout import Buffer, Layout, Slot, capacity
 
 ALIGNMENT = 64

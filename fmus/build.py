@@ -12,7 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from cosim.block import describe
+from cosim.block_description import describe
 from fmus import interpreter
 from fmus.archive import write_archive
 from fmus.binaries import binaries

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Causality
+from cosim.variable import Causality
 from fmus.buffers import Buffers
 from fmus.layout import Buffer, Slot
 

@@ -1,14 +1,29 @@
-"""documentation/index.html of an FMU: what the block declares, as a page."""
+"""documentation/index.html of an FMU: what the block declares and what its docstring says, as a page."""
 
+import enum
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 
 import jinja2
 import numpy as np
+from markupsafe import Markup, escape
 
-from cosim.block import Kind, Variable
-from fmus.model_description import Model
+from cosim.variable import Causality, Kind, Variable
+from fmus.docstring import parse
+from fmus.layout import SAMPLE_CLOCK, Form
+from fmus.model_description import Model, enumerations
+from fmus.papers import cited
 from fmus.sources import Package
+
+_FORMS = {
+    Form.FMI2: "FMI 2.0 for co-simulation",
+    Form.FMI3: "FMI 3.0 for co-simulation",
+    Form.FMI3_SCALAR: "FMI 3.0 for co-simulation, without arrays",
+}
+_GROUPS = (("Parameters", Causality.PARAMETER), ("Inputs", Causality.INPUT), ("Outputs", Causality.OUTPUT))
 
 
 @dataclass(frozen=True)
@@ -33,30 +48,68 @@ def page(model: Model, packages: list[Package]) -> bytes:
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
     )
-    d = model.description
+    environment.filters.update(seconds=seconds, prose=_prose)
+    shown = {v.variable.name: v.variable for v in model.layout.shown(model.form)}
     groups = [
-        (title, [_row(v) for v in variables])
-        for title, variables in (("Parameters", d.parameters), ("Inputs", d.inputs), ("Outputs", d.outputs))
+        (title, [_row(v, model.form) for v in shown.values() if v.causality is causality])
+        for title, causality in _GROUPS
     ]
-    return environment.get_template("unit.html").render(model=model, groups=groups, packages=packages).encode()
+    d = model.description
+    return (
+        environment.get_template("unit.html")
+        .render(
+            model=model,
+            form=_FORMS[model.form],
+            clock=SAMPLE_CLOCK if model.layout.has_clock(model.form) else "",
+            origin=d.module_doc.partition("\n\n")[0],
+            doc=parse(d.doc),
+            papers=cited("\n".join((d.module_doc, d.doc, *(v.description for v in d.variables)))),
+            groups=groups,
+            enumerations=[(e.__name__, _items(e)) for e in enumerations(d.variables)],
+            packages=packages,
+        )
+        .encode()
+    )
 
 
-def _row(v: Variable) -> Row:
+def seconds(time: Fraction) -> str:
+    """Return a time as a decimal number where that is exact, as in `0.016 s`, else as a fraction, as in `1/30 s`."""
+    decimal = repr(float(time))
+    return f"{decimal if Fraction(decimal) == time else time} s"
+
+
+def _prose(text: str) -> Markup:
+    """Return a docstring's text with what is between backquotes as code."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _row(v: Variable, form: Form) -> Row:
     return Row(
         name=v.name,
-        kind=v.raster.mime if v.raster else v.enumeration.__name__ if v.enumeration else v.type_name,
+        kind=_type(v, form),
         shape=" × ".join(map(str, v.shape)),
         unit=v.unit.symbol if v.kind is Kind.REAL else "",
-        start="" if v.causality.value == "output" or v.kind is Kind.BINARY else _start(v),
+        start="" if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else _start(v),
         range=_range(v),
         description=v.description,
     )
 
 
+def _type(v: Variable, form: Form) -> str:
+    """Return a type as the model description has it, of enumerations its name, of pictures their MIME type besides."""
+    if v.enumeration:
+        return v.enumeration.__name__
+    if form is Form.FMI2 or v.width is None:
+        return v.kind.value.capitalize() + (f", {v.raster.mime}" if v.raster else "")
+    return v.width.value
+
+
 def _start(v: Variable) -> str:
     if v.shape:
-        values = np.ravel(v.start)
-        return f"{values[0]:.6g} …" if values.size > 9 else ", ".join(f"{value:.6g}" for value in values)
+        rows = np.atleast_2d(v.start)
+        if rows.size > 9:
+            return f"{rows.flat[0]:.6g} …"
+        return "; ".join(", ".join(f"{value:.6g}" for value in row) for row in rows)
     return v.start.name if v.enumeration else f"{v.start:.6g}" if v.kind is Kind.REAL else str(v.start)
 
 
@@ -65,3 +118,7 @@ def _range(v: Variable) -> str:
         return ""
     low, high = ("" if bound is None else f"{bound:.6g}" for bound in (v.minimum, v.maximum))
     return f"{low or '−∞'} … {high or '∞'}"
+
+
+def _items(enumeration: Iterable[enum.IntEnum]) -> str:
+    return ", ".join(f"{int(item)} {item.name}" for item in enumeration)

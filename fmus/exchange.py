@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Causality, Variable
 from cosim.ports import Raster
+from cosim.variable import Causality, Variable
 from cosim.width import Width
 from fmus.buffers import Buffers, to_signed
 from fmus.layout import Buffer, Slot, capacity

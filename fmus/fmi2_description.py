@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cosim.block import Causality, Kind, Variable
+from cosim.variable import Causality, Kind, Variable
 from cosim.width import Width
 from fmus.layout import Form, HostVariable
 from fmus.model_description import (

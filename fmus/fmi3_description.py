@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from cosim.block import Causality, Kind, Variable
+from cosim.variable import Causality, Kind, Variable
 from fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
 from fmus.model_description import (
     GENERATOR,

@@ -10,7 +10,8 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cosim.block import Causality, Description, Kind, Variable
+from cosim.block_description import Description
+from cosim.variable import Causality, Kind, Variable
 from cosim.width import Width
 
 CLOCK = 2

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.block import Description, Kind, Variable
+from cosim.block_description import Description
 from cosim.units import Unit
+from cosim.variable import Kind, Variable
 from fmus.layout import Form, Layout
 
 GENERATOR = "handover-cosim"

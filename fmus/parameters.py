@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.block import Variable
 from cosim.start_values import fault_of
+from cosim.variable import Variable
 from cosim.width import Width
 from fmus.buffers import Buffers, to_unsigned
 from fmus.layout import Buffer, Slot

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.eventful_block import UnfitAdvance
 from fmus.buffers import Buffers, UnfitState, join, split
 from fmus.derivatives import derivative_reader

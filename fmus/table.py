@@ -5,7 +5,7 @@ A header, then the binary buffers, the variables by value reference, and their n
 
 import struct
 
-from cosim.block import Causality
+from cosim.variable import Causality
 from fmus.buffers import Buffers
 from fmus.layout import TIME, Buffer, Form, Type, type_of
 

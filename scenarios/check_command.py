@@ -12,16 +12,18 @@ from rich.text import Text
 from cosim.check.check_fmu import check_fmu
 from cosim.check.check_report import CheckReport, Section
 from cosim.check.finding import Finding, Level
+from scenarios.bad_call import BadCall
 from scenarios.console import open_console
 
-_FAULTS, _BAD_CALL = 1, 2
+_FAULTS = 1
 _MOST_FINDINGS = 20  # of one level in one section
 _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAULT: "bold red"}
 
 _HELP = """Tell what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
 
 The archive, its model description, by the standard's schema and rules, and its library for this machine are looked at;
-then the unit is loaded and run for ten steps in a process of its own, which may crash.
+then the unit is loaded and run for ten steps in a process of its own, which may crash. A unit of `handover build` reads
+its environment then, as in other tools: see there.
 
 \b
 Exit status
@@ -29,10 +31,6 @@ Exit status
   1  faults were found
   2  bad call: a FILE is not there or cannot be read
 """
-
-
-class _BadCall(click.ClickException):
-    exit_code = _BAD_CALL
 
 
 @click.command("check", help=_HELP)
@@ -70,7 +68,7 @@ def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
         except OSError as e:
             faults.append(f"{file}: {(e.strerror or str(e)).lower()}")
     if faults:
-        raise _BadCall("; ".join(faults))
+        raise BadCall("; ".join(faults))
 
 
 def _print_report(report: CheckReport) -> None:
@@ -85,6 +83,7 @@ def _print_section(section: Section) -> None:
     level = section.level.name.lower() if section.reached else "-"
     style = _STYLES[section.level] if section.reached else "dim"
     line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.told))
+    line.rstrip()
     open_console().print(line, soft_wrap=True)
     for wanted in sorted(Level, reverse=True):
         findings = [f for f in section.findings if f.level is wanted]
@@ -127,4 +126,8 @@ def _verdict(report: CheckReport) -> Text:
     told = f" ({', '.join(counted)})" if counted else ""
     if report.passed:
         return Text.assemble(("usable", "green"), f": no faults were found{told}")
+    if report.ran:
+        return Text.assemble(
+            ("against the standard", "bold red"), f": it runs here, but another tool may refuse it{told}"
+        )
     return Text.assemble(("not usable as it is", "bold red"), told)

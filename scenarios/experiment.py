@@ -7,9 +7,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from cosim.block import Causality, Variable, declared_variables
+from cosim.declared_fields import declared_variables
 from cosim.signals import Signals
 from cosim.system import System
+from cosim.variable import Causality, Variable
 from scenarios.record import Record
 
 FmuOf = Callable[[str], Path]

@@ -7,8 +7,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from cosim.block import Causality, Kind, Variable, describe
+from cosim.block_description import describe
 from cosim.start_values import range_of
+from cosim.variable import Causality, Kind, Variable
 from fmus.build import import_block
 from fmus.catalog import UNITS, Entry
 from scenarios.catalog import SCENARIOS, SYSTEMS

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind, Variable
 from cosim.exceptions import nearest
 from cosim.start_values import fault_of, range_of
+from cosim.variable import Kind, Variable
 from scenarios.experiment import Experiment
 
 

@@ -15,6 +15,7 @@ from cosim.exceptions import CosimError, UnitFailure
 from fmus.binaries import NotCompiled
 from fmus.build import cached
 from fmus.compile import CompilationError, UnknownPlatform
+from scenarios.bad_call import BadCall
 from scenarios.interruption import Interruption
 from scenarios.progress import progress_bar
 from scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
@@ -22,12 +23,6 @@ from scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, 
 _PATH = click.Path(path_type=Path)
 
 _ELBOW = click.Choice([e.name.lower() for e in Elbow], case_sensitive=False)
-
-
-class _BadCall(click.ClickException):
-    """A call that cannot be carried out, told in one line."""
-
-    exit_code = 2
 
 
 class _ArmFailed(click.ClickException):
@@ -85,22 +80,22 @@ def _built() -> Path:
     try:
         return cached("VslArm", 3)
     except OSError as e:
-        raise _BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+        raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
 
 
 def _check_file(out: Path) -> None:
     folder = out.absolute().parent
     longest = 240  # of the 255 bytes of a file's name; the unfinished file's name is longer
     if out.suffix not in (".json", ".py"):
-        raise _BadCall(f"--out {out}: a name that ends in .json, or in .py for the module form")
+        raise BadCall(f"--out {out}: a name that ends in .json, or in .py for the module form")
     if len(os.fsencode(out.name)) > longest:
-        raise _BadCall(f"--out {out}: the name is longer than {longest} bytes")
+        raise BadCall(f"--out {out}: the name is longer than {longest} bytes")
     if out.is_dir():
-        raise _BadCall(f"--out {out}: there is a folder of that name")
+        raise BadCall(f"--out {out}: there is a folder of that name")
     if not folder.is_dir():
-        raise _BadCall(f"--out {out}: there is no folder {folder}")
+        raise BadCall(f"--out {out}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise _BadCall(f"--out {out}: no permission to write to {folder}")
+        raise BadCall(f"--out {out}: no permission to write to {folder}")
 
 
 def _write(out: Path, text: str) -> None:
@@ -116,7 +111,7 @@ def _write(out: Path, text: str) -> None:
             Path(part).unlink(missing_ok=True)
             raise
     except OSError as e:
-        raise _BadCall(f"--out {out}: {e.strerror}") from e
+        raise BadCall(f"--out {out}: {e.strerror}") from e
 
 
 @contextmanager
@@ -128,6 +123,6 @@ def _told_in_one_line(interruption: Interruption) -> Generator[None, None, None]
         raise _ArmFailed(e.cause) from e
     except (CosimError, NotCompiled, NothingToLearn, UnknownPlatform) as e:
         interruption.check()
-        raise _BadCall(str(e)) from e
+        raise BadCall(str(e)) from e
     except CompilationError as e:
-        raise _BadCall(str(e).replace("\n", " ", 1)) from e
+        raise BadCall(str(e).replace("\n", " ", 1)) from e

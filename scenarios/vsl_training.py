@@ -15,9 +15,9 @@ from controllers.vsl_fit import Fit, fit_cubic
 from controllers.vsl_kinematics import Elbow, VslKinematics
 from controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, turned
 from controllers.vsl_model_text import model_text
-from cosim.block import Kind
 from cosim.fmu_description import FmuPort
 from cosim.ports import Floats
+from cosim.variable import Kind
 from scenarios.vsl_training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
 
 SPLIT = (0.70, 0.15, 0.15)

@@ -1,5 +1,6 @@
 """Checks one file: archive, description, interface, binaries, loading, and a short run."""
 
+import math
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,10 @@ from cosim.fmu_archive import FmuArchive
 from cosim.fmu_xml import XmlElement
 
 _STEP = 0.01  # seconds, where the FMU asks for none
+
+
+class _NotTried(Exception):
+    """A part of a check has nothing to go by; the message says where the reason is told."""
 
 
 def check_fmu(path: Path, timeout: float) -> CheckReport:
@@ -41,17 +46,19 @@ def check_fmu(path: Path, timeout: float) -> CheckReport:
 def _section(name: str, carry_out: Callable[[], tuple[str, list[Finding]]]) -> Section:
     try:
         told, findings = carry_out()
+    except _NotTried as e:
+        return Section(name, str(e), reached=False)
     except InvalidFmu as e:
         told, findings = "", [fault(e.fault)]
     return Section(name, told, tuple(findings))
 
 
 class _Check:
-    """One file's check; each part leaves what the next ones need, and says in `goes_on` whether they can."""
+    """One file's check; each part leaves what the next ones need, and says in `goes_on` whether they can follow."""
 
     def __init__(self, path: Path, timeout: float, scratch: Path) -> None:
         self.path, self.timeout, self.scratch = path, timeout, scratch
-        self.goes_on = False
+        self.goes_on = self.is_described = False
         self.parts = (
             ("archive", self._archive),
             ("description", self._description),
@@ -68,8 +75,8 @@ class _Check:
             warning("compressed in a way that the standards do not know", where=name, cure="use deflate")
             for name in self.archive.outdated_methods
         ]
-        size = self.path.stat().st_size
-        return f"{len(self.archive.names)} files in {size / 1000:.0f} kB", findings
+        size, n = self.path.stat().st_size, len(self.archive.names)
+        return f"{n} file{'s' if n != 1 else ''} in {math.ceil(size / 1000)} kB", findings
 
     def _description(self) -> tuple[str, list[Finding]]:
         self.root = checked_xml(self.archive)
@@ -77,8 +84,11 @@ class _Check:
         variables = variables_of(self.root, self.fmi)
         own = [*variable_findings(self.root, self.fmi, variables), *structure_findings(self.root, self.fmi, variables)]
         self.goes_on = True
-        told = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {len(variables)} variables"
-        return told, [*standard_findings(self.path, own), *own]
+        n = len(variables)
+        told = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"
+        findings = [*standard_findings(self.path, own), *own]
+        self.is_described = all(f.level is not Level.FAULT for f in findings)
+        return told, findings
 
     def _interface(self) -> tuple[str, list[Finding]]:
         findings = list(interface_findings(self.root, self.fmi))
@@ -88,7 +98,7 @@ class _Check:
         self.identifier = self.interface.get("modelIdentifier")
         step = default_step(self.root)
         told = f"co-simulation, {'steps of ' + f'{step:g} s' if step else 'no step size given'}"
-        return told if interface else "", findings
+        return told if interface else "no co-simulation", findings
 
     def _binaries(self) -> tuple[str, list[Finding]]:
         findings = list(binary_findings(self.archive, self.fmi, self.identifier))
@@ -107,8 +117,10 @@ class _Check:
     def _run(self) -> tuple[str, list[Finding]]:
         try:
             read_description(self.path)
-        except InvalidFmu:
-            return "", [fault("no run with this description", cure="its faults are told above")]
+        except InvalidFmu as e:
+            if not self.is_described:
+                raise _NotTried("not tried: its description cannot be used, see there") from e
+            return "", [fault(e.fault)]
         step = default_step(self.root) or _STEP
         capabilities = dict(_capabilities(self.interface, self.fmi))
         task = {

@@ -42,6 +42,11 @@ class CheckReport:
         """Whether there is no fault."""
         return self.count(Level.FAULT) == 0
 
+    @property
+    def ran(self) -> bool:
+        """Whether the unit ran without a fault; the run is the last section."""
+        return self.sections[-1].reached and self.sections[-1].level is not Level.FAULT
+
     def count(self, level: Level) -> int:
         """Return the number of findings of a level."""
         return sum(f.level is level for s in self.sections for f in s.findings)

@@ -65,5 +65,5 @@ def _missing_findings(missing: list[str], wanted: int) -> Iterator[Finding]:
         yield fault(what, cure='they must be exported under their plain names (extern "C", dllexport, no prefix)')
     elif missing:
         what = f"it lacks {len(missing)} of {wanted} functions: {', '.join(missing)}"
-        cure = "a host that looks them up does not load it or crashes; those without a use may answer with an error"
+        cure = "hosts that look them up refuse it or crash: the standard wants all, also those of what it cannot do"
         yield fault(what, cure=cure)

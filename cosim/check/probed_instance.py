@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind
 from cosim.check.journal import Journal
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.instance import Instance
 from cosim.signal_buffer import SignalBuffer
+from cosim.variable import Kind
 
 _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind
 from cosim.check.finding import Finding, fault, warning
 from cosim.check.journal import Journal
 from cosim.check.probed_instance import ProbedInstance
 from cosim.exceptions import InvalidFmu, UnitFailure
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.variable import Kind
 
 STEPS = 10
 _REPEATED = 5  # steps that are done again from a state

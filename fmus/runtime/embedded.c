@@ -95,7 +95,10 @@ static PyObject *run_loader(const Instance *instance, const char *function, cons
     text_add(&path, "%s/sources/fmus/loader.py", resources);
     char *source = platform_read_file(text_of(&path));
     PyObject *names = source ? loader_names(source) : NULL;
-    if (!source) refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+    if (!source)
+        refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+    else if (!names)
+        log_exception(instance, function);
     if (names && !py.PyDict_GetItemString(names, READY)) {
         PyObject *code = py.Py_CompileString(source, text_of(&path), FILE_INPUT);
         PyObject *done = code ? py.PyEval_EvalCode(code, names, names) : NULL;

@@ -178,11 +178,18 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                       sensitivity, n_unknowns);
 }
 
+/* What the standard wants for a status that there is not. */
+static fmi2Status discard(const Instance *instance, const char *function, const char *reason) {
+    if (!instance) return fmi2Error;
+    refuse(instance, function, "there is no such status: %s", reason);
+    return fmi2Discard;
+}
+
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
     BEGIN(STEPPING | TERMINATED | FAILED);
     if (!given(instance, __func__, value, "value")) return fmi2Error;
     if (kind != fmi2LastSuccessfulTime)
-        return (fmi2Status)refuse(instance, __func__, "only fmi2LastSuccessfulTime is a real status");
+        return discard(instance, __func__, "only fmi2LastSuccessfulTime is a real one");
     *value = instance->floats[0];
     return fmi2OK;
 }
@@ -190,10 +197,21 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
     BEGIN(STEPPING | TERMINATED | FAILED);
     if (!given(instance, __func__, value, "value")) return fmi2Error;
-    if (kind != fmi2Terminated)
-        return (fmi2Status)refuse(instance, __func__, "only fmi2Terminated is a boolean status");
+    if (kind != fmi2Terminated) return discard(instance, __func__, "only fmi2Terminated is a boolean one");
     *value = 0; /* a unit never asks for the end of the simulation */
     return fmi2OK;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
+    return discard(c, __func__, ASYNCHRONOUS);
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
+    return discard(c, __func__, ASYNCHRONOUS);
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
+    return discard(c, __func__, ASYNCHRONOUS);
 }
 
 #define UNSUPPORTED(reason, function, ...)                                     \
@@ -206,9 +224,6 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
     }
 
 UNSUPPORTED_BARE(ASYNCHRONOUS, fmi2CancelStep)
-UNSUPPORTED(ASYNCHRONOUS, fmi2GetStatus, const fmi2StatusKind k, fmi2Status *v)
-UNSUPPORTED(ASYNCHRONOUS, fmi2GetIntegerStatus, const fmi2StatusKind k, fmi2Integer *v)
-UNSUPPORTED(ASYNCHRONOUS, fmi2GetStringStatus, const fmi2StatusKind k, fmi2String *v)
 UNSUPPORTED(DERIVATIVES, fmi2SetRealInputDerivatives, const fmi2ValueReference vr[], size_t n,
             const fmi2Integer order[], const fmi2Real v[])
 UNSUPPORTED(DERIVATIVES, fmi2GetRealOutputDerivatives, const fmi2ValueReference vr[], size_t n,

@@ -24,8 +24,9 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance handle, fmi3Boolean on, size_t n, co
     return (fmi3Status)set_logging(handle, __func__, on, n, categories);
 }
 
-/* The standard wants this error. The reverse it puts on the host: to use event mode where there is a clock. A host that
- * does not is served nonetheless, the unit then ticks by itself. */
+/* The standard lets a host use event mode only where hasEventMode is true; that it is told at once, not by a unit which
+ * never has an event, is also the way of the standard's Reference FMUs. The reverse, to use event mode where there is a
+ * clock, the standard puts on the host, too. One that does not is served nonetheless, the unit then ticks by itself. */
 static bool may_use_event_mode(const Instance *instance, const char *function) {
     if (!instance->event_mode_used || has_clock(instance) || has_events(instance)) return true;
     refuse(instance, function, "eventModeUsed is true, but the unit has no event mode (hasEventMode is false)");

@@ -37,11 +37,12 @@ fmi3Status fmi3GetClock(fmi3Instance handle, REFERENCES, fmi3Clock values[]) {
 fmi3Status fmi3SetClock(fmi3Instance handle, REFERENCES, const fmi3Clock values[]) {
     Instance *instance = handle;
     if (!clocks(instance, __func__, EVENT, vr, n, values)) return fmi3Error;
+    const uint8_t *bytes = (const uint8_t *)values; /* a host's true may be any bit pattern */
     for (size_t i = 0; i < n; i++) {
-        if (!values[i] && instance->events.clock_active)
+        if (!bytes[i] && instance->events.clock_active)
             return (fmi3Status)refuse(instance, __func__,
                                       "the clock cannot be deactivated; fmi3UpdateDiscreteStates ends its tick");
-        if (values[i] && sampling_activate(instance, __func__) != STATUS_OK) return fmi3Error;
+        if (bytes[i] && sampling_activate(instance, __func__) != STATUS_OK) return fmi3Error;
     }
     return fmi3OK;
 }

@@ -66,7 +66,7 @@ Status instance_enter_initialisation(Instance *instance, const char *function) {
 
 Status instance_refresh_outputs(Instance *instance, const char *function) {
     if (!instance->outputs_stale) return STATUS_OK;
-    if (instance->events.clock_active) return sampling_evaluate(instance, function);
+    if (instance->events.clock_active && instance->mode == EVENT) return sampling_evaluate(instance, function);
     if (instance->mode != INITIALISATION) return STATUS_OK;
     if (!inputs_finite(instance, function)) return STATUS_ERROR;
     if (slave_call(instance, function, "initialise") != STATUS_OK) return STATUS_ERROR;

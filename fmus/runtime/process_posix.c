@@ -43,21 +43,19 @@ double process_clock(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Two ends of a channel that no process inherits by accident; -1 in both if there are none. */
-static void open_channel(int ends[2]) {
+/* Two ends of a channel that no process inherits by accident. */
+static bool open_channel(int ends[2]) {
 #ifdef SOCK_CLOEXEC
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0) return;
+    return socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0;
 #else
-    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0) {
-        int on = 1;
-        for (int i = 0; i < 2; i++) {
-            fcntl(ends[i], F_SETFD, FD_CLOEXEC);
-            setsockopt(ends[i], SOL_SOCKET, SO_NOSIGPIPE, &on, sizeof on);
-        }
-        return;
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) return false;
+    int on = 1;
+    for (int i = 0; i < 2; i++) {
+        fcntl(ends[i], F_SETFD, FD_CLOEXEC);
+        setsockopt(ends[i], SOL_SOCKET, SO_NOSIGPIPE, &on, sizeof on);
     }
+    return true;
 #endif
-    ends[0] = ends[1] = -1;
 }
 
 /* The process begins with no signal blocked and none ignored; in a group of its own, so that what it starts ends with
@@ -105,12 +103,15 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
     list[n++] = "3";
     list[n++] = "4";
     int ends[2];
-    open_channel(ends);
+    if (!open_channel(ends)) {
+        text_add(fault, "no channel to it: %s", strerror(errno));
+        return NULL;
+    }
     int channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 10), shared = fcntl((int)memory->file, F_DUPFD_CLOEXEC, 10);
     Process *process = calloc(1, sizeof *process);
     int why = channel < 0 || shared < 0 ? errno : process ? 0 : ENOMEM;
     if (!why) why = spawn(&process->id, interpreter, list, channel, shared);
-    if (ends[1] >= 0) close(ends[1]);
+    close(ends[1]);
     if (channel >= 0) close(channel);
     if (shared >= 0) close(shared);
     if (!why) {
@@ -118,7 +119,7 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
         process->host = getpid();
         return process;
     }
-    if (ends[0] >= 0) close(ends[0]);
+    close(ends[0]);
     free(process);
     text_add(fault, "%s", strerror(why));
     return NULL;

@@ -23,12 +23,17 @@ static void interpreter_clear(Interpreter *found) {
     *found = (Interpreter){0};
 }
 
-/* Reads lines such as `library = /usr/lib/libpython3.11.so`; changes `lines`. */
+/* Reads lines such as `library = /usr/lib/libpython3.11.so`; changes `lines`. Without strtok, whose place in the text
+ * all threads share: the host may start instances in several at once. */
 static Interpreter interpreter_of(char *lines) {
     Interpreter found = {0};
-    for (char *line = strtok(lines, "\r\n"); line; line = strtok(NULL, "\r\n")) {
+    for (char *line = lines; *line;) {
+        size_t length = strcspn(line, "\r\n");
+        char *rest = line + length + (line[length] != 0);
+        line[length] = 0;
         if (strncmp(line, "executable = ", 13) == 0 && !found.executable) found.executable = copy_of(line + 13);
         if (strncmp(line, "library = ", 10) == 0 && !found.library) found.library = copy_of(line + 10);
+        line = rest;
     }
     return found;
 }

@@ -53,7 +53,8 @@ static const Side remote_side;
 
 static Remote *side_of(const Instance *instance) { return instance->python; }
 
-/* A call on its way and back within `limit` seconds. `answer` is given; on TRANSFERRED its bytes are what the method returned, or why not. */
+/* A call on its way and back within `limit` seconds. `answer` is given; on TRANSFERRED its bytes are what the method
+ * returned, or why not. */
 static Transfer transfer(const Remote *side, const Question *question, double limit, Outcome *outcome,
                          Answer *answer) {
     double deadline = process_clock() + limit;
@@ -66,6 +67,7 @@ static Transfer transfer(const Remote *side, const Question *question, double li
     if (done == TRANSFERRED) done = process_send(side->process, question->bytes, question->size, deadline);
     if (done == TRANSFERRED) done = process_receive(side->process, &head, sizeof head, deadline);
     if (done != TRANSFERRED) return done;
+    if (head.outcome > RAISED || head.size >= SIZE_MAX) return ENDED; /* the block's code wrote into the channel */
     *outcome = (Outcome)head.outcome;
     *answer = (Answer){.bytes = malloc(head.size + 1), .size = head.size};
     if (!answer->bytes) return ENDED;
@@ -167,6 +169,7 @@ static bool revive(Instance *instance, const char *function) {
     Text fault = {0};
     if (side->process) process_end(side->process, 0.0, &fault); /* nobody has asked it since it ended */
     text_clear(&fault);
+    instance->mode = FAILED; /* whatever the mode was, that run is lost; whoever asked for the revival sets another */
     Start start = begin(instance, function, &fault);
     if (start == NO_PYTHON)
         refuse(instance, function, "%s does not start again: %s", side->interpreter, text_of(&fault));
@@ -206,7 +209,7 @@ static double read_seconds(const char *string) {
 static bool read_limit(const Instance *instance, const char *function, double *limit) {
     char *setting = platform_environment("FMU_PYTHON_TIMEOUT");
     *limit = !setting ? TIMEOUT : strcmp(setting, "inf") == 0 ? 0.0 : read_seconds(setting);
-    if (*limit < 0.0)
+    if (!(*limit >= 0.0)) /* not even a number, with hundreds of decimals */
         refuse(instance, function, "FMU_PYTHON_TIMEOUT is '%s'; it is a number of seconds such as 2.5, or 0: no limit",
                setting);
     free(setting);

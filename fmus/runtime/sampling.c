@@ -2,8 +2,8 @@
  *
  * Without event mode a step runs the ticks in [t, t + dt) by itself. With event mode the host activates the clock at each
  * tick, and steps only pass the time between. There are hosts that use event mode wherever it is offered, yet know no
- * clocks: when one leaves out the first tick, the unit ticks by itself, after a warning. Either way the block is stepped by its period with the inputs as they
- * are at the tick, and its outputs hold until the next one.
+ * clocks: when one leaves out the first tick, the unit ticks by itself, after a warning. Either way the block is stepped
+ * by its period with the inputs as they are at the tick, and its outputs hold until the next one.
  */
 #include <math.h>
 

@@ -117,7 +117,10 @@ Status slave_derivative(Instance *instance, const char *function, const double s
     Question question = {.method = "derivative", .bytes = (const char *)seed, .size = instance->n_inputs * sizeof *seed};
     Answer answer = {0};
     Status status = status_of(instance, instance->side->ask(instance, function, &question, &answer));
-    if (status == STATUS_OK) memcpy(sensitivity, answer.bytes, instance->n_outputs * sizeof *sensitivity);
+    size_t size = instance->n_outputs * sizeof *sensitivity;
+    if (status == STATUS_OK && answer.size != size)
+        status = refuse(instance, function, "%zu bytes of derivatives where there are to be %zu", answer.size, size);
+    if (status == STATUS_OK) memcpy(sensitivity, answer.bytes, size);
     free(answer.bytes);
     return status;
 }
@@ -132,8 +135,13 @@ Status slave_get_string(Instance *instance, const char *function, size_t index, 
         free(answer.bytes);
         return refuse(instance, function, "no memory for a string of %zu bytes", answer.size);
     }
-    free(*kept);
-    *value = *kept = answer.bytes;
+    if (*kept && strcmp(*kept, answer.bytes) == 0) { /* one call may ask for it twice and then has two pointers to it */
+        free(answer.bytes);
+    } else {
+        free(*kept);
+        *kept = answer.bytes;
+    }
+    *value = *kept;
     return STATUS_OK;
 }
 

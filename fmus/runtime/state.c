@@ -109,6 +109,10 @@ Status state_set(Instance *instance, const char *function, void *state) {
     SavedState **at = find(instance, function, state);
     if (!at) return STATUS_ERROR;
     const StateHeader *header = &(*at)->header;
+    if (header->mode == EVENT && !instance->event_mode_used)
+        return refuse(instance, function,
+                      "the state was saved in event mode, by an instance with eventModeUsed = fmi3True; this one was "
+                      "made without");
     if (slave_set_state(instance, function, (*at)->bytes, header->size) != STATUS_OK) return STATUS_ERROR;
     instance->mode = (Mode)header->mode;
     instance->has_outputs = header->has_outputs;

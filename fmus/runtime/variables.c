@@ -198,7 +198,8 @@ static void describe_bad(const Instance *instance, size_t at, Text *description)
     for (size_t i = 0; i < instance->n_variables; i++) {
         const Variable *v = &instance->variables[i];
         if (v->kind != FLOAT64 || at < v->offset || at >= (size_t)v->offset + v->count) continue;
-        text_add(description, "%s '%s' is %g", v->causality == OUTPUT ? "output" : "input", name_of(instance, v), instance->floats[at]);
+        const char *what = v->causality == OUTPUT ? "output" : "input";
+        text_add(description, "%s '%s' is %g", what, name_of(instance, v), instance->floats[at]);
         if (v->count > 1) text_add(description, " (entry %zu of %u)", at - v->offset + 1, v->count);
         return;
     }

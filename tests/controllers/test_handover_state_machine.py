@@ -19,7 +19,7 @@ from controllers.handover_state_machine import (
     Params,
     UnusableHandover,
 )
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 
 P = HandoverPhase

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.handover_vision import HandoverVision, Inputs, Outputs, Params
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.geometry import quaternion_of
 from cosim.pinhole import UnusableCalibration
 from cosim.ports import BLACK_1280X720, Floats

@@ -13,7 +13,7 @@ from controllers.flyer_behaviour import Behaviour
 from controllers.flyer_rotation import UnusableOrientation
 from controllers.flyer_stability import UnusableController
 from controllers.impedance_controller import ImpedanceController, Inputs, Outputs, Params
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.geometry import quaternion_of, rotation_of
 from cosim.ports import Floats
 

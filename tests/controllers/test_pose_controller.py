@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from controllers.flyer_profile import Bounds, profile_between
 from controllers.flyer_stability import UnusableController
 from controllers.pose_controller import Inputs, Outputs, Params, PoseController
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.geometry import rotation_of
 from cosim.ports import Floats
 from plants.free_flyer import FreeFlyer

@@ -10,7 +10,7 @@ import pytest
 
 from controllers.constant_curvature import forward_kinematics, tendon_lengths
 from controllers.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 
 W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])

@@ -1,5 +1,4 @@
 import sys
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
@@ -7,11 +6,10 @@ import pytest
 
 from fmus.build import build_block
 
-sys.path.insert(0, str(Path(__file__).parent))  # master_blocks, decay
+sys.path.insert(0, str(Path(__file__).parent))  # master_blocks, decay, fmu_of
 
 import decay
-
-FmuOf = Callable[..., Path]
+from fmu_of import FmuOf
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import decay
 import pytest
-from conftest import FmuOf
+from fmu_of import FmuOf
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -62,6 +62,11 @@ def test_a_sound_description_has_no_findings(tmp_path: Path):
         ('fmiVersion="2.0"', "", r"does not say its fmiVersion"),
         ("fmiModelDescription", "modelDescription", r"begins with <modelDescription>; <fmiModelDescription> is right"),
         (
+            '<InitialUnknowns><Unknown index="3"',
+            '<InitialUnknowns><Unknown index="2"',
+            r"ModelStructure/InitialUnknowns lacks y and should not have u",
+        ),
+        (
             'name="x" valueReference="0" causality="local"',
             'name="x" valueReference="1" causality="input"',
             r"can be set and shares the value reference 1 with 'x'",
@@ -116,6 +121,7 @@ def edited_copy(fmu: Path, file: Path, old: str, new: str) -> Path:
     ("old", "new", "wanted"),
     [
         ('fmiVersion="3.0"', 'fmiVersion="3.0-beta.2"', None),
+        ('causality="independent"', 'causality="local"', r'independent variable must be defined; one Float64 with'),
         ('<Dimension start="2" />', '<Dimension valueReference="999" />', r"dimension has the value reference 999"),
         ('name="pair_back" valueReference="', 'name="pair_back" valueReference="9', r"9\d* leads to no|not list"),
         ('<Item name="GREEN" value="2"', '<Item name="GREEN" value="1"', r"type '\w+' \(line \d+\) has a value twice"),

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from cosim.fmpy_edge import load_fmi2, load_fmi3, unpack
+from cosim.fmpy_edge import unpack
+from cosim.fmpy_loading import load_fmi2, load_fmi3
 from cosim.fmu_description import describe_fmu
 
 

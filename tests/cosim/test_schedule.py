@@ -3,11 +3,11 @@ from pathlib import Path
 
 import pytest
 
-from cosim.block import Causality, Kind
 from cosim.exceptions import ScheduleError
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.schedule import Schedule
 from cosim.system import PlacedUnit, PortName, System
+from cosim.variable import Causality, Kind
 
 
 def description(feedthrough: bool, presumed: bool, sampled: bool) -> FmuDescription:

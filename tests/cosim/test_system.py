@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from cosim.block import Causality, Kind, Variable
 from cosim.exceptions import InvalidFmu, WiringError
 from cosim.fmu_description import FmuPort
 from cosim.start_values import numbers_of
 from cosim.system import System, mismatch, proposed_step
 from cosim.units import UNKNOWN, BaseExponents, Unit
+from cosim.variable import Causality, Kind, Variable
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Description, Kind, Variable
+from cosim.block_description import Description
+from cosim.variable import Kind, Variable
 from fmus.layout import element_names
 from plants.stereo_camera import Inputs, Params, StereoCamera
 

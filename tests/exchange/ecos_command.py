@@ -19,7 +19,7 @@ from drive import STEPS, inputs, parameters, scalars
 from notary import ENTRIES
 from reference import description, variables
 
-from cosim.block import Kind
+from cosim.variable import Kind
 from fmus.catalog import UNITS
 from fmus.layout import element_names
 

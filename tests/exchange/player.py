@@ -6,7 +6,7 @@ from typing import Any
 
 from drive import inputs
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import output
 from fmus.catalog import UNITS
 

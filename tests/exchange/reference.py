@@ -10,12 +10,13 @@ import drive
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Description, Kind, Variable, describe
+from cosim.block_description import Description, describe
 from cosim.fmu_description import describe_fmu
 from cosim.master import Master
 from cosim.schedule import Algorithm
 from cosim.signals import Signals
 from cosim.system import PortName, System
+from cosim.variable import Kind, Variable
 from fmus.build import build_block, cached, import_block
 from fmus.catalog import UNITS
 

@@ -12,7 +12,7 @@ import pytest
 from drive import STEPS, inputs, parameters
 from reference import FMI2_UNITS, Record, References, description, expect_same, variables
 
-from cosim.block import Kind, Variable
+from cosim.variable import Kind, Variable
 from fmus import interpreter
 from fmus.binaries import FMI2_FOLDERS
 from fmus.build import cached

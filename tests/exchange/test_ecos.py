@@ -8,7 +8,7 @@ import pytest
 from ecos_command import Ecos
 from reference import FMI2_UNITS, References, expect_same, variables
 
-from cosim.block import Kind
+from cosim.variable import Kind
 from fmus import interpreter
 from fmus.build import build_block, cached
 

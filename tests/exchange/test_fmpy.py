@@ -10,7 +10,7 @@ import pytest
 from drive import STEPS, inputs, parameters, scalars
 from reference import FMI2_UNITS, Record, References, description, expect_same, variables
 
-from cosim.block import Kind, Variable
+from cosim.variable import Kind, Variable
 from fmus.build import cached
 from fmus.catalog import UNITS
 from fmus.layout import element_names

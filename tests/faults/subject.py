@@ -133,12 +133,12 @@ class Subject:
         if not any(len(line.partition(name)[2]) > 5 for line in self.log):
             raise Fault(f"{function} is answered with an error and no log line: {self.log}")
 
-    def expect_refusal(self, function: str, *arguments: Any) -> None:
-        """Call a function that must be answered with an error and a log line that names it."""
+    def expect_refusal(self, function: str, *arguments: Any, status: int = ERROR) -> None:
+        """Call a function that must be answered with that status, an error, and a log line that names it."""
         del self.log[:]
-        status = self.call(function, *arguments)
-        if status != ERROR:
-            raise Fault(f"{function}({shown(arguments)}) in {self.mode} is answered with {status}, not with an error")
+        answer = self.call(function, *arguments)
+        if answer != status:
+            raise Fault(f"{function}({shown(arguments)}) in {self.mode} is answered with {answer}, not with {status}")
         self.expect_log_line(function)
 
     def set(self, variables: Sequence[Variable], values: Sequence[Sequence[Any]]) -> int:

@@ -106,7 +106,7 @@ class Crew:
             for fault in result["faults"]:
                 calls = "\n    ".join(fault["calls"])
                 told.append(f"{line}; sequence {fault['sequence']}: {fault['fault']}\n    {calls}")
-            enough = job.kind == "illegal" or result.get("refused", 0) < 0.02 * result["calls"]
+            enough = job.kind == "illegal" or result.get("refused", 0) <= 0.02 * result["calls"]
             if not enough:
                 told.append(f"{line}: {result['refused']} legal calls were refused")
         assert not told, "\n".join(told)

@@ -12,7 +12,7 @@ from typing import Any
 from fmus.binaries import FMI2_FOLDERS
 from fmus.compile import host_platform, library
 
-OK, ERROR = 0, 3
+OK, DISCARD, ERROR = 0, 2, 3
 
 DOUBLE, SIZE, BOOL = ctypes.c_double, ctypes.c_size_t, ctypes.c_bool
 Log2 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.block import Kind
-from cosim.fmpy_edge import load_fmi2, load_fmi3, unpack
+from cosim.fmpy_edge import unpack
+from cosim.fmpy_loading import load_fmi2, load_fmi3
 from cosim.fmu_description import FmuPort, describe_fmu
+from cosim.variable import Kind
 
 Digests = dict[str, str]
 """A digest of every output's bytes, by name."""

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from fmpy_host import Digests, FmpyHost
 
-from cosim.block import Kind
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.variable import Kind
 from plants.stereo_camera import Inputs, Outputs, Params, StereoCamera
 
 STEPS = 12

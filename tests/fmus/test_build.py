@@ -6,69 +6,12 @@ from typing import cast
 
 import pytest
 from workshop import Workshop
+from written_blocks import write_block
 
 from fmus.build import UnknownVersion, UnusableName, build_block, cached
 from fmus.catalog import UNITS, Entry, UnknownUnit, find_unit
 from fmus.sources import UnknownBlock, closure
 from fmus.universal import universal
-
-BLOCK = """
-from collections.abc import Mapping
-from dataclasses import dataclass
-from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
-
-from cosim.ports import output, parameter
-from cosim.units import Number
-
-if TYPE_CHECKING:
-    import cv2
-
-
-@dataclass(frozen=True, kw_only=True)
-class Params:
-    pass
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    pass
-
-
-@dataclass(kw_only=True)
-class Outputs:
-    y: Number = output("answer")
-
-
-class Small:
-    "Answers."
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
-
-    def __init__(self, params: Params) -> None: ...
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        from {helper} import answer
-
-        return Outputs(y=answer())
-
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None: ...
-"""
-
-
-def write_block(folder: Path, name: str, answer: str, helper: str = "shared_helper") -> str:
-    """Write a block and a module that it imports; return the block's path."""
-    folder.mkdir(exist_ok=True)
-    (folder / f"{name}.py").write_text(BLOCK.replace("{helper}", helper))
-    (folder / f"{helper}.py").write_text(f"def answer():\n    return {answer}\n")
-    return f"{name}:Small"
 
 
 def test_the_catalog_knows_its_units_without_loading_them():
@@ -107,7 +50,7 @@ def test_an_fmu_carries_its_sources_and_lists_its_packages(workshop: Workshop):
         names = set(archive.namelist())
         unit = json.loads(archive.read("resources/unit.json"))
         page = archive.read("documentation/index.html").decode()
-    assert {"resources/sources/sample_units/every_kind.py", "resources/sources/cosim/block.py"} <= names
+    assert {"resources/sources/sample_units/every_kind.py", "resources/sources/cosim/block_description.py"} <= names
     assert not any("build" in name or "catalog" in name for name in names)
     assert [p["module"] for p in unit["packages"]] == ["numpy", "typing_extensions"]
     assert all(p["version"] for p in unit["packages"])

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 
 import pytest
-from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
+from ctypes_host import DISCARD, DOUBLE, ERROR, OK, SIZE, CtypesHost
 from workshop import Workshop
 
 BLOCK = "every_kind:EveryKind"
@@ -179,3 +179,24 @@ def test_event_mode_is_refused_to_a_unit_that_has_none(workshop: Workshop):
     host.free()
     assert not host.instantiate(event_mode=True)
     assert "the unit has no event mode (hasEventMode is false)" in host.log[-1]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_string_that_one_call_asks_for_twice_is_the_same_string(workshop: Workshop, fmi: int):
+    host = workshop.host(BLOCK, fmi)
+    references = (ctypes.c_uint32 * 2)(*[host.references["word"]] * 2)
+    pointers = (ctypes.c_void_p * 2)()
+    assert host.call("GetString", references, SIZE(2), pointers, *[SIZE(2)] * (fmi == 3)) == OK
+    assert pointers[0] == pointers[1]
+    assert ctypes.string_at(pointers[0]) == b"hello"
+
+
+def test_a_status_that_there_is_not_is_discarded(workshop: Workshop):
+    host = workshop.host(BLOCK, 2)
+    assert host.initialise() == OK
+    time, kinds = DOUBLE(), {"LastSuccessfulTime": 2, "Terminated": 3}
+    assert host.call("GetRealStatus", kinds["LastSuccessfulTime"], ctypes.byref(time)) == OK
+    assert host.call("GetRealStatus", kinds["Terminated"], ctypes.byref(time)) == DISCARD
+    for name in ("Status", "IntegerStatus", "StringStatus"):
+        assert host.call(f"Get{name}", 0, ctypes.byref(time)) == DISCARD
+        assert f"fmi2Get{name}: there is no such status" in host.log[-1]

@@ -14,8 +14,9 @@ from saved_states import deserialise, save, serialised
 from state_runs import varied
 from workshop import Workshop
 
-from cosim.block import Kind, describe
+from cosim.block_description import describe
 from cosim.fmu_description import describe_fmu
+from cosim.variable import Kind
 from fmus.build import cached, import_block
 from fmus.catalog import UNITS
 from fmus.layout import DuplicateName, Layout
@@ -280,6 +281,22 @@ def test_a_state_saved_while_the_clock_is_active_continues_there(workshop: Works
         assert h.call("EnterStepMode") == OK
         assert (h.get("y"), h.get("ticks"), h.get("t_seen")) == ([0.6], [2.0], [P])
         assert h.step(P, P) == OK
+
+
+def test_a_state_saved_in_event_mode_is_refused_to_an_instance_that_does_not_use_it(workshop: Workshop):
+    host, other = started(workshop), workshop.host(SAMPLED, 3)
+    status, state = deserialise(other, serialised(host, save(host)))
+    assert status == OK
+    assert other.call("SetFMUState", state) == ERROR
+    assert "saved in event mode" in other.log[-1]
+    assert other.initialise() == OK
+
+
+def test_what_is_read_after_the_end_makes_no_tick(workshop: Workshop):
+    host = started(workshop)
+    assert host.set_clock() == OK
+    assert host.call("Terminate") == OK
+    assert (host.get("y"), host.get("ticks")) == ([0.0], [0.0])
 
 
 def test_reset_returns_to_the_start_with_the_clock_at_rest(workshop: Workshop):

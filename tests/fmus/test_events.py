@@ -15,7 +15,8 @@ from sample_units.scalars import Scalars
 from saved_states import deserialise, save, serialised
 from workshop import Workshop
 
-from cosim.block import DeclarationError, describe
+from cosim.block_description import describe
+from cosim.declared_fields import DeclarationError
 from cosim.eventful_block import EndlessEvents, UnfitAdvance, step_through_events
 
 BALL = "bouncing_ball:BouncingBall"

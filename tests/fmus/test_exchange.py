@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sample_units import every_kind, eye
 
-from cosim.block import describe
+from cosim.block_description import describe
 from fmus.buffers import Buffers
 from fmus.exchange import UnfitOutput, output_writer
 from fmus.layout import Layout

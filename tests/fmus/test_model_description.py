@@ -15,7 +15,7 @@ from fmpy.validation import validate_fmu
 from sample_units import declarations
 from workshop import Workshop
 
-from cosim.block import Description, describe
+from cosim.block_description import Description, describe
 from cosim.fmu_description import describe_fmu
 from cosim.ports import parameter
 from cosim.units import Number

@@ -74,18 +74,34 @@ def test_windows_asks_the_interpreter_on_the_path(tmp_path: Path, wine: dict[str
     assert f"python on the PATH: {script}.dll: LoadLibrary failed with code" in output
 
 
-@pytest.mark.skipif(
+aarch64 = pytest.mark.skipif(
     not (QEMU and AARCH64_LIBRARIES.is_dir()),
     reason="qemu-user and AArch64's C library are not installed",
 )
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_linux_on_aarch64(fmi: int, tmp_path: Path):
-    unit = unpack(ENTRY, fmi, "aarch64-linux", tmp_path)
-    host = compiled_host(fmi, "aarch64-linux", tmp_path)
+
+
+def on_aarch64(fmi: int, folder: Path, environment: Mapping[str, str]) -> str:
+    """Return what the host prints; a process that it starts is of this machine's own kind."""
+    unit = unpack(ENTRY, fmi, "aarch64-linux", folder)
+    host = compiled_host(fmi, "aarch64-linux", folder)
     resources = unit.folder / "resources"
     place = resources.as_uri() if fmi == 2 else f"{resources}/"
     emulator = [str(QEMU), "-L", str(AARCH64_LIBRARIES)]
-    output = run([*emulator, host, unit.library, unit.token, place], {"PATH": "/nonexistent"}, tmp_path)
+    return run([*emulator, host, unit.library, unit.token, place], {"PATH": "/nonexistent", **environment}, folder)
+
+
+@aarch64
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_linux_on_aarch64(fmi: int, tmp_path: Path):
+    output = on_aarch64(fmi, tmp_path, {"FMU_PYTHON_PROCESS": "0"})
     expect_clear_answers(output, fmi)
     assert "resources/python.txt: cannot be read" not in output
     assert "python3 on the PATH: cannot be read" in output
+
+
+@aarch64
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_linux_on_aarch64_starts_a_process_for_python(fmi: int, tmp_path: Path):
+    output = on_aarch64(fmi, tmp_path, {})
+    assert output.count("instance: made") == 2
+    assert output.rstrip().endswith("closed: 0")

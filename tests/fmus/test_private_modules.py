@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from ctypes_host import OK, CtypesHost
-from test_build import write_block
 from workshop import Workshop
+from written_blocks import write_block
 
 from fmus import loader
 from fmus.build import build_block

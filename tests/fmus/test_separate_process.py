@@ -9,15 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from binary_values import SIZE_OF_PICTURE, put, take
 from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
 from sample_units.trouble import Deed
-from test_pictures import SIZE_OF_PICTURE, put, take
-from test_states import DT, called, deserialise, save, serialised
+from saved_states import called, deserialise, save, serialised
 from workshop import Workshop
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="looks after processes as POSIX has them")
 
 TROUBLE = "trouble:Trouble"
+DT = 1 / 64
 
 
 @pytest.fixture(autouse=True)
@@ -176,6 +177,15 @@ def test_a_saved_state_revives_an_instance_whose_process_was_killed(workshop: Wo
     assert not processes & children()
 
 
+def test_a_state_that_does_not_fit_leaves_a_revived_instance_failed(workshop: Workshop):
+    host, other = running(workshop), workshop.host("every_kind:EveryKind", 3)
+    status, foreign = deserialise(host, serialised(other, save(other)))
+    assert status == OK
+    kill(host)
+    assert host.call("SetFMUState", foreign) == ERROR
+    expect_revival(host)
+
+
 def test_an_exception_is_an_error_with_the_traceback_of_the_block_alone(workshop: Workshop):
     host = workshop.host("every_kind:EveryKind", 3)
     assert host.initialise() == OK
@@ -220,7 +230,7 @@ def test_a_process_that_ends_while_the_block_is_made_is_an_error(workshop: Works
 
 
 @pytest.mark.parametrize("name", ["FMU_PYTHON_PROCESS", "FMU_PYTHON_TIMEOUT"])
-@pytest.mark.parametrize("value", ["yes", "-1", "1.2.3"])
+@pytest.mark.parametrize("value", ["yes", "-1", "1.2.3", f"0.{'3' * 400}"])
 def test_a_setting_that_makes_no_sense_is_refused(
     workshop: Workshop, monkeypatch: pytest.MonkeyPatch, name: str, value: str
 ):

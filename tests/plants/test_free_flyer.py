@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 from plants.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
 from plants.rigid_body import TurnsTooFast

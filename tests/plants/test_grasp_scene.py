@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 from plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
 from plants.grasp_objects import SOLIDS, Thing

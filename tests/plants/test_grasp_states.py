@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.block import describe
+from cosim.block_description import describe
 from plants.grasp_objects import Thing
 from plants.grasp_parameters import Params
 from plants.grasp_scene import GraspScene, Inputs, Outputs

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 from plants.hand_and_object import (
     Activity,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 from plants.handover_partner import HandoverPartner, Holder, Inputs, Outputs, Params, UnusablePartner
 from plants.tendon_arm import Inputs as ArmInputs

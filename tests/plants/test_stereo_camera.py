@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.pinhole import Pinhole, UnusableCalibration
 from plants.sketch import Pixels
 from plants.stereo_camera import BadCover, Inputs, Params, StereoCamera

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.geometry import rotation_of
 from cosim.ports import Floats
 from plants.exudyn_edge import SolverFailure

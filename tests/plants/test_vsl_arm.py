@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.block import describe
+from cosim.block_description import describe
 from cosim.ports import Floats
 from plants.vsl_arm import Inputs as ArmInputs
 from plants.vsl_arm import Outputs as ArmOutputs

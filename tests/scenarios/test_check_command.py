@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -64,6 +65,28 @@ def test_a_fault_is_told_with_status_1(broken: Path):
     )
     assert "  -        description  not reached: see archive" in lines
     assert lines[-1] == "not usable as it is (1 fault)"
+
+
+def test_a_unit_that_runs_against_the_standard_is_told_as_that(tmp_path: Path):
+    file = tmp_path / "x.fmu"
+    with zipfile.ZipFile(cached("Push", 2)) as source, zipfile.ZipFile(file, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, re.sub(rb"<InitialUnknowns>.*</InitialUnknowns>", b"", source.read(name), flags=re.S))
+    result = check(file)
+    assert result.exit_code == 1
+    assert "ModelStructure/InitialUnknowns lacks" in result.output
+    assert "against the standard: it runs here" in result.output.splitlines()[-1]
+
+
+def test_what_cannot_be_tried_says_where_the_reason_is(tmp_path: Path):
+    file = tmp_path / "x.fmu"
+    with zipfile.ZipFile(cached("Push", 3)) as source, zipfile.ZipFile(file, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name).replace(b'causality="independent"', b'causality="local"'))
+    result = check(file)
+    assert result.exit_code == 1
+    assert "  -        run          not tried: its description cannot be used, see there" in result.output.splitlines()
+    assert result.output.splitlines()[-1].startswith("not usable as it is (1 fault")
 
 
 def test_the_worst_of_several_files_decides(broken: Path):

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from controllers.handover_state_machine import HandoverPhase as Phase
-from cosim.block import Causality, Kind
 from cosim.fmu_description import FmuPort
 from cosim.signals import Signals
+from cosim.variable import Causality, Kind
 from plants.hand_and_object import Holder
 from scenarios.free_flyer.handover_parameters import Parameters
 from scenarios.free_flyer.handover_watch import HandoverWatch

@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from controllers.ir_reflex import Phase, Stop
-from cosim.block import Causality, Kind
 from cosim.fmu_description import FmuPort
 from cosim.signals import Signals
+from cosim.variable import Causality, Kind
 from scenarios.ir_grasp.parameters import Parameters
 from scenarios.ir_grasp.watch import GraspWatch
 

@@ -14,8 +14,9 @@ from controllers.hybrid_kinematics import Params as KinematicsParams
 from controllers.trajectory_planner import Elbow
 from controllers.trajectory_planner import Params as PlannerParams
 from controllers.vsl_path import Path, QuarterArc, segments_of
-from cosim.block import Causality, declared_variables
+from cosim.declared_fields import declared_variables
 from cosim.ports import Floats
+from cosim.variable import Causality
 from plants.vsl_parameters import Params as ArmParams
 from scenarios import vsl_training_data
 from scenarios.vsl.parameters import HybridParameters, Parameters

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cosim.block import Causality, Kind
 from cosim.fmu_description import FmuPort
 from cosim.signals import Signals
+from cosim.variable import Causality, Kind
 from scenarios.vsl.parameters import HybridParameters, Parameters
 from scenarios.vsl.path_point import distance_to_path
 from scenarios.vsl.watch import PathWatch

@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from controllers.visual_servo import Phase
-from cosim.block import Causality, Kind
 from cosim.fmu_description import FmuPort
 from cosim.signals import Signals
+from cosim.variable import Causality, Kind
 from plants.handover_partner import Holder
 from scenarios.helix_handover.parameters import Parameters
 from scenarios.helix_handover.watch import HandoverWatch

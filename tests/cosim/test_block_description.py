@@ -8,9 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from cosim.block import Causality, DeclarationError, Kind, Variable, declared_variables, describe
+from cosim.block_description import describe
+from cosim.declared_fields import DeclarationError, declared_variables
 from cosim.ports import BLACK_1280X720, Int8, Picture1280x720, Single, UInt64, Vector3, output, parameter, port
 from cosim.units import Metre, Newton
+from cosim.variable import Causality, Kind, Variable
 from cosim.width import Width
 
 

@@ -1,0 +1,117 @@
+"""What a block class declares: everything that is told of its variables elsewhere comes from here."""
+
+import dataclasses
+import functools
+import inspect
+import sys
+import typing
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from cosim.declared_fields import DeclarationError, declared_variables
+from cosim.variable import Causality, Variable
+
+_EVENT_METHODS = ("advance", "handle_event", "next_event")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Description:
+    """What a block class declares.
+
+    Attributes:
+        name: the class's name.
+        doc, module_doc: docstrings of the class and of its module; empty where there is none.
+        params_type, inputs_type, outputs_type: the dataclasses of declared fields.
+        parameters, inputs, outputs: their fields, in the order of their declaration.
+        feedthrough: by output, the inputs that act on it at once.
+        period: of a sampled block, in seconds.
+        has_events: whether it is an `EventfulBlock`.
+        has_derivatives: whether it is a `DifferentiableBlock`.
+    """
+
+    name: str
+    doc: str
+    module_doc: str
+    params_type: type[Any]
+    inputs_type: type[Any]
+    outputs_type: type[Any]
+    parameters: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    feedthrough: Mapping[str, tuple[str, ...]]
+    period: Fraction | None
+    has_events: bool
+    has_derivatives: bool
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Parameters, inputs and outputs, in the order of their declaration."""
+        return self.parameters + self.inputs + self.outputs
+
+
+@functools.cache
+def describe(block: type[Any]) -> Description:
+    """Read a block class's declarations.
+
+    Raises:
+        DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
+            declaration, or a type that is no port's, or a start value or bound that its type cannot hold; the
+            period is not positive.
+    """
+    for name in ("feedthrough", "period", "step"):
+        if not hasattr(block, name):
+            raise DeclarationError(block.__name__, name, "a block has this attribute; see cosim.block.Block")
+    if block.period is not None and block.period <= 0:
+        raise DeclarationError(block.__name__, "period", f"{block.period} s is not positive")
+    params_type = _annotation(block, "__init__", "params")
+    inputs_type = _annotation(block, "step", "u")
+    outputs_type = _annotation(block, "step", "return")
+    inputs = declared_variables(inputs_type, Causality.INPUT)
+    outputs = declared_variables(outputs_type, Causality.OUTPUT)
+    feedthrough: Mapping[str, tuple[str, ...]] = block.feedthrough
+    for y, us in feedthrough.items():
+        for name, known in [(y, outputs)] + [(u, inputs) for u in us]:
+            if name not in [v.name for v in known]:
+                raise DeclarationError(block.__name__, "feedthrough", f"no such port: {name!r}")
+    return Description(
+        name=block.__name__,
+        doc=inspect.getdoc(block) or "",
+        module_doc=_module_doc(block),
+        params_type=params_type,
+        inputs_type=inputs_type,
+        outputs_type=outputs_type,
+        parameters=declared_variables(params_type, Causality.PARAMETER),
+        inputs=inputs,
+        outputs=outputs,
+        feedthrough=feedthrough,
+        period=block.period,
+        has_events=_has_events(block),
+        has_derivatives=hasattr(block, "directional_derivative"),
+    )
+
+
+def _module_doc(block: type[Any]) -> str:
+    module = sys.modules.get(block.__module__)
+    return inspect.cleandoc(module.__doc__ or "") if module else ""
+
+
+def _has_events(block: type[Any]) -> bool:
+    present = [name for name in _EVENT_METHODS if hasattr(block, name)]
+    for name in _EVENT_METHODS:
+        if present and name not in present:
+            fault = f"a block that has {present[0]} has this method too; see cosim.eventful_block.EventfulBlock"
+            raise DeclarationError(block.__name__, name, fault)
+    if present and block.period is not None:
+        raise DeclarationError(block.__name__, "period", "a block with events is not sampled: its period is None")
+    return bool(present)
+
+
+def _annotation(block: type[Any], method: str, name: str) -> type[Any]:
+    hints = typing.get_type_hints(getattr(block, method))
+    found = hints.get(name)
+    if found is None or not dataclasses.is_dataclass(found):
+        raise DeclarationError(
+            block.__name__, method, f"{name!r} must be annotated with a dataclass of declared fields"
+        )
+    return typing.cast("type[Any]", found)

@@ -1,0 +1,68 @@
+"""What is told of a parameter, input or output: name, kind, unit, shape, width, start, range."""
+
+import dataclasses
+import enum
+import math
+from typing import Any
+
+from cosim.ports import Raster
+from cosim.units import ONE, Unit
+from cosim.width import Width
+
+
+class Kind(enum.Enum):
+    """Kind of a variable."""
+
+    REAL = "real"
+    INTEGER = "integer"
+    BOOLEAN = "boolean"
+    ENUMERATION = "enumeration"
+    STRING = "string"
+    BINARY = "binary"
+
+
+class Causality(enum.Enum):
+    """Role of a variable."""
+
+    PARAMETER = "parameter"
+    INPUT = "input"
+    OUTPUT = "output"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Declared:
+    """What is known of a parameter, input or output, be it a block's or an FMU's.
+
+    `items` are an enumeration's; reals and integers have a `width`.
+    """
+
+    name: str
+    kind: Kind
+    causality: Causality
+    description: str = ""
+    shape: tuple[int, ...] = ()
+    unit: Unit = ONE
+    minimum: float | None = None
+    maximum: float | None = None
+    items: tuple[tuple[str, int], ...] = ()
+    width: Width | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of entries; 1 for a scalar."""
+        return math.prod(self.shape)
+
+    @property
+    def type_name(self) -> str:
+        """Kind, with the width of numbers where it is not the usual one, as in `integer (Int16)`."""
+        usual = self.width in (None, Width.FLOAT64, Width.INT64)
+        return self.kind.value if usual or self.width is None else f"{self.kind.value} ({self.width.value})"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Variable(Declared):
+    """All that a block says of one of its parameters, inputs or outputs."""
+
+    start: Any
+    enumeration: type[enum.IntEnum] | None = None
+    raster: Raster | None = None

@@ -1,0 +1,29 @@
+"""Calls of a command that cannot be carried out."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+import click
+
+from cosim.exceptions import CosimError
+from fmus.binaries import NotCompiled
+from fmus.compile import CompilationError, UnknownPlatform
+from scenarios.parameters import BadParameter
+from scenarios.run_folder import BadRunFolder
+
+
+class BadCall(click.ClickException):
+    """A call that cannot be carried out, told in one line."""
+
+    exit_code = 2
+
+
+@contextmanager
+def told_in_one_line() -> Generator[None, None, None]:
+    """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback."""
+    try:
+        yield
+    except (CosimError, BadParameter, BadRunFolder, NotCompiled, UnknownPlatform) as e:
+        raise BadCall(str(e)) from e
+    except CompilationError as e:
+        raise BadCall(str(e).replace("\n", " ", 1)) from e
