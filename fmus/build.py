@@ -124,9 +124,7 @@ def build(
     carried = closure(entry.block)
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise UnusableName(entry.name)
-    step: object = entry.step  # of whatever type the caller gave
-    if not isinstance(step, Rational) or step <= 0:
-        raise UnusableStep(step)
+    _check_step(entry.step)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     packages = carried.packages()
     describe_in_xml = fmi2_description if fmi == 2 else fmi3_description
@@ -149,6 +147,11 @@ def build(
         **binaries(entry.name, fmi, platforms),
     }
     return write_archive(out_dir / file_name(entry.name, form), files)
+
+
+def _check_step(step: object) -> None:
+    if not isinstance(step, Rational) or step <= 0:
+        raise UnusableStep(step)
 
 
 def file_name(name: str, form: Form) -> str:
