@@ -47,6 +47,7 @@ def universal() -> bytes:
         (mach(), 9096),
         (universal(), 17084),
     ],
+    ids=["elf", "elf of high bytes first", "elf of 32 bits", "pe", "mach-o", "universal"],
 )
 def test_a_library_is_as_long_as_its_headers_say(head: bytes, size: int):
     assert shortage(head, size) == ""
