@@ -27,6 +27,10 @@ bool slave_take_table(Instance *instance, const char *bytes, size_t size, uint64
     instance->n_inputs = header.inputs;
     instance->first_output = header.first_output;
     instance->n_outputs = header.outputs;
+    instance->gives_singles = false;
+    for (size_t i = 0; i < instance->n_variables; i++)
+        if (instance->variables[i].causality == OUTPUT && instance->variables[i].type == TYPE_FLOAT32)
+            instance->gives_singles = true;
     instance->abilities = header.abilities;
     instance->period_counter = header.period_counter;
     instance->period_resolution = header.period_resolution;
