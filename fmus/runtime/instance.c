@@ -109,8 +109,9 @@ Status instance_step(Instance *instance, const char *function, double t, double 
     if (!(fabs(t - instance->floats[0]) <= tolerance))
         return refuse(instance, function, "the step begins at t = %.17g s where the instance is at %.17g s", t,
                       instance->floats[0]);
-    if (!(dt > 0.0 && isfinite(dt)))
-        return refuse(instance, function, "the step size is %.17g s; it must be positive", dt);
+    if (!(dt > 0.0 && isfinite(t + dt)))
+        return refuse(instance, function, "the step size is %.17g s; it must be positive, and the step's end finite",
+                      dt);
     if (t + dt > instance->stop_time + tolerance)
         return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
                       instance->stop_time);

@@ -122,6 +122,26 @@ static Outcome step(const Instance *instance, const char *function) {
     return ask(instance, function, &question, NULL);
 }
 
+/* Takes over what a slave tells of itself when it starts: a Begun, a warning, the table. */
+static bool take_over(Instance *instance, const char *function, const Answer *answer, Text *fault) {
+    SharedMemory *memory = &side_of(instance)->memory;
+    Begun begun = {0};
+    size_t size = answer->size;
+    if (size >= sizeof begun) memcpy(&begun, answer->bytes, sizeof begun);
+    if (size < sizeof begun || begun.warning > size - sizeof begun) {
+        refuse(instance, function, "%zu bytes that tell of no unit; is resources/sources that of this unit?", size);
+        return false;
+    }
+    const char *warning = answer->bytes + sizeof begun, *table = warning + begun.warning;
+    if (begun.warning) warn(instance, function, "%.*s", (int)begun.warning, warning);
+    if (!shared_memory_map(memory, begun.size, fault)) {
+        refuse(instance, function, "%s", text_of(fault));
+        return false;
+    }
+    uint64_t shift = (uint64_t)(uintptr_t)memory->address - begun.address;
+    return slave_take_table(instance, table, size - (size_t)(table - answer->bytes), shift);
+}
+
 /* Starts the interpreter and the slave in it. NO_PYTHON: the interpreter is of no use, `fault` says why. */
 static Start begin(Instance *instance, const char *function, Text *fault) {
     Remote *side = side_of(instance);
@@ -139,21 +159,13 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     Transfer done = transfer(side, &question, limit, &outcome, &answer);
     text_clear(&wanted);
     Start start = NOT_STARTED;
-    Begun begun;
     if (done != TRANSFERRED) {
         lose(side, done, limit, done == TOO_LATE ? "" : " before the unit had started; is it a Python 3.10 or later?", fault);
         start = NO_PYTHON;
     } else if (outcome != ANSWERED) {
         refuse(instance, function, "%s", answer.bytes);
-    } else {
-        memcpy(&begun, answer.bytes, sizeof begun);
-        const char *warning = answer.bytes + sizeof begun, *table = warning + begun.warning;
-        size_t size = answer.size - (size_t)(table - answer.bytes);
-        if (!shared_memory_map(&side->memory, begun.size, fault))
-            refuse(instance, function, "%s", text_of(fault));
-        else if (slave_take_table(instance, table, size, (uint64_t)(uintptr_t)side->memory.address - begun.address))
-            start = STARTED;
-        if (begun.warning) warn(instance, function, "%.*s", (int)begun.warning, warning);
+    } else if (take_over(instance, function, &answer, fault)) {
+        start = STARTED;
     }
     free(answer.bytes);
     if (start != STARTED && side->process) {

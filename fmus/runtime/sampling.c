@@ -9,6 +9,7 @@
 
 #include "instance.h"
 
+#define MOST_TICKS 1e9 /* in a step: hours */
 #define STEP_TOLERANCE 1e-6 /* relative: hosts write step sizes as decimals, and add them up */
 
 double period(const Instance *instance) {
@@ -44,7 +45,15 @@ static Status tick(Instance *instance, const char *function) {
     return status;
 }
 
+/* A step size in other units, or a wild one, would hold the host up for ever. */
+static bool too_many_ticks(const Instance *instance, double t, double dt) {
+    return (t + dt - next_tick(instance)) / period(instance) > MOST_TICKS;
+}
+
 static Status tick_by_itself(Instance *instance, const char *function, double t, double dt) {
+    if (too_many_ticks(instance, t, dt))
+        return refuse(instance, function, "a step of %.17g s holds more than %g ticks of the unit, one each %.17g s", dt,
+                      MOST_TICKS, period(instance));
     bool ticked = false;
     while (next_tick(instance) < t + dt - tick_tolerance(instance, dt)) {
         if (tick(instance, function) != STATUS_OK) {

@@ -78,8 +78,9 @@ class Driver:
 
     def _add(self) -> None:
         name = f"x{self.made}"
-        event_mode = self.unit.fmi == 3 and self.unit.has_event_mode and self.made % 2 == 1
-        subject = Subject(self.unit, self.ring, name, event_mode=event_mode)
+        event_mode = self.unit.fmi == 3 and self.unit.has_event_mode and self.made % 3 != 0
+        early_return = event_mode and self.made % 3 == 2
+        subject = Subject(self.unit, self.ring, name, event_mode=event_mode, early_return=early_return)
         self.made += 1
         if not self.shown:
             self.shown = performance(subject, self.unit)

@@ -1,6 +1,7 @@
 """A unit as a host sees it: what its XML says, and its library's functions."""
 
 import ctypes
+import math
 import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
@@ -50,6 +51,8 @@ class ForeignUnit:
         step: the step that the unit suggests, in seconds.
         any_step: whether it takes steps of any size.
         has_event_mode: whether it does something in event mode.
+        has_derivatives: whether it gives derivatives.
+        clock: value reference of its clock, as an array of one; empty if it has none. `period` is that of its ticks.
     """
 
     def __init__(self, fmu: Path, fmi: int) -> None:
@@ -66,13 +69,19 @@ class ForeignUnit:
         abilities = _child(root, "CoSimulation").attrib
         self.any_step = abilities.get("canHandleVariableCommunicationStepSize") == "true"
         self.has_event_mode = abilities.get("hasEventMode") == "true"
+        self.has_derivatives = abilities.get(f"providesDirectionalDerivative{'s' * (fmi == 3)}") == "true"
         self.step = float(_child(root, "DefaultExperiment").attrib["stepSize"])
         items = {
             kind.attrib["name"]: tuple(int(i.attrib["value"]) for i in kind.iter("Item"))
             for kind in _child(root, "TypeDefinitions", optional=True)
         }
         self.variables = _grouped([_variable(e, fmi, items) for e in _child(root, "ModelVariables")])
-        self.has_clocks = any(v.type == "Clock" for v in self.variables)
+        clocks = list(_child(root, "ModelVariables").iter("Clock"))
+        self.has_clocks = bool(clocks)
+        self.clock = (ctypes.c_uint32 * len(clocks))(*(int(c.attrib["valueReference"]) for c in clocks))
+        self.period = math.inf
+        for c in clocks:
+            self.period = int(c.attrib["intervalCounter"]) / int(c.attrib["resolution"])
         platform = FMI2_FOLDERS[host_platform()] if fmi == 2 else host_platform()
         suffix = library(host_platform(), fmi).suffix
         loaded = ctypes.CDLL(str(folder / "binaries" / platform / (self.name + suffix)))

@@ -3,10 +3,13 @@
 import random
 from collections.abc import Callable
 
+import derivatives
+import illegal_clocks
 import illegal_instances
 import illegal_states
 import illegal_times
 import illegal_variables
+from event_mode import advance, enter_event_mode, to_step_mode
 from legal_calls import Effort, LegalCalls
 from subject import Fault, Saved, Subject
 
@@ -17,6 +20,8 @@ REFUSALS: tuple[Offence, ...] = (
     *illegal_times.REFUSALS,
     *illegal_states.REFUSALS,
     *illegal_instances.REFUSALS,
+    *illegal_clocks.REFUSALS,
+    *derivatives.REFUSALS,
 )
 """Calls that are refused at once."""
 
@@ -56,16 +61,19 @@ class IllegalCalls:
             LegalCalls(s, self.ready, rng, self.effort).one()
 
     def _take_position(self) -> None:
-        s, mode = self.subject, self.rng.choice(["instantiated", "initialisation", "ready", "ready", "terminated"])
+        s, afresh = self.subject, self.rng.random() < min(0.4, 0.1 + 2.0 * self.effort.from_scratch)
+        mode = self.rng.choice(["instantiated", "initialisation"] if afresh else ["ready", "ready", "terminated"])
         if mode in ("instantiated", "initialisation"):
             s.reset()
         else:
             s.restore(self.ready)
         if mode == "initialisation":
             s.enter()
-        if mode == "ready" and s.mode == "event" and self.rng.random() < 0.5:
-            s.demand("EnterStepMode")
-            s.mode = "stepping"
+        if mode == "ready" and s.mode == "event" and self.rng.random() < 0.7:
+            to_step_mode(s)
+            if s.unit.has_clocks and self.rng.random() < 0.5:
+                advance(s, 0.5 * s.unit.period)
+                enter_event_mode(s)
         if mode == "terminated":
             s.demand("Terminate")
             s.mode = "terminated"

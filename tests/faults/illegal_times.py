@@ -5,7 +5,8 @@ import math
 import random
 from typing import Any
 
-from subject import DISCARD, Subject
+from event_mode import to_step_mode
+from subject import DISCARD, Fault, Subject
 
 MODES = {
     "SetupExperiment": ("instantiated",),
@@ -93,9 +94,7 @@ def step_past_the_end(s: Subject, rng: random.Random) -> None:
     if s.mode == "instantiated":
         s.enter(0.0, 1.5 * s.unit.step)
         if s.exit():
-            if s.event_mode:
-                s.demand("EnterStepMode")
-                s.mode = "stepping"
+            to_step_mode(s)
             s.expect_refusal("DoStep", *s.step_arguments(s.t, rng.choice([2.0 * s.unit.step, 1e9, 1e300])))
 
 
@@ -111,4 +110,15 @@ REFUSALS = (
     wrong_status_kind,
     wrong_categories,
 )
-POISONS = (step_past_the_end,)
+
+
+def enter_without_setup(s: Subject, rng: random.Random) -> None:  # noqa: ARG001
+    """FMI 2.0 has hosts call fmi2SetupExperiment before; hosts that do not are let through: the time begins with 0."""
+    if s.unit.fmi == 2 and s.mode == "instantiated":
+        s.demand("EnterInitializationMode")
+        s.mode = "initialisation"
+        if not s.exit() or s.time() != 0.0:
+            raise Fault("the unit does not begin at 0 without fmi2SetupExperiment")
+
+
+POISONS = (step_past_the_end, enter_without_setup)

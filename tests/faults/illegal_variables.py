@@ -5,6 +5,7 @@ import math
 import random
 from typing import Any
 
+from event_mode import advance, tick_is_due, to_step_mode
 from foreign_unit import Variable
 from subject import ERROR, NUMBERS, OK, Fault, Subject, references_of
 
@@ -174,10 +175,12 @@ def go_on(s: Subject, *, must_fail: bool) -> None:
     """Make the call that uses what was set."""
     if s.mode == "instantiated":
         s.enter()
-    if s.mode == "event":
-        s.demand("EnterStepMode")
-        s.mode = "stepping"
-    passed = s.exit() if s.mode == "initialisation" else s.step(s.unit.step)
+    if s.mode == "initialisation":
+        passed = s.exit()
+    elif s.next_tick < math.inf:
+        passed = (tick_is_due(s) or advance(s, s.unit.period)) and to_step_mode(s)
+    else:
+        passed = advance(s, s.unit.step)
     if passed and must_fail:
         raise Fault("the unit goes on with a value that it should refuse")
 

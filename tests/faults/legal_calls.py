@@ -6,7 +6,9 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from derivatives import derive
 from draws import legal_values
+from event_mode import advance, enter_event_mode, settle, to_step_mode
 from foreign_unit import ForeignUnit
 from subject import Fault, Saved, Subject, of_one_type
 
@@ -14,10 +16,28 @@ LENGTH = (5, 12)
 CATEGORIES = (b"logStatusError", b"logStatusWarning", b"logAll")
 WEIGHTS = {
     "instantiated": {"set_some": 3, "log": 1, "save_and_restore": 1, "enter": 4},
-    "initialisation": {"set_some": 2, "get_some": 2, "save_and_restore": 1, "exit": 4, "log": 1},
-    "stepping": {"set_some": 3, "get_some": 4, "step": 5, "save_and_restore": 2, "enter_event": 2, "log": 1, "end": 1},
-    "event": {"set_some": 2, "get_some": 2, "update": 2, "leave_event": 4, "save_and_restore": 1, "end": 1},
-    "terminated": {"get_some": 3, "save_and_restore": 1, "reset": 3, "log": 1},
+    "initialisation": {"set_some": 2, "get_some": 2, "derive": 1, "save_and_restore": 1, "exit": 4, "log": 1},
+    "stepping": {
+        "set_some": 3,
+        "get_some": 4,
+        "derive": 1,
+        "step": 5,
+        "save_and_restore": 2,
+        "enter_event": 2,
+        "log": 1,
+        "end": 1,
+    },
+    "event": {
+        "set_some": 2,
+        "get_some": 2,
+        "derive": 1,
+        "ask_clock": 1,
+        "update": 2,
+        "leave_event": 4,
+        "save_and_restore": 1,
+        "end": 1,
+    },
+    "terminated": {"get_some": 3, "derive": 1, "save_and_restore": 1, "reset": 3, "log": 1},
     "failed": {"reset": 1},
 }
 """What may be called in which mode, and how often it is."""
@@ -30,7 +50,8 @@ class Effort:
     Attributes:
         from_scratch: share of sequences that make the block anew; the others go on from a saved state.
         steps: most steps in a sequence.
-        bytes: share of the occasions at which a state's bytes are looked at; two pictures make megabytes of them.
+        bytes: share of the occasions at which a state's bytes are looked at, or it is gone back to; two pictures make
+            megabytes of them, and going back draws them again.
     """
 
     from_scratch: float = 0.5
@@ -111,10 +132,10 @@ class LegalCalls:
             return
         self.steps += whole
         if unit.any_step:
-            self.subject.step(unit.step * self.rng.choice([whole, 0.5, 1.0, self.rng.uniform(0.1, 2.0)]))
+            advance(self.subject, unit.step * self.rng.choice([whole, 0.5, 1.0, self.rng.uniform(0.1, 2.0)]))
             return
         for _ in range(whole):
-            if not self.subject.step(unit.step):
+            if not advance(self.subject, unit.step):
                 return
 
     def save_and_restore(self) -> None:
@@ -132,27 +153,35 @@ class LegalCalls:
             if s.serialised(again) != data:
                 raise Fault("a restored state's bytes differ from those that it was restored from")
             s.forget(again)
-        elif self.rng.random() < 0.8:
+        elif self.rng.random() < 0.8 * max(0.25, self.effort.bytes):
             s.restore(saved)
         s.forget(saved)
 
     def enter_event(self) -> None:
         """Enter event mode if the instance was made with it."""
         if self.subject.event_mode:
-            self.subject.demand("EnterEventMode")
-            self.subject.mode = "event"
+            enter_event_mode(self.subject)
 
     def update(self) -> None:
-        """Bring the discrete states up to date."""
-        flags, time = (ctypes.c_bool * 5)(), ctypes.c_double()
-        self.subject.demand(
-            "UpdateDiscreteStates", *(ctypes.addressof(flags) + i for i in range(5)), ctypes.addressof(time)
-        )
+        """Bring the discrete states up to date, after activating the clock if it ticks."""
+        settle(self.subject)
+
+    def ask_clock(self) -> None:
+        """Ask whether the clock is active, and for its interval."""
+        unit, active, interval, qualifier = self.subject.unit, ctypes.c_bool(), ctypes.c_double(), ctypes.c_int()
+        if unit.has_clocks:
+            self.subject.demand("GetClock", unit.clock, 1, ctypes.byref(active))
+            self.subject.demand("GetIntervalDecimal", unit.clock, 1, ctypes.byref(interval), ctypes.byref(qualifier))
+            if active.value or interval.value != unit.period:
+                raise Fault(f"the clock is active, or its interval {interval.value!r} s is not {unit.period!r} s")
+
+    def derive(self) -> None:
+        """Ask for derivatives."""
+        derive(self.subject, self.rng)
 
     def leave_event(self) -> None:
         """Go on to step mode."""
-        self.subject.demand("EnterStepMode")
-        self.subject.mode = "stepping"
+        to_step_mode(self.subject)
 
     def end(self) -> None:
         """Terminate, now and then."""
@@ -174,15 +203,12 @@ def performance(subject: Subject, unit: ForeignUnit) -> list[object]:
     subject.enter()
     if not subject.exit():
         raise Fault(f"start values are refused: {subject.log[-1:]}")
-    if subject.event_mode:
-        subject.demand("EnterStepMode")
-        subject.mode = "stepping"
     inputs, outputs = unit.of("input"), unit.of("output")
     for _ in range(2):
         for v in inputs:
             if v.type != "Binary":
                 subject.set([v], [legal_values(v, rng, wide=False)])
-        if not subject.step(unit.step):
+        if not advance(subject, unit.step):
             raise Fault(f"inputs near the start values are refused: {subject.log[-1:]}")
         seen += [subject.get([v]) for v in outputs]
     return seen

@@ -3,8 +3,9 @@
 import ctypes
 import math
 import random
+import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from call_ring import CallRing
@@ -45,6 +46,9 @@ class Saved:
     mode: str
     t: float
     stop: float
+    start: float
+    ticks: int
+    needs_event: bool
 
 
 class Subject:
@@ -53,15 +57,20 @@ class Subject:
     Attributes:
         mode: instantiated, initialisation, stepping, event, terminated; or failed after an error that is not at odds
             with the standard, when only reset, a saved state or the instance's end may follow.
+        start: its time at initialisation.
+        ticks: how often the host has activated its clock, if the host does; `next_tick` is the time of the next.
+        needs_event: whether the last step asked for event mode.
         log: messages since it was last emptied.
         refused: how often legal values were answered with an error.
     """
 
-    def __init__(self, unit: ForeignUnit, ring: CallRing, name: str, *, event_mode: bool = False) -> None:
+    def __init__(
+        self, unit: ForeignUnit, ring: CallRing, name: str, *, event_mode: bool = False, early_return: bool = False
+    ) -> None:
         self.unit, self.ring, self.name = unit, ring, name
         self.log: list[str] = []
-        self.mode, self.t, self.stop = "instantiated", 0.0, math.inf
-        self.event_mode = event_mode
+        self._forget_times()
+        self.event_mode, self.early_return = event_mode, early_return
         self.refused = self.answered = 0
         self.kept: Any = None  # memory that a call's arguments point into
         self._log2 = Log2(lambda *a: self.log.append(a[-1].decode("utf-8", "replace")))
@@ -80,7 +89,7 @@ class Subject:
             kind = given.get("kind", 1)
             return self.bare("Instantiate", given["name"], kind, given["token"], given["resources"], host, 0, 0)
         more = (None, 0, None, given.get("logger", logger), None)
-        flags = (False, False, self.event_mode, False)
+        flags = (False, False, self.event_mode, self.early_return)
         return self.bare("InstantiateCoSimulation", given["name"], given["token"], given["resources"], *flags, *more)
 
     def bare(self, function: str, *arguments: Any) -> Any:
@@ -172,12 +181,13 @@ class Subject:
         """Save the state."""
         pointer = ctypes.c_void_p()
         self.demand("GetFMUState", ctypes.byref(pointer))
-        return Saved(pointer.value or 0, self.mode, self.t, self.stop)
+        return Saved(pointer.value or 0, self.mode, self.t, self.stop, self.start, self.ticks, self.needs_event)
 
     def restore(self, saved: Saved) -> None:
         """Go back to a saved state."""
         self.demand("SetFMUState", saved.pointer)
         self.mode, self.t, self.stop = saved.mode, saved.t, saved.stop
+        self.start, self.ticks, self.needs_event = saved.start, saved.ticks, saved.needs_event
 
     def forget(self, saved: Saved) -> None:
         """Free a saved state."""
@@ -195,12 +205,23 @@ class Subject:
         """Return a state made from bytes."""
         pointer = ctypes.c_void_p()
         self.demand("DeserializeFMUState", data, len(data), ctypes.byref(pointer))
-        return Saved(pointer.value or 0, like.mode, like.t, like.stop)
+        return replace(like, pointer=pointer.value or 0)
 
     def reset(self) -> None:
         """Reset, which must always help."""
         self.demand("Reset")
-        self.mode, self.t, self.stop = "instantiated", 0.0, math.inf
+        self._forget_times()
+
+    def _forget_times(self) -> None:
+        self.mode, self.t, self.start, self.stop = "instantiated", 0.0, 0.0, math.inf
+        self.ticks, self.needs_event = 0, False
+
+    @property
+    def next_tick(self) -> float:
+        """The time of the clock's next tick; infinity if the host has no clock to activate."""
+        if not self.event_mode or self.mode in ("instantiated", "initialisation"):
+            return math.inf
+        return self.start + self.ticks * self.unit.period if self.unit.has_clocks else math.inf
 
     def enter(self, start: float = 0.0, stop: float = math.inf, tolerance: float | None = None) -> None:
         """Enter initialisation mode."""
@@ -211,7 +232,7 @@ class Subject:
             self.demand("EnterInitializationMode")
         else:
             self.demand("EnterInitializationMode", *times)
-        self.mode, self.t, self.stop = "initialisation", start, stop
+        self.mode, self.t, self.start, self.stop = "initialisation", start, start, stop
 
     def exit(self) -> bool:
         """Leave initialisation mode; tell whether the block took the values that were set."""
@@ -221,10 +242,16 @@ class Subject:
         return False
 
     def step(self, dt: float) -> bool:
-        """Advance; tell whether the block did. The time goes on."""
+        """Advance; tell whether the block did. The time goes on, if the unit returns early not by all of `dt`."""
         if not self.attempt("DoStep", *self.step_arguments(self.t, dt)):
             return False
-        self.t += dt
+        last, early = self.t + dt, False
+        if self.unit.fmi == 3:
+            last, needs_event, _, early = struct.unpack_from("=d???", self.kept)
+            self.needs_event = self.event_mode and needs_event
+        if early and not self.t <= last <= self.t + dt:
+            raise Fault(f"a step from {self.t!r} s by {dt!r} s returned early at {last!r} s")
+        self.t = last if early else self.t + dt
         told = self.time()
         if abs(told - self.t) > 1e-9 * max(1.0, abs(self.t)):
             raise Fault(f"the time is {told!r} after a step to {self.t!r}")

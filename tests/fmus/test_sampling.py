@@ -120,3 +120,14 @@ def test_clock_functions_are_refused_outside_event_mode(workshop: Workshop):
     reference = ctypes.c_uint32(host.references["u"])
     assert host.call("SetIntervalDecimal", ctypes.byref(reference), ctypes.c_size_t(1), None) == ERROR
     assert "interval is constant" in host.log[-1]
+
+
+@both
+@pytest.mark.parametrize("dt", [1e12, 1e300, 1.7e308])
+def test_a_step_of_no_end_of_ticks_is_refused_and_nothing_has_changed(workshop: Workshop, fmi: int, dt: float):
+    host = started(workshop, fmi)
+    assert host.step(0.0, P) == OK
+    assert host.step(P, dt) == ERROR
+    assert "holds more than 1e+09 ticks of the unit" in host.log[-1]
+    assert host.step(P, P) == OK
+    assert host.get("ticks") == [2.0]
