@@ -24,6 +24,9 @@ from typing import Any
 
 _builtin_import = builtins.__import__
 
+_PREFIX = re.compile(r"(?<![\w./\\])_fmu_\w+\.(?=\w)")
+"""The prefix before a module's name; not a part of a path."""
+
 
 class Refusal(Exception):
     """The host or its installation is at fault; the message says all, a traceback would only distract."""
@@ -45,7 +48,10 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
         unit = json.load(file)
     if token != unit["token"]:
-        raise Refusal(f"the model description's token {token} is not this unit's, which is {unit['token']}")
+        raise Refusal(
+            f"the model description's token {token} is not that of the resources, which is {unit['token']}:"
+            " they are of two different builds. Cure: unpack the FMU again, into an empty folder, or build it again"
+        )
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
@@ -63,10 +69,13 @@ def warning(resources: str) -> str:
 
 
 def explain(error: BaseException) -> str:
-    """Return what the log says of an exception: its message if that is enough, else the traceback."""
+    """Return what the log says of an exception: its message if that is enough, else the traceback.
+
+    Names of the FMU's modules are those that the reader knows, without the prefix under which they are kept.
+    """
     if getattr(error, "is_refusal", False):
-        return str(error)
-    return "".join(traceback.format_exception(type(error), error, error.__traceback__)).rstrip()
+        return _PREFIX.sub("", str(error))
+    return _PREFIX.sub("", "".join(traceback.format_exception(type(error), error, error.__traceback__)).rstrip())
 
 
 def _require(unit: dict[str, Any], resources: str) -> None:

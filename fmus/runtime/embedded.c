@@ -50,8 +50,8 @@ static bool log_exception(const Instance *instance, const char *function) {
     PyObject *explain = side_of(instance)->explain;
     if (error && explain) add_string(&text, py.PyObject_CallFunctionObjArgs(explain, error, NULL));
     if (!text.length && type) {
-        add_string(&text, py.PyObject_Str(type));
-        text_add(&text, " ");
+        add_string(&text, py.PyObject_GetAttrString(type, "__name__"));
+        text_add(&text, ": ");
         if (error) add_string(&text, py.PyObject_Str(error));
     }
     bool refused = is_refusal(error);
@@ -84,8 +84,10 @@ static PyObject *loader_names(const char *source) {
     text_add(&name, "_fmu_loader_%016llx", (unsigned long long)digest);
     PyObject *module = py.PyImport_AddModule(text_of(&name));
     PyObject *names = module ? py.PyModule_GetDict(module) : NULL;
-    if (names) py.Py_IncRef(names);
+    PyObject *builtins = py.PyImport_AddModule("builtins"); /* C code that imports looks for it in these names */
     text_clear(&name);
+    if (!names || !builtins || py.PyDict_SetItemString(names, "__builtins__", builtins) != 0) return NULL;
+    py.Py_IncRef(names);
     return names;
 }
 
@@ -96,7 +98,7 @@ static PyObject *run_loader(const Instance *instance, const char *function, cons
     char *source = platform_read_file(text_of(&path));
     PyObject *names = source ? loader_names(source) : NULL;
     if (!source)
-        refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+        refuse_unreadable(instance, function, text_of(&path));
     else if (!names)
         log_exception(instance, function);
     if (names && !py.PyDict_GetItemString(names, READY)) {

@@ -30,20 +30,24 @@ void instance_free(Instance *instance) {
     free(instance);
 }
 
-static bool all_finite(const Instance *instance, const char *function, size_t first, size_t n) {
-    Text bad = {0};
-    if (!find_not_finite(instance, first, n, &bad)) return true;
-    refuse(instance, function, "%s", text_of(&bad));
-    text_clear(&bad);
-    return false;
+static void refuse_text(const Instance *instance, const char *function, Text *bad) {
+    refuse(instance, function, "%s", text_of(bad));
+    text_clear(bad);
 }
 
 bool inputs_finite(const Instance *instance, const char *function) {
-    return all_finite(instance, function, instance->first_input, instance->n_inputs);
+    Text bad = {0};
+    bool found = find_not_finite(instance, instance->first_input, instance->n_inputs, &bad);
+    if (found) refuse_text(instance, function, &bad);
+    return !found;
 }
 
 Status check_outputs(Instance *instance, const char *function) {
-    if (all_finite(instance, function, instance->first_output, instance->n_outputs)) return STATUS_OK;
+    Text bad = {0};
+    bool found = find_not_finite(instance, instance->first_output, instance->n_outputs, &bad) ||
+                 (instance->gives_singles && find_beyond_single(instance, &bad));
+    if (!found) return STATUS_OK;
+    refuse_text(instance, function, &bad);
     instance->mode = FAILED;
     return STATUS_ERROR;
 }

@@ -127,6 +127,7 @@ struct Instance {
     uint8_t *booleans;
     uint64_t *sizes;
     size_t first_input, n_inputs, first_output, n_outputs;
+    bool gives_singles; /* there are Float32 outputs */
     uint64_t abilities, period_counter, period_resolution;
 
     SavedState *states;
@@ -238,6 +239,8 @@ Status set_strings(Instance *instance, const char *function, Type type, const ui
 
 /* The first of `n` real entries that is not finite, described, or false if all are. */
 bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *description);
+/* The same for the first Float32 output that no Float32 holds. */
+bool find_beyond_single(const Instance *instance, Text *description);
 
 /* state.c */
 

@@ -98,21 +98,30 @@ static void tell_program_name(void *library, const char *executable) {
     if (set && executable) set(py.Py_DecodeLocale(executable, NULL));
 }
 
+/* Sets a variable of Python's that is read when it starts; tells whether this Python has it. */
+static bool set_flag(void *library, const char *name) {
+    AnyFunction found = platform_function(library, name);
+    if (!found) return false;
+    int *flag;
+    memcpy(&flag, &found, sizeof flag);
+    *flag = 1;
+    return true;
+}
+
+/* Paths are UTF-8 whatever the host's locale, which may be C; from Python 3.15 on that is the rule. */
+static void prefer_utf8(void *library) { set_flag(library, "Py_UTF8Mode"); }
+
 /* Python ends the process if it cannot start, so what could keep it from starting is looked at before. Of the
  * environment it must not take PYTHONHOME and the like, which are for another Python or the host's own. */
 static bool initialise(void *library, const char *from, Text *tried) {
-    AnyFunction flag = platform_function(library, "Py_IgnoreEnvironmentFlag"); /* a variable */
-    char *home = flag ? NULL : platform_environment("PYTHONHOME");
+    bool ignored = set_flag(library, "Py_IgnoreEnvironmentFlag");
+    char *home = ignored ? NULL : platform_environment("PYTHONHOME");
     if (home) {
         text_add(tried, "\n  %s: PYTHONHOME is set, to %s; it must not be", from, home);
         free(home);
         return false;
     }
-    if (flag) {
-        int *ignore;
-        memcpy(&ignore, &flag, sizeof ignore);
-        *ignore = 1;
-    }
+    prefer_utf8(library);
     py.Py_InitializeEx(0);  /* 0: signals stay the host's */
     py.PyEval_SaveThread(); /* every call takes the lock for itself, from whatever thread it comes */
     return true;
@@ -128,6 +137,7 @@ static bool start_from(void *library, const Interpreter *found, const char *from
     bool started = false;
     if (home || bare) {
         Text guess = {0};
+        prefer_utf8(library); /* before the name is decoded */
         if (home) text_add(&guess, "%s/bin/python3.%d", home, atoi(py.Py_GetVersion() + 2));
         bool known = found->executable && platform_exists(found->executable);
         tell_program_name(library, known ? found->executable : guess.chars);
@@ -165,22 +175,29 @@ static bool use_loaded(void *process, Text *tried) {
     return false;
 }
 
-static bool use_environment(Text *tried) {
-    Interpreter found = {.library = platform_environment("FMU_LIBPYTHON")};
-    bool done = found.library && start(&found, "FMU_LIBPYTHON", tried);
-    if (!found.library) text_add(tried, "\n  FMU_LIBPYTHON: not set");
-    interpreter_clear(&found);
+#define A_LIBRARY                                                                               \
+    "the shared library of a Python 3.%d or later that has the packages of this unit, such as " \
+    "/usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0 (python311.dll, libpython3.11.dylib)."
+
+/* The library that the user chose; what else there is he does not want. */
+static bool use_library(char *library, Text *tried) {
+    Interpreter found = {.library = library};
+    bool done = start(&found, "FMU_LIBPYTHON", tried);
+    text_add(tried,
+             "\nWhile FMU_LIBPYTHON is set no other Python is tried.\nCure: unset it, or set it to " A_LIBRARY,
+             OLDEST_MINOR);
     return done;
 }
 
 static bool use_description(char *lines, const char *from, Text *tried) {
     Interpreter found = lines ? interpreter_of(lines) : (Interpreter){0};
-    bool done = false;
+    bool done = false, names_library = found.library && *found.library;
     if (!lines)
         text_add(tried, "\n  %s: cannot be read", from);
-    else if (!found.library || !*found.library)
-        text_add(tried, "\n  %s: %s is built without a shared library of Python", from,
-                 found.executable ? found.executable : "the interpreter");
+    else if (!names_library && !(found.executable && *found.executable))
+        text_add(tried, "\n  %s: names no interpreter", from);
+    else if (!names_library)
+        text_add(tried, "\n  %s: %s is built without a shared library of Python", from, found.executable);
     else
         done = start(&found, from, tried);
     interpreter_clear(&found);
@@ -204,9 +221,32 @@ char *python_noted(const char *resources) {
 /* The library of the interpreter that the user chose; what else there is he does not want. */
 static bool use_chosen(const char *interpreter, const char *script, Text *tried) {
     char *lines = platform_run(interpreter, script);
-    if (lines) return use_description(lines, "FMU_PYTHON", tried);
-    text_add(tried, "\n  FMU_PYTHON: %s cannot be run, or is older than Python 3.6", interpreter);
+    if (lines && strstr(lines, "executable = ")) return use_description(lines, "FMU_PYTHON", tried);
+    free(lines);
+    text_add(tried, "\n  FMU_PYTHON: %s cannot be run, or is no Python 3.6 or later", interpreter);
     return false;
+}
+
+/* By the interpreter that the user chose; without one, by that which built the unit or that on the PATH. */
+static bool use_interpreter(const char *resources, Text *tried) {
+    Text noted = {0}, script = {0};
+    text_add(&noted, "%s/python.txt", resources);
+    text_add(&script, "%s/sources/fmus/interpreter.py", resources);
+    char *chosen = platform_environment("FMU_PYTHON");
+    text_add(tried, "\n  FMU_LIBPYTHON: not set");
+    bool done = chosen ? use_chosen(chosen, text_of(&script), tried)
+                       : use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
+                             use_description(platform_run(PYTHON_ON_PATH, text_of(&script)),
+                                             PYTHON_ON_PATH " on the PATH", tried);
+    free(chosen);
+    text_clear(&noted);
+    text_clear(&script);
+    text_add(tried,
+             "\nCure: set the environment variable FMU_LIBPYTHON to " A_LIBRARY
+             " A Python without one is rebuilt with ./configure --enable-shared (pyenv: "
+             "PYTHON_CONFIGURE_OPTS=--enable-shared pyenv install 3.11).",
+             OLDEST_MINOR);
+    return done;
 }
 
 static bool search(const char *resources, Text *tried) {
@@ -214,25 +254,9 @@ static bool search(const char *resources, Text *tried) {
     void *process = platform_loaded_python();
     if (process) return use_loaded(process, tried);
     text_add(tried, "\n  this process: no Python is loaded");
-    Text noted = {0}, script = {0};
-    text_add(&noted, "%s/python.txt", resources);
-    text_add(&script, "%s/sources/fmus/interpreter.py", resources);
-    char *chosen = platform_environment("FMU_PYTHON");
-    bool done = use_environment(tried);
-    if (!done && chosen)
-        done = use_chosen(chosen, text_of(&script), tried);
-    else if (!done)
-        done = use_description(platform_read_file(text_of(&noted)), "resources/python.txt", tried) ||
-               use_description(platform_run(PYTHON_ON_PATH, text_of(&script)), PYTHON_ON_PATH " on the PATH", tried);
-    free(chosen);
-    text_clear(&noted);
-    text_clear(&script);
-    text_add(tried,
-             "\nCure: set the environment variable FMU_LIBPYTHON to the shared library of a Python 3.%d or later "
-             "that has the packages of this unit, such as /usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0 "
-             "(python311.dll, libpython3.11.dylib). A Python without one is rebuilt with ./configure "
-             "--enable-shared (pyenv: PYTHON_CONFIGURE_OPTS=--enable-shared pyenv install 3.11).",
-             OLDEST_MINOR);
+    char *library = platform_environment("FMU_LIBPYTHON");
+    bool done = library ? use_library(library, tried) : use_interpreter(resources, tried);
+    free(library);
     return done;
 }
 

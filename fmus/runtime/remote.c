@@ -75,20 +75,20 @@ static Transfer transfer(const Remote *side, const Question *question, double li
     return process_receive(side->process, answer->bytes, head.size, deadline);
 }
 
-/* Ends a process that does not answer and adds how it ended. */
-static void lose(Remote *side, Transfer why, double limit, Text *text) {
+/* Ends a process that does not answer and adds how it ended; `cure` is what to do then, or nothing. */
+static void lose(Remote *side, Transfer why, double limit, const char *cure, Text *text) {
     Text how = {0};
     int status = process_end(side->process, why == TOO_LATE ? 0.0 : PATIENCE, &how);
     side->process = NULL;
     if (why == TOO_LATE)
         text_add(text,
-                 "the unit's Python process, %s, did not answer for %g s and was ended. " CURE_ENDED
-                 "; a greater FMU_PYTHON_TIMEOUT (s) gives it more time, 0 all the time it wants",
-                 side->interpreter, limit);
+                 "the unit's Python process, %s, did not answer for %g s and was ended%s; a greater "
+                 "FMU_PYTHON_TIMEOUT (s) gives it more time, 0 all the time it wants",
+                 side->interpreter, limit, cure);
     else if (status == TOO_OLD)
         text_add(text, "it is older than Python 3.10");
     else
-        text_add(text, "the unit's Python process, %s, %s. " CURE_ENDED, side->interpreter, text_of(&how));
+        text_add(text, "the unit's Python process, %s, %s%s", side->interpreter, text_of(&how), cure);
     text_clear(&how);
 }
 
@@ -103,7 +103,7 @@ static Outcome ask(const Instance *instance, const char *function, const Questio
     Transfer done = transfer(side, question, side->limit, &outcome, &given);
     if (done != TRANSFERRED) {
         Text why = {0};
-        lose(side, done, side->limit, &why);
+        lose(side, done, side->limit, ". " CURE_ENDED, &why);
         refuse(instance, function, "%s", text_of(&why));
         text_clear(&why);
         outcome = LOST;
@@ -147,7 +147,7 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     Remote *side = side_of(instance);
     Text script = {0}, wanted = {0};
     text_add(&script, "%s/sources/fmus/server.py", side->resources);
-    const char *arguments[] = {"-E", "-u", "-c", BEGINNING, text_of(&script), NULL};
+    const char *arguments[] = {"-E", "-u", "-X", "utf8", "-c", BEGINNING, text_of(&script), NULL};
     side->process = process_start(side->interpreter, arguments, &side->memory, fault);
     text_clear(&script);
     if (!side->process) return NO_PYTHON;
@@ -160,7 +160,7 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     text_clear(&wanted);
     Start start = NOT_STARTED;
     if (done != TRANSFERRED) {
-        lose(side, done, limit, fault);
+        lose(side, done, limit, done == TOO_LATE ? "" : " before the unit had started; is it a Python 3.10 or later?", fault);
         start = NO_PYTHON;
     } else if (outcome != ANSWERED) {
         refuse(instance, function, "%s", answer.bytes);
@@ -184,7 +184,9 @@ static bool revive(Instance *instance, const char *function) {
     instance->mode = FAILED; /* whatever the mode was, that run is lost; whoever asked for the revival sets another */
     Start start = begin(instance, function, &fault);
     if (start == NO_PYTHON)
-        refuse(instance, function, "%s does not start again: %s", side->interpreter, text_of(&fault));
+        refuse(instance, function,
+               "%s does not start again: %s. Cure: once it can, reset the instance or set a saved state",
+               side->interpreter, text_of(&fault));
     text_clear(&fault);
     return start == STARTED;
 }
@@ -248,7 +250,7 @@ static bool readable(const Instance *instance, const char *function, const char 
     Text path = {0};
     text_add(&path, "%s/sources/fmus/%s", resources, source);
     bool there = platform_exists(text_of(&path));
-    if (!there) refuse(instance, function, "%s cannot be read; is the resource location right?", text_of(&path));
+    if (!there) refuse_unreadable(instance, function, text_of(&path));
     text_clear(&path);
     return there;
 }

@@ -27,10 +27,21 @@ bool slave_take_table(Instance *instance, const char *bytes, size_t size, uint64
     instance->n_inputs = header.inputs;
     instance->first_output = header.first_output;
     instance->n_outputs = header.outputs;
+    instance->gives_singles = false;
+    for (size_t i = 0; i < instance->n_variables; i++)
+        if (instance->variables[i].causality == OUTPUT && instance->variables[i].type == TYPE_FLOAT32)
+            instance->gives_singles = true;
     instance->abilities = header.abilities;
     instance->period_counter = header.period_counter;
     instance->period_resolution = header.period_resolution;
     return true;
+}
+
+void refuse_unreadable(const Instance *instance, const char *function, const char *path) {
+    refuse(instance, function,
+           "%s cannot be read: the resources folder lacks it. Either the resource location is wrong, or the FMU was "
+           "taken apart. Cure: give the location of the unpacked FMU's folder resources, or build the FMU again",
+           path);
 }
 
 /* In which ways the interpreter may run, by FMU_PYTHON_PROCESS. */
@@ -45,13 +56,27 @@ static bool read_ways(const Instance *instance, const char *function, bool *here
     return *here || *apart;
 }
 
+/* Whether the user chose a library and no interpreter: then Python is that one or none. */
+static bool only_a_library_is_chosen(void) {
+    char *library = platform_environment("FMU_LIBPYTHON"), *interpreter = platform_environment("FMU_PYTHON");
+    bool only = library && !interpreter;
+    free(library);
+    free(interpreter);
+    return only;
+}
+
 bool slave_start(Instance *instance, const char *function, const char *resources, const char *token) {
     bool here, apart;
     if (!read_ways(instance, function, &here, &apart)) return false;
     Text tried = {0};
     Start start = NO_PYTHON;
     if (here) start = embedded_start(instance, function, resources, token, &tried);
-    if (start == NO_PYTHON && apart) start = remote_start(instance, function, resources, token, &tried);
+    bool is_last_resort = here && apart;
+    if (start == NO_PYTHON && is_last_resort && only_a_library_is_chosen())
+        text_add(&tried, "\nNor is a process of its own tried while FMU_LIBPYTHON is set, unless FMU_PYTHON is set or "
+                         "FMU_PYTHON_PROCESS is 1.");
+    else if (start == NO_PYTHON && apart)
+        start = remote_start(instance, function, resources, token, &tried);
     if (start == NO_PYTHON) refuse(instance, function, "%s", text_of(&tried));
     text_clear(&tried);
     return start == STARTED;

@@ -213,3 +213,17 @@ bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *des
     }
     return false;
 }
+
+bool find_beyond_single(const Instance *instance, Text *description) {
+    for (size_t i = 0; i < instance->n_variables; i++) {
+        const Variable *v = &instance->variables[i];
+        if (v->causality != OUTPUT || v->type != TYPE_FLOAT32) continue;
+        for (size_t at = v->offset; at < (size_t)v->offset + v->count; at++) {
+            if (fabs(instance->floats[at]) <= FLT_MAX) continue;
+            describe_bad(instance, at, description);
+            text_add(description, "; it is declared as Float32, up to %g", FLT_MAX);
+            return true;
+        }
+    }
+    return false;
+}

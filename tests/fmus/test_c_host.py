@@ -110,18 +110,93 @@ def test_by_the_interpreter_on_the_path(program: Path, unpacked: CtypesHost, tmp
 
 def test_all_that_was_tried_is_logged_with_a_cure(program: Path, unpacked: CtypesHost):
     (unpacked.folder / "resources" / "python.txt").write_text("executable = /opt/static/bin/python3\nlibrary = \n")
-    done = run(program, unpacked, PATH="/nonexistent", FMU_LIBPYTHON="/no/libpython.so")
+    done = run(program, unpacked, PATH="/nonexistent")
     assert done.returncode == 1
     for part in (
         "[unit 3] fmi2Instantiate: no usable Python",
         "this process: no Python is loaded",
-        "FMU_LIBPYTHON: /no/libpython.so",
+        "FMU_LIBPYTHON: not set",
         "/opt/static/bin/python3 is built without a shared library of Python",
         "python3 on the PATH: cannot be read",
         "Cure: set the environment variable FMU_LIBPYTHON",
         "--enable-shared",
     ):
         assert part in done.stdout
+
+
+def test_a_chosen_library_is_the_only_python_that_is_tried(program: Path, unpacked: CtypesHost):
+    done = run(program, unpacked, PATH=os.environ["PATH"], FMU_LIBPYTHON="/no/libpython.so")
+    assert done.returncode == 1
+    for part in (
+        "[unit 3] fmi2Instantiate: no usable Python",
+        "FMU_LIBPYTHON: /no/libpython.so",
+        "While FMU_LIBPYTHON is set no other Python is tried",
+        "Cure: unset it, or set it to the shared library of a Python 3.10 or later",
+        "Nor is a process of its own tried while FMU_LIBPYTHON is set, unless FMU_PYTHON is set or FMU_PYTHON_PROCESS",
+    ):
+        assert part in done.stdout
+    assert not re.search(r"python\.txt|on the PATH", done.stdout)
+
+
+@pytest.mark.parametrize("wish", ["FMU_PYTHON", "FMU_PYTHON_PROCESS"])
+def test_a_process_of_its_own_that_was_asked_for_needs_no_library(program: Path, unpacked: CtypesHost, wish: str):
+    value = {"FMU_PYTHON": sys.executable, "FMU_PYTHON_PROCESS": "1"}[wish]
+    done = run(program, unpacked, PATH="/nonexistent", FMU_LIBPYTHON="/no/libpython.so", **{wish: value})
+    expect_values(done)
+
+
+@pytest.mark.parametrize("text", ["", "library = \n", "executable = \nlibrary = \n"])
+def test_a_note_that_says_nothing_names_no_interpreter(program: Path, unpacked: CtypesHost, text: str):
+    (unpacked.folder / "resources" / "python.txt").write_text(text)
+    done = run(program, unpacked, PATH="/nonexistent")
+    assert "resources/python.txt: names no interpreter" in done.stdout
+    assert "is built without" not in done.stdout
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("place", ["0", "1"])
+@pytest.mark.parametrize("command", ["/bin/true", "/bin/cat"])
+def test_a_program_that_is_no_interpreter_is_told_with_one_cure(
+    program: Path, unpacked: CtypesHost, place: str, command: str
+):
+    done = run(program, unpacked, PATH="/bin:/usr/bin", FMU_PYTHON=command, FMU_PYTHON_PROCESS=place)
+    told = {"0": "cannot be run, or is no Python", "1": "before the unit had started; is it a Python 3.10 or later?"}
+    assert command in done.stdout
+    assert told[place] in done.stdout
+    assert done.stdout.count("Cure: ") == 1
+    assert "saved state" not in done.stdout
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("place", ["0", "1"])
+def test_a_unit_without_its_sources_says_what_may_be_wrong(program: Path, unpacked: CtypesHost, place: str):
+    shutil.rmtree(unpacked.folder / "resources" / "sources" / "fmus")
+    done = run(program, unpacked, PATH="/nonexistent", FMU_PYTHON_PROCESS=place)
+    for part in ("cannot be read: the resources folder lacks it", "Either the resource location is wrong, or the FMU"):
+        assert part in done.stdout
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("place", ["0", "1"])
+@pytest.mark.parametrize("locale", ["C", "POSIX", "C.UTF-8"])
+def test_a_folder_of_any_name_serves_in_any_locale(
+    program: Path, unpacked: CtypesHost, tmp_path: Path, place: str, locale: str
+):
+    resources = shutil.copytree(unpacked.folder / "resources", tmp_path / "größe 100% #a" / "resources")
+    references = [str(unpacked.references[name]) for name in ("a", "b")]
+    command: list[str | Path] = [program, unpacked.library._name, unpacked.token, resources.as_uri(), *references]
+    bare = {"PATH": "/nonexistent", "LC_ALL": locale, "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = call(command, {**bare, "FMU_PYTHON_PROCESS": place})
+    assert done.stdout.splitlines() == [VALUE] * 2
+
+
+@pytest.mark.parametrize("place", ["0", "1"])
+def test_names_in_a_blocks_modules_may_be_of_any_script(program: Path, unpacked: CtypesHost, place: str):
+    module = unpacked.folder / "resources" / "sources" / "sample_units" / "every_kind.py"
+    with module.open("a", encoding="utf-8") as file:
+        file.write("\nω = 3\n\nclass Ünit:\n    größe = ω\n")
+    done = run(program, unpacked, PATH="/nonexistent", FMU_PYTHON_PROCESS=place)
+    assert done.stdout.splitlines() == [VALUE] * 2
 
 
 def test_a_library_that_is_no_python_is_named(program: Path, unpacked: CtypesHost):

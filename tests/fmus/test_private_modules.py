@@ -112,3 +112,25 @@ def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
 
 def test_an_explanation_of_a_refusal_has_no_traceback():
     assert loader.explain(loader.Refusal("why")) == "why"
+
+
+def test_the_prefix_of_a_units_modules_is_told_nowhere(workshop: Workshop):
+    host = workshop.host("every_kind:EveryKind", 3)
+    assert host.initialise() == OK
+    host.set("a", [666.0])
+    assert host.step(0.0, 1 / 64) != OK
+    assert "\nsample_units.every_kind.Misfortune: the number of the beast" in host.log[-1]
+    assert "_fmu_" not in host.log[-1]
+
+
+def test_a_path_keeps_all_its_parts():
+    error = ValueError("in /tmp/_fmu_12.d/a.py: <_fmu_12ab.plants.arm.Arm object>, _fmu_12ab.größe.Ünit")
+    assert loader.explain(error) == "ValueError: in /tmp/_fmu_12.d/a.py: <plants.arm.Arm object>, größe.Ünit"
+
+
+def test_two_builds_in_one_folder_are_told_with_a_cure(workshop: Workshop):
+    host = workshop.host("scalars:Scalars", 3)
+    host.free()
+    assert not host.instantiate(token="{0}")
+    for part in ("token {0} is not that of the resources", "of two different builds. Cure: unpack the FMU again"):
+        assert part in host.log[-1]

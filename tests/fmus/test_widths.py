@@ -62,13 +62,33 @@ def test_a_single_is_widened_on_its_way_in_and_rounded_on_its_way_out(workshop: 
     assert list(three) == [2.0 * float(np.float32(entry)) for entry in (0.1, 0.2, math.pi)]
 
 
-def test_what_a_single_cannot_hold_is_refused_when_it_is_read(workshop: Workshop):
-    host = workshop.host(BLOCK, 3)
-    transfer(host, "Set", "Float32", "stretch", (ctypes.c_float * 1)(1e38))
-    transfer(host, "Set", "Float32", "x", (ctypes.c_float * 1)(1e38))
+def set_real(host: CtypesHost, name: str, *values: float) -> int:
+    if host.fmi == 2:
+        return host.set(name, values)
+    return transfer(host, "Set", "Float32", name, (ctypes.c_float * len(values))(*values))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("name", "values", "told"),
+    [
+        ("x", (1e38,), "DoStep: output 'x_out' is 5e+75; it is declared as Float32, up to 3.40282e+38"),
+        ("x", (-1e38,), "DoStep: output 'x_out' is -5e+75; it is declared as Float32"),
+        ("v", (0.0, 0.0, 3e38), "is 6e+38"),
+    ],
+)
+def test_a_step_whose_output_no_single_holds_is_an_error(
+    workshop: Workshop, fmi: int, name: str, values: tuple[float, ...], told: str
+):
+    host = workshop.host(BLOCK, fmi)
+    assert set_real(host, "stretch", 5e37) == OK
     assert host.initialise() == OK
-    assert transfer(host, "Get", "Float32", "x_out", (ctypes.c_float * 1)()) == ERROR
-    assert "the value 1e+76 of 'x_out' is beyond Float32" in host.log[-1]
+    assert host.step(0.0, 0.5) == OK
+    assert set_real(host, name, *values) == OK
+    assert host.step(0.5, 0.5) == ERROR
+    assert told in host.log[-1]
+    assert host.step(0.5, 0.5) == ERROR
+    assert "failed: only reset" in host.log[-1]
 
 
 @pytest.mark.parametrize(
