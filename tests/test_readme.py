@@ -166,6 +166,10 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
     (tmp_path / "spring.py").write_text(PROGRAMS[1])
     printed = program(PROGRAMS[2], tmp_path)
     assert (tmp_path / printed.strip()).is_file()
+    (command,) = re.findall(r"`(handover build spring:Spring [^`]*)`", README)
+    done = handover(command, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert printed.strip() in done.stdout
 
 
 @pytest.mark.slow
