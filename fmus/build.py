@@ -5,6 +5,7 @@ import importlib
 import importlib.util
 import json
 import os
+import sys
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -150,7 +151,7 @@ def build(
 
 
 def _check_step(step: object) -> None:
-    if not isinstance(step, Rational) or step <= 0:
+    if not isinstance(step, Rational) or not sys.float_info.min <= step <= sys.float_info.max:
         raise UnusableStep(step)
 
 

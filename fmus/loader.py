@@ -220,7 +220,13 @@ def _source(path: str) -> str:
     """Return a module's source; tracebacks keep its lines though the host may delete the FMU's folder."""
     if os.path.isdir(path):
         return ""
-    with open(path, encoding="utf-8") as file:
-        source = file.read()
+    with open(path, "rb") as file:
+        content = file.read()
+    try:
+        source = content.decode()
+    except UnicodeDecodeError as error:
+        raise SyntaxError(f"not UTF-8: {error}", (path, content.count(b"\n", 0, error.start) + 1, None, None)) from None
+    if "\0" in source:
+        raise SyntaxError("a zero byte", (path, source.count("\n", 0, source.index("\0")) + 1, None, None))
     linecache.cache[path] = (len(source), None, source.splitlines(keepends=True), path)
     return source

@@ -135,7 +135,7 @@ def _path_in_fmu(module: str, spec: ModuleSpec) -> str:
 def _imports(source: Path, package: str) -> list[str]:
     """Return the absolute names that a source may import; of `from a import b` both a and a.b, as b may be a module."""
     found: list[str] = []
-    for node in _running(ast.parse(source.read_text(encoding="utf-8"))):
+    for node in _running(ast.parse(source.read_bytes(), filename=str(source))):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

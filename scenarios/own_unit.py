@@ -42,6 +42,6 @@ def _seconds(text: str) -> Fraction:
         step = Fraction(text)
     except (ValueError, ZeroDivisionError):
         step = Fraction(0)
-    if step <= 0:
+    if not sys.float_info.min <= step <= sys.float_info.max:
         raise BadCall(f"--step {text!r} is not a positive number of seconds, such as 0.01 or 1/30")
     return step

@@ -10,17 +10,23 @@
 #define DERIVATIVES "derivatives of inputs and outputs with respect to time are not provided"
 #define MODEL_EXCHANGE "this unit is a co-simulation slave, it has no model-exchange form"
 
+#define MOST_LOGGED 1800 /* characters: hosts print a message into a buffer of, often, 2 kB and lose what is beyond */
+
 /* A logger's message is a printf format in which # begins a reference to a variable: both are doubled. */
 static void log_message(const Instance *instance, Status status, const char *category, const char *message) {
-    char *escaped = malloc(2 * strlen(message) + 1);
-    if (!escaped) return;
-    char *to = escaped;
-    for (; *message; *to++ = *message++)
-        if (*message == '%' || *message == '#') *to++ = *message;
-    *to = 0;
-    fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->host_logger;
-    logger(instance->host_environment, instance->name, (fmi2Status)status, category, escaped);
+    Text kept = {0};
+    text_add_shortened(&kept, message, MOST_LOGGED);
+    char *escaped = malloc(2 * kept.length + 1);
+    if (escaped) {
+        char *to = escaped;
+        for (const char *from = text_of(&kept); *from; *to++ = *from++)
+            if (*from == '%' || *from == '#') *to++ = *from;
+        *to = 0;
+        fmi2CallbackLogger logger = (fmi2CallbackLogger)instance->host_logger;
+        logger(instance->host_environment, instance->name, (fmi2Status)status, category, escaped);
+    }
     free(escaped);
+    text_clear(&kept);
 }
 
 #define BEGIN(modes)        \

@@ -25,6 +25,16 @@ void text_add(Text *text, const char *format, ...) {
     va_end(arguments);
 }
 
+void text_add_shortened(Text *text, const char *string, size_t most) {
+    size_t length = strlen(string), head = most / 3;
+    while (length > most && head > 0 && string[head] != '\n') head--;
+    const char *tail = length > most ? strchr(string + length - most / 2, '\n') : NULL;
+    if (head > 0 && tail)
+        text_add(text, "%.*s\n  [...]%s", (int)head, string, tail);
+    else
+        text_add(text, "%s", string);
+}
+
 void text_clear(Text *text) {
     free(text->chars);
     *text = (Text){0};

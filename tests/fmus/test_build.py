@@ -40,7 +40,7 @@ def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_pat
         build_block("sample_units.every_kind:EveryKind", 1, tmp_path)
 
 
-@pytest.mark.parametrize("step", [Fraction(0), Fraction(-1), 0, 0.1, "soon"])
+@pytest.mark.parametrize("step", [Fraction(0), Fraction(-1), 0, 0.1, "soon", Fraction("1e400"), Fraction("1e-400")])
 def test_a_step_that_is_none_is_refused_before_anything_is_written(tmp_path: Path, step: Any):
     with pytest.raises(UnusableStep, match=r"such as Fraction\(1, 100\), is right") as caught:
         build_block("sample_units.every_kind:EveryKind", 3, tmp_path / "out", step=step)

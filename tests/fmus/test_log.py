@@ -5,6 +5,7 @@ import json
 
 import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from sample_units.trouble import Deed
 from workshop import Workshop
 
 from cosim.exceptions import UnitRefused
@@ -42,6 +43,24 @@ def test_in_fmi_2_the_host_gets_the_name_beside_the_message(workshop: Workshop):
     assert host.step(7.0, 0.1) == ERROR
     assert host.names == ["x"]
     assert host.log[0].startswith("fmi2DoStep: the step begins")
+
+
+def test_a_long_traceback_keeps_its_end_within_what_hosts_of_fmi_2_print(workshop: Workshop):
+    messages: dict[int, str] = {}
+    for fmi in (2, 3):
+        host = workshop.host("trouble:Trouble", fmi)
+        assert host.initialise() == OK
+        deed = (ctypes.c_uint32 * 1)(host.references["deed"])
+        if fmi == 2:
+            assert host.call("SetInteger", deed, SIZE(1), (ctypes.c_int * 1)(Deed.FAIL_DEEP_DOWN)) == OK
+        else:
+            assert host.call("SetInt64", deed, SIZE(1), (ctypes.c_int64 * 1)(Deed.FAIL_DEEP_DOWN), SIZE(1)) == OK
+        assert host.step(0.0, 0.1) == ERROR
+        messages[fmi] = host.log[-1]
+    assert len(messages[3]) > 2048 > len(messages[2])
+    assert messages[2].startswith("fmi2DoStep: Traceback")
+    assert "\n  [...]\n" in messages[2]
+    assert all(m.endswith("RuntimeError: the deepest reason") for m in messages.values())
 
 
 def test_a_refused_kind_of_instance_is_told_with_its_name(workshop: Workshop):

@@ -89,20 +89,31 @@ def test_what_cannot_be_tried_says_where_the_reason_is(tmp_path: Path):
     assert result.output.splitlines()[-1].startswith("not usable as it is (1 fault")
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_a_source_that_python_cannot_read_is_told_with_file_and_line(tmp_path: Path, fmi: int):
+@pytest.mark.parametrize(
+    ("fmi", "spoilt", "fault"),
+    [
+        (2, b"x = 1\ny = = 2\n", "invalid syntax"),
+        (3, b"x = 1\ny = = 2\n", "invalid syntax"),
+        (2, b"x = 1\ny = '\0'\n", "a zero byte"),
+        (3, b"x = 1\ny = '\xf6'\n", "not UTF-8: "),
+    ],
+)
+def test_a_source_that_python_cannot_read_is_told_with_file_and_line(
+    tmp_path: Path, fmi: int, spoilt: bytes, fault: str
+):
     file = tmp_path / "x.fmu"
     source = "resources/sources/" + UNITS["Push"].block.partition(":")[0].replace(".", "/") + ".py"
     with zipfile.ZipFile(cached("Push", fmi)) as original, zipfile.ZipFile(file, "w") as target:
         for name in original.namelist():
-            target.writestr(name, original.read(name) if name != source else b"x = 1\ny = = 2\n")
+            target.writestr(name, original.read(name) if name != source else spoilt)
     result = check(file)
     assert result.exit_code == 1
     place = source.removeprefix("resources/sources/")
-    assert f"- instantiation: SyntaxError: invalid syntax ({place}, line 2)" in result.output
+    told = re.search(rf"- instantiation: SyntaxError: {fault}.*\({place}, line 2\)", result.output, re.DOTALL)
+    assert told, result.output
     lines = result.output.splitlines()
     assert any(line.startswith(" " * 13 + "|   File ") and line.endswith(f'{source}", line 2') for line in lines)
-    assert " " * 13 + "| SyntaxError: invalid syntax" in lines
+    assert any(line.startswith(" " * 13 + f"| SyntaxError: {fault}") for line in lines)
 
 
 def test_the_worst_of_several_files_decides(broken: Path):

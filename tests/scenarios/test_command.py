@@ -115,6 +115,8 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("build", "nowhere:Spring"), "module 'nowhere' cannot be found"),
         (("build", "failing_arm:Nothing"), "has no class 'Nothing'"),
         (("build", "failing_arm:RunTime", "--step", "soon"), "--step 'soon' is not a positive number of seconds"),
+        (("build", "failing_arm:RunTime", "--step", "1e400"), "--step '1e400' is not a positive number of seconds"),
+        (("build", "failing_arm:RunTime", "--step", "1e-400"), "--step '1e-400' is not a positive number of seconds"),
         (("build", "failing_arm:Inputs"), "failing_arm:Inputs: Inputs.feedthrough, period, outputs, step, get_state"),
         (("build", "Push", "--step", "0.1"), "--step is for units of your own"),
         (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),

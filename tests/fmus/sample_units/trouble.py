@@ -23,6 +23,7 @@ class Deed(enum.IntEnum):
     SYSTEM_EXIT = 5
     INTERRUPT = 6
     LEAVE_A_CHILD = 7
+    FAIL_DEEP_DOWN = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +82,19 @@ def do(deed: Deed) -> None:
         raise SystemExit(3)
     if deed is Deed.INTERRUPT:
         raise KeyboardInterrupt
+    if deed is Deed.FAIL_DEEP_DOWN:
+        even(30)
     if deed is Deed.LEAVE_A_CHILD:
         if os.fork() == 0:
             threading.Event().wait()  # with the channel open
         os._exit(7)
+
+
+def even(depth: int) -> None:
+    odd(depth - 1)
+
+
+def odd(depth: int) -> None:
+    if depth < 0:
+        raise RuntimeError("the deepest reason")
+    even(depth - 1)
