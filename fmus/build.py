@@ -151,7 +151,8 @@ def build(
 
 
 def _check_step(step: object) -> None:
-    if not isinstance(step, Rational) or not sys.float_info.min <= step <= sys.float_info.max:
+    exact = Fraction(step) if isinstance(step, Rational) else Fraction(0)
+    if not sys.float_info.min <= exact <= sys.float_info.max:
         raise UnusableStep(step)
 
 
