@@ -30,8 +30,8 @@ class Block(Protocol):
     def step(self, t: float, dt: float, u: Any) -> Any:
         """Advance from t by dt with u held and return the outputs at t + dt.
 
-        A sampled block is stepped by its period only, once at each tick, with the inputs of that instant; a host sees the
-        outputs at once, and they hold until the next tick.
+        A sampled block is stepped by its period only, once at each tick, with the inputs of that instant; a host sees
+        the outputs at once, and they hold until the next tick.
         """
         ...
 
