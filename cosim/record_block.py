@@ -78,7 +78,7 @@ class RecordBlock:
         Raises:
             FileLocked: a running process records into that file. OSError: it cannot be made.
         """
-        parts = [(a.dtype.str, len(a)) for a in sources]
+        parts: list[tuple[str, int]] = [(a.dtype.str, len(a)) for a in sources]
         row = 8 + sum(a.itemsize * len(a) for a in sources)
         capacity = min(max(_BYTES // row, _LEAST_ROWS), _MOST_ROWS)
         layout = json.dumps({**about, "capacity": capacity, "parts": parts}).encode()

@@ -13,6 +13,7 @@ from cosim.signals import Column
 from cosim.variable import Kind
 from cosim.width import Width
 
+_WIDE: dict[Any, Any] = {pa.float64(): np.float64, pa.int64(): np.int64, pa.uint64(): np.uint64, pa.bool_(): np.bool_}
 _TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}
 
 
@@ -30,12 +31,11 @@ class RecordColumns:
     def batch(self, block: RecordBlock, begin: int = 0) -> "pa.RecordBatch":
         """Return a block's rows from row `begin` of the block on as columns."""
         end = block.filled
-        turned = [np.ascontiguousarray(part.rows[begin:end].T) for part in block.parts]
-        arrays: list[pa.Array[Any]] = [pa.array(block.time[begin:end].copy())]
-        for field, (part, place) in zip(list(self.schema)[1:], self.places, strict=True):
-            values = turned[part][place]
-            kind = bool if field.type == pa.bool_() else field.type.to_pandas_dtype()
-            arrays.append(pa.array(values.astype(kind, copy=False)))
+        turned: list[NDArray[Any]] = [part.rows[begin:end].T.copy(order="C") for part in block.parts]
+        columns: list[NDArray[Any]] = [block.time[begin:end].copy()]
+        for kind, (part, place) in zip(self.schema.types[1:], self.places, strict=True):
+            columns.append(turned[part][place].astype(_WIDE[kind], copy=False))
+        arrays: list[pa.Array[Any]] = [pa.array(column) for column in columns]
         return pa.RecordBatch.from_arrays(arrays, schema=self.schema)
 
 
@@ -56,6 +56,16 @@ def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArr
         places.append((part_of[id(whole)], first + c.index))
     time = pa.field("time", pa.float64(), metadata={"unit": "s", "description": "simulated time"})
     return RecordColumns(pa.schema([time, *(_field(c) for c in columns)]), places), wholes
+
+
+def told_of(schema: "pa.Schema") -> list[tuple[str, dict[str, str]]]:
+    """Return of each column its name and what is told of it: `unit`, `description`, and `items` of an enumeration."""
+    told: list[tuple[str, dict[str, str]]] = []
+    for name in schema.names:
+        metadata: dict[bytes, bytes] = schema.field(name).metadata or {}
+        known = {"unit": "1", "description": "", "items": ""}
+        told.append((name, known | {k.decode(): v.decode() for k, v in metadata.items()}))
+    return told
 
 
 def _type_of(c: Column) -> "pa.DataType":

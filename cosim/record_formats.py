@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Generator, Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
+from cosim.record_columns import told_of
 from cosim.record_mat import write_mat
 
 WriteRecord = Callable[[Path, "pa.Schema", Iterable["pa.RecordBatch"]], None]
@@ -21,7 +21,7 @@ def write_parquet(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordB
     """Write Parquet; units, descriptions and enumerations' items are in the columns' metadata."""
     with pq.ParquetWriter(path, schema) as file:
         for group in _row_groups(schema, batches):
-            file.write_batch(group, row_group_size=group.num_rows)
+            file.write_table(group, row_group_size=group.num_rows)
 
 
 def write_csv(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> None:
@@ -29,7 +29,7 @@ def write_csv(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch
 
     Numbers have as many digits as it takes to read the same numbers back; truths are `true` and `false`.
     """
-    titled = pa.schema([field.with_name(_title(field)) for field in schema])
+    titled = schema.empty_table().rename_columns([_title(name, told["unit"]) for name, told in told_of(schema)]).schema
     with pyarrow.csv.CSVWriter(path, titled) as file:
         for batch in batches:
             file.write_batch(pa.RecordBatch.from_arrays(batch.columns, schema=titled))
@@ -39,22 +39,18 @@ RECORD_FORMATS: Mapping[str, WriteRecord] = {"parquet": write_parquet, "csv": wr
 """Forms by name, which is also the file's suffix."""
 
 
-def _row_groups(schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> Generator["pa.RecordBatch", None, None]:
+def _row_groups(schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> Generator["pa.Table", None, None]:
     """Cut rows into groups that depend on the number of columns alone, not on when rows were flushed."""
     rows = min(max(_VALUES // len(schema), _LEAST_ROWS), _MOST_ROWS)
-    waiting: list[pa.RecordBatch] = []
-    have = 0
+    waiting = schema.empty_table()
     for batch in batches:
-        waiting.append(batch)
-        have += batch.num_rows
-        while have >= rows:
-            whole = pa.concat_batches(waiting)
-            yield whole.slice(0, rows)
-            waiting, have = [whole.slice(rows)], have - rows
-    if have:
-        yield pa.concat_batches(waiting)
+        waiting = pa.concat_tables([waiting, pa.Table.from_batches([batch])])
+        while waiting.num_rows >= rows:
+            yield waiting.slice(0, rows).combine_chunks()
+            waiting = waiting.slice(rows)
+    if waiting.num_rows:
+        yield waiting.combine_chunks()
 
 
-def _title(field: "pa.Field[Any]") -> str:
-    unit = (field.metadata or {}).get(b"unit", b"1").decode()
-    return field.name if unit in ("", "1") else f"{field.name} [{unit}]"
+def _title(name: str, unit: str) -> str:
+    return name if unit in ("", "1") else f"{name} [{unit}]"

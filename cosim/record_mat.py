@@ -1,13 +1,15 @@
 """Writes a record as OpenModelica and Dymola write their results: MATLAB's level 4, arranged as a trajectory."""
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+
+from cosim.record_columns import told_of
 
 _DOUBLE, _INT32, _TEXT = 0, 20, 51  # type and kind of a matrix, little-endian
 _HEAD = struct.Struct("<5i")  # type, rows, columns, imaginary, bytes of the name
@@ -25,22 +27,21 @@ def write_mat(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch
 
     Source: OpenModelica User's Guide, "Simulation result files"; MATLAB's "MAT-File Format", level 4.
     """
-    names = [field.name for field in schema]
-    info = np.array([[2, i + 1, 0, -1] for i in range(len(names))], dtype="<i4")
+    told = told_of(schema)
+    info = np.array([[2, i + 1, 0, -1] for i in range(len(told))], dtype="<i4")
     info[0, 0] = 0  # time is in all matrices
     with open(path, "wb") as file:
-        rows = ["Atrajectory", "1.1", "", "binTrans"]
-        _write_head(file, "Aclass", _TEXT, (4, 11))
-        file.write(_columns_of([*map("".join, zip(*(r.ljust(11) for r in rows), strict=True))]))
-        _write_texts(file, "name", names)
-        _write_texts(file, "description", [_description(field) for field in schema])
-        _write_head(file, "dataInfo", _INT32, (4, len(names)))
+        rows = [row.ljust(11) for row in ("Atrajectory", "1.1", "", "binTrans")]
+        _write_texts(file, "Aclass", ["".join(column) for column in zip(*rows, strict=True)])
+        _write_texts(file, "name", [name for name, _ in told])
+        _write_texts(file, "description", [_description(known) for _, known in told])
+        _write_head(file, "dataInfo", _INT32, (4, len(told)))
         file.write(info.tobytes())
         _write_head(file, "data_1", _DOUBLE, (1, 2))
         limits_at = file.tell()
         file.write(np.zeros(2).tobytes())
         head_at = file.tell()
-        _write_head(file, "data_2", _DOUBLE, (len(names), 0))
+        _write_head(file, "data_2", _DOUBLE, (len(told), 0))
         count, first, last = 0, 0.0, 0.0
         for batch in batches:
             if not batch.num_rows:
@@ -52,36 +53,30 @@ def write_mat(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch
         file.seek(limits_at)
         file.write(np.array([first, last], dtype="<f8").tobytes())
         file.seek(head_at)
-        _write_head(file, "data_2", _DOUBLE, (len(names), count))
+        _write_head(file, "data_2", _DOUBLE, (len(told), count))
 
 
 def _doubles(batch: "pa.RecordBatch") -> NDArray[np.float64]:
     """Return a batch as [rows, columns]."""
-    columns = [c.to_numpy(zero_copy_only=False) for c in batch.columns]
-    return np.column_stack([c.astype("<f8") for c in columns])
+    values = np.empty((batch.num_rows, batch.num_columns), dtype="<f8")
+    for i in range(batch.num_columns):
+        column: NDArray[Any] = batch.column(i).to_numpy(zero_copy_only=False)
+        values[:, i] = column
+    return values
 
 
-def _description(field: "pa.Field[Any]") -> str:
-    told = field.metadata or {}
-    text = told.get(b"description", b"").decode()
-    if items := told.get(b"items", b"").decode():
-        text = f"{text} ({items})" if text else items
-    unit = told.get(b"unit", b"1").decode()
-    if unit in ("", "1"):
-        return text
-    return f"{text} [{unit}]" if text else f"[{unit}]"
+def _description(told: Mapping[str, str]) -> str:
+    unit = "" if told["unit"] in ("", "1") else f"[{told['unit']}]"
+    items = f"({told['items']})" if told["items"] else ""
+    return " ".join(text for text in (told["description"], items, unit) if text)
 
 
 def _write_texts(file: IO[bytes], name: str, texts: Sequence[str]) -> None:
-    """Write texts as the columns of a matrix, padded with zero bytes as OpenModelica does."""
+    """Write texts as the columns of a matrix, padded with blanks as Dymola does: not all readers take zero bytes."""
     coded = [t.encode() for t in texts]
     longest = max(map(len, coded)) or 1
     _write_head(file, name, _TEXT, (longest, len(coded)))
-    file.write(b"".join(t.ljust(longest, b"\0") for t in coded))
-
-
-def _columns_of(columns: Sequence[str]) -> bytes:
-    return "".join(columns).encode()
+    file.write(b"".join(t.ljust(longest) for t in coded))
 
 
 def _write_head(file: IO[bytes], name: str, kind: int, shape: tuple[int, int]) -> None:

@@ -32,7 +32,8 @@ from cosim.system import System
 s = System()
 s.add("counter", Path({str(fmu("Counter"))!r}))
 with Master(s) as master, Recorder(Path({str(file)!r}), ["csv"]) as recorder:
-    master.run(Fraction(10**6), [recorder], until=lambda: recorder.rows == {rows} and os.kill(os.getpid(), signal.SIGKILL))
+    kill = lambda: recorder.rows == {rows} and os.kill(os.getpid(), signal.SIGKILL)
+    master.run(Fraction(10**6), [recorder], until=kill)
 """
     done = subprocess.run([sys.executable, "-c", program], check=False)
     assert done.returncode == -signal.SIGKILL
@@ -48,7 +49,7 @@ def test_a_process_that_died_between_stream_and_counter_left_no_row_twice(tmp_pa
     x = np.zeros(1)
     recorder = Recorder(file)
     _record(recorder, x, 10)
-    counters = recorder.block.counters.copy()
+    counters = np.array(recorder.block.counters)
     recorder.flush()
     recorder.block.counters[:] = counters  # what the system would still hold then
     _abandon(recorder)
@@ -63,7 +64,7 @@ def test_a_stream_that_is_cut_off_within_a_block_costs_no_row(tmp_path: Path):
     _record(recorder, x, 10)
     recorder.flush()
     _record(recorder, x, 7)
-    counters = recorder.block.counters.copy()
+    counters = np.array(recorder.block.counters)
     recorder.flush()
     recorder.block.counters[:] = counters
     _abandon(recorder)
