@@ -254,7 +254,7 @@ def _description3(d: Declaration, step: float, dependencies: bool, flags: dict[s
     structure = ElementTree.SubElement(root, "ModelStructure")
     for group in ("Output", "InitialUnknown"):
         for v in d.variables:
-            if v.causality == OUTPUT and (group == "Output" or v.type != CLOCK):
+            if v.causality == OUTPUT and (group == "Output" or not v.clock):
                 known = _dependencies(d, v, with_parameters=group == "InitialUnknown") if dependencies else {}
                 ElementTree.SubElement(structure, group, {"valueReference": str(v.reference), **known})
     return _text(root)

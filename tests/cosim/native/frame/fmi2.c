@@ -25,6 +25,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     unit->owner = (void *)functions->logger;
     unit->environment = functions->componentEnvironment;
     unit->log = log_fmi2;
+    unit->fmi = 2;
     if (unit->model->created)
         unit->model->created(unit);
     return unit;

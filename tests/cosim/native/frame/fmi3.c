@@ -30,6 +30,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     unit->owner = (void *)logger;
     unit->environment = environment;
     unit->log = log_fmi3;
+    unit->fmi = 3;
     unit->event_mode = event_mode && unit->model->abilities & EVENTS;
     unit->early_return = early_return && unit->model->abilities & EARLY_RETURN;
     if (unit->model->created)

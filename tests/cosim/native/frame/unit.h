@@ -60,7 +60,7 @@ typedef struct {
     void (*created)(Unit *);                                     /* an instance is there */
     void (*initialize)(Unit *);                                  /* states from parameters */
     void (*outputs)(Unit *);                                     /* outputs from states and inputs */
-    enum status (*step)(Unit *, double t, double h, StepEnd *);  /* must not change anything where it discards */
+    enum status (*step)(Unit *, double t, double h, StepEnd *);
     void (*update)(Unit *, Update *);                            /* discrete states, at an event */
 } Model;
 
@@ -74,6 +74,7 @@ typedef struct {
 
 struct Unit {
     const Model *model;
+    int fmi;     /* the standard's version, 2 or 3 */
     void *owner; /* of the standard's side: how to log */
     bool event_mode, early_return;
     char name[128];
@@ -92,6 +93,10 @@ void say(Unit *unit, enum status status, const char *format, ...) __attribute__(
 
 /* An input `since` seconds after the step began, by the time derivatives that were set. */
 double input_at(Unit *unit, const double *field, double since);
+
+/* x'' = a(t, x, x') over h, by the classical Runge-Kutta method with steps of at most 1 ms. */
+typedef double (*Acceleration)(Unit *unit, double since, double x, double v);
+void runge_kutta(Unit *unit, Acceleration a, double h, double *x, double *v);
 
 /* for the standards' sides */
 Unit *new_unit(const char *token, const char *name);
