@@ -57,6 +57,14 @@ class InvalidFmu(CosimError):
         self.path, self.fault, self.log = path, fault, tuple(log)
 
 
+class InvalidSsp(CosimError):
+    """A file is not an SSP that can be used; `faults` lists what is wrong with it, each with where and what is right."""
+
+    def __init__(self, path: Path, faults: Sequence[str]) -> None:
+        super().__init__(f"{path}: {'; '.join(faults)}")
+        self.path, self.faults = path, tuple(faults)
+
+
 class WiringError(CosimError):
     """A system is wired wrongly; `faults` lists everything that is wrong with it."""
 
