@@ -47,14 +47,15 @@ class ModelDescription(Protocol):
     outputs: list[Any]
 
 
-def read_description(path: Path) -> ModelDescription:
-    """Read and validate the model description of a co-simulation FMU.
+def read_description(path: Path) -> tuple[ModelDescription, XmlElement]:
+    """Read and validate the model description of a co-simulation FMU; return it with its XML, for what FMPy leaves out.
 
     Raises:
         InvalidFmu: with what is wrong with the file.
     """
     archive = FmuArchive(path)
-    version_of(path, checked_xml(archive))
+    root = checked_xml(archive)
+    version_of(path, root)
     try:
         md: Any = fmpy.read_model_description(str(path))
     except (
@@ -63,7 +64,7 @@ def read_description(path: Path) -> ModelDescription:
         raise InvalidFmu(path, f"its modelDescription.xml is not valid: {one_line(e)}") from e
     if md.coSimulation is None:
         raise InvalidFmu(path, "it has no co-simulation interface")
-    return cast(ModelDescription, md)
+    return cast(ModelDescription, md), root
 
 
 def checked_xml(archive: FmuArchive) -> XmlElement:
@@ -127,9 +128,9 @@ def required_functions(fmi: int) -> list[str]:
     return sorted(name for name in dir(slave) if name.startswith(f"fmi{fmi}"))
 
 
-def mime_types(path: Path) -> dict[str, str]:
+def mime_types(root: XmlElement) -> dict[str, str]:
     """Return the MIME types of an FMI 3 FMU's binary variables by name; FMPy does not read them."""
-    variables = checked_xml(FmuArchive(path)).named("ModelVariables", "Binary")
+    variables = root.named("ModelVariables", "Binary")
     return {e.get("name"): e.get("mimeType", "application/octet-stream") for e in variables}
 
 

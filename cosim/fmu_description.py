@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from cosim.capabilities import Capabilities, capabilities_of
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
 from cosim.units import UNKNOWN, BaseExponents, Unit
 from cosim.variable import Causality, Declared, Kind
@@ -77,6 +78,7 @@ class FmuDescription:
     feedthrough: Mapping[str, tuple[str, ...]]
     presumed_feedthrough: Mapping[str, tuple[str, ...]]
     sampled: bool
+    capabilities: Capabilities = Capabilities()
 
 
 def describe_fmu(path: Path) -> FmuDescription:
@@ -85,10 +87,10 @@ def describe_fmu(path: Path) -> FmuDescription:
     Raises:
         InvalidFmu: the file is missing, not an FMU, of another standard, or has no co-simulation interface.
     """
-    md = read_description(path)
+    md, root = read_description(path)
     is_fmi2 = md.fmiVersion == "2.0"
     units = {u.name: _unit(u) for u in md.unitDefinitions}
-    mimes = {} if is_fmi2 else mime_types(path)
+    mimes = {} if is_fmi2 else mime_types(root)
     ports = [_port(v, units, mimes) for v in md.modelVariables if v.causality in ("parameter", "input", "output")]
     ports = [p for p in ports if p is not None]
     grouped = _group_elements(ports)
@@ -98,7 +100,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         by_causality[p.causality][p.name] = p
     declared, presumed = _feedthrough(md, owner, by_causality[Causality.INPUT])
     outputs = [v for v in md.modelVariables if v.causality == "output"]
-    fixed_step = not md.coSimulation.canHandleVariableCommunicationStepSize
+    capabilities = capabilities_of(root, 2 if is_fmi2 else 3)
     return FmuDescription(
         path=path,
         fmi=2 if is_fmi2 else 3,
@@ -111,7 +113,8 @@ def describe_fmu(path: Path) -> FmuDescription:
         outputs=by_causality[Causality.OUTPUT],
         feedthrough=declared,
         presumed_feedthrough=presumed,
-        sampled=bool(outputs) and fixed_step and all(v.variability == "discrete" for v in outputs),
+        sampled=bool(outputs) and not capabilities.varies_step and all(v.variability == "discrete" for v in outputs),
+        capabilities=capabilities,
     )
 
 

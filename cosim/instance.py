@@ -13,6 +13,9 @@ from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 from cosim.variable import Kind
 
+State = ctypes.c_void_p
+"""A saved state of one instance, which alone knows what it points to."""
+
 _LOG_LINES = 30
 _FATAL = 4
 
@@ -96,6 +99,28 @@ class Instance:
         if self._fmi == 3 and self._terminate.value:
             raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
         self.time = t + dt
+
+    def save_state(self) -> State:
+        """Let the unit save its state; it is freed by `free_state`.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state = State()
+        self._call("GetFMUstate" if self._fmi == 2 else "GetFMUState", ctypes.byref(state))
+        return state
+
+    def restore_state(self, state: State) -> None:
+        """Go back to a saved state of this instance, which may be used again.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        self._call("SetFMUstate" if self._fmi == 2 else "SetFMUState", state)
+
+    def free_state(self, state: State) -> None:
+        """Free a saved state."""
+        self._call("FreeFMUstate" if self._fmi == 2 else "FreeFMUState", ctypes.byref(state))
 
     def end(self) -> None:
         """Terminate the unit, unless a call failed: the standards forbid it then."""

@@ -1,23 +1,23 @@
-"""Runs a system of FMUs: loads them, wires their buffers, steps them on the schedule's grid."""
+"""Runs a system of FMUs: checks it, loads it, and takes it from one communication point to the next."""
 
 import array
-import contextlib
-import tempfile
-import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
-from pathlib import Path
 from types import TracebackType
-from typing import Any
 
-from cosim.exceptions import CosimError, UnitFailure, UnitRefused
-from cosim.fmpy_edge import unpack
-from cosim.instance import Instance
-from cosim.narrowing import Narrowing, narrows
-from cosim.schedule import Algorithm, Schedule, Slot
-from cosim.signal_buffer import Copy, joined
+from cosim.coupling import Coupling
+from cosim.ensemble import Ensemble
+from cosim.exceptions import UnitFailure, UnitRefused
+from cosim.gauss_seidel import GaussSeidel
+from cosim.grid_stepper import GridStepper
+from cosim.jacobi import Jacobi
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.schedule import Schedule
 from cosim.signals import Signals
+from cosim.stepper import Stepper
 from cosim.system import System
+
+_PLAIN = MasterOptions()
 
 Observer = Callable[[float, Signals], None]
 """Called at every communication point with the time and the signals that hold at that time."""
@@ -29,7 +29,7 @@ def never() -> bool:
 
 
 class Master:
-    """Co-simulates a system of FMUs at fixed steps, each unit at its own rate. Use as a context manager.
+    """Co-simulates a system of FMUs, each unit at its own rate. Use as a context manager.
 
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
@@ -38,38 +38,61 @@ class Master:
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
-    def __init__(self, system: System, algorithm: Algorithm = Algorithm.GAUSS_SEIDEL) -> None:
+    def __init__(self, system: System, options: MasterOptions = _PLAIN) -> None:
         system.check()
         self.system = system
-        self.schedule = Schedule(system, algorithm)
-        self.time = 0.0
-        self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
-        """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
-        self._due: dict[str, int] = dict.fromkeys(system.units, 0)
-        self._instances: dict[str, Instance] = {}
-        self._copies: dict[str, Sequence[Copy]] = {}
-        self._narrowings: dict[str, list[Narrowing]] = {}
-        self._cleanup = contextlib.ExitStack()
+        self.options = options
+        self.schedule = Schedule(system)
+        self._ensemble: Ensemble | None = None
+        self._stepper: Stepper | None = None
 
     def __enter__(self) -> "Master":
-        with self._cleanup as cleanup:
-            self._load(cleanup)
-            try:
-                self._initialize()
-            except UnitFailure as e:
-                raise UnitRefused(e) from e
-            self._cleanup = cleanup.pop_all()
+        ensemble = Ensemble(self.system)
+        try:
+            ensemble.initialize(self.schedule.slots)
+            self._stepper = GridStepper(self.schedule, self._coupling(ensemble))
+        except UnitFailure as e:
+            ensemble.close()
+            raise UnitRefused(e) from e
+        except BaseException:
+            ensemble.close()
+            raise
+        self._ensemble = ensemble
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._cleanup.close()
+        self.ensemble.close()
+
+    @property
+    def ensemble(self) -> Ensemble:
+        """The loaded units; there are none before the master is entered."""
+        if self._ensemble is None:
+            raise RuntimeError("enter the master first: `with Master(system) as master:`")
+        return self._ensemble
+
+    @property
+    def stepper(self) -> Stepper:
+        """What moves the units through time; there is none before the master is entered."""
+        if self._stepper is None:
+            raise RuntimeError("enter the master first: `with Master(system) as master:`")
+        return self._stepper
+
+    @property
+    def time(self) -> float:
+        """Simulated time in seconds."""
+        return 0.0 if self._stepper is None else self._stepper.time
+
+    @property
+    def cpu(self) -> "dict[str, array.array[float]]":
+        """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        return self.ensemble.cpu
 
     @property
     def signals(self) -> Signals:
         """The units' outputs as they are."""
-        return Signals({n: i.y for n, i in self._instances.items()}, self._descriptions(), self)
+        return self.ensemble.signals()
 
     def run(self, stop: Fraction, observers: Sequence[Observer] = (), until: Callable[[], bool] = never) -> None:
         """Step until `stop` seconds, or until `until()` says so after the observers have seen a communication point.
@@ -82,115 +105,15 @@ class Master:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
         signals = self.signals
-        jacobi = self.schedule.algorithm is Algorithm.JACOBI
         last = self.schedule.ticks(stop)
         while True:
-            tick = min(last, *self._due.values())
-            self.time = self.schedule.time(tick)
-            sampled = [s for s in self.schedule.sampled if self._due[s.unit] == tick]
-            continuous = [s for s in self.schedule.continuous if self._due[s.unit] == tick]
-            if jacobi:
-                self._publish(sampled + continuous)
-            else:
-                self._one_after_another(sampled)
+            ended = self.stepper.arrive(last)
             for observe in observers:
-                observe(self.time, signals)
-            if tick == last or until():
+                observe(self.stepper.time, signals)
+            if ended or until():
                 break
-            if jacobi:
-                self._all_at_once(sampled + continuous)
-            else:
-                self._one_after_another(continuous)
+            self.stepper.depart()
 
-    def _one_after_another(self, due: Sequence[Slot]) -> None:
-        began = time.process_time()
-        for slot in due:
-            self._feed(slot.unit)
-            self._step(slot)
-            self._instances[slot.unit].get_outputs()
-            began = self._charge(slot, began)
-
-    def _all_at_once(self, due: Sequence[Slot]) -> None:
-        for slot in due:
-            self._feed(slot.unit)
-        began = time.process_time()
-        for slot in due:
-            self._step(slot)
-            began = self._charge(slot, began)
-
-    def _publish(self, due: Sequence[Slot]) -> None:
-        """Fetch what steps that end now have computed."""
-        for slot in due:
-            self._instances[slot.unit].get_outputs()
-
-    def _feed(self, unit: str, known: Collection[str] | None = None) -> None:
-        """Set a unit's inputs from its sources, or only from those whose outputs are known already."""
-        for narrowing in self._narrowings[unit]:
-            narrowing.check(self.time)
-        for target, source in self._copies[unit]:
-            target[...] = source
-        if known is None:
-            self._instances[unit].set_inputs()
-        else:
-            sources = self.system.sources_of(unit)
-            self._instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
-
-    def _step(self, slot: Slot) -> None:
-        self._instances[slot.unit].step(self.time, slot.period)
-        self._due[slot.unit] += slot.every
-
-    def _charge(self, slot: Slot, began: float) -> float:
-        """Note the CPU time that a unit took since `began`; return what it is by then."""
-        ended = time.process_time()
-        self.cpu[slot.unit].append(ended - began)
-        return ended
-
-    def _load(self, cleanup: contextlib.ExitStack) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        folder = Path(cleanup.enter_context(temporary))
-        unpacked: dict[Path, Path] = {}
-        for name, unit in self.system.units.items():
-            d = unit.description
-            if d.path not in unpacked:
-                unpacked[d.path] = folder / str(len(unpacked))
-                unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name))
-            cleanup.callback(instance.free)
-            self._instances[name] = instance
-        for name, instance in self._instances.items():
-            copies: list[Copy] = []
-            self._narrowings[name] = []
-            for port, source in self.system.sources_of(name).items():
-                other, target = self._instances[source.unit], instance.description.inputs[port]
-                copies += zip(instance.u[port], other.y[source.port], strict=True)
-                if target.width and narrows(other.description.outputs[source.port], target):
-                    values = other.y[source.port][0]
-                    self._narrowings[name].append(Narrowing(str(source), name, port, target.width, values))
-            self._copies[name] = joined(copies)
-
-    def _initialize(self) -> None:
-        for name, unit in self.system.units.items():
-            instance = self._instances[name]
-            instance.set_start(unit.start)
-            instance.enter_initialization(0.0, None)
-        known: set[str] = set()
-        for slot in self.schedule.slots:
-            self._feed(slot.unit, known)
-            self._instances[slot.unit].get_outputs()
-            known.add(slot.unit)
-        for slot in self.schedule.slots:
-            instance = self._instances[slot.unit]
-            self._feed(slot.unit)
-            instance.exit_initialization()
-            instance.get_outputs()
-            self._cleanup_end(instance)
-
-    def _cleanup_end(self, instance: Instance) -> None:
-        def end() -> None:
-            with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
-                instance.end()
-
-        self._cleanup.callback(end)
-
-    def _descriptions(self) -> Mapping[str, Mapping[str, Any]]:
-        return {n: u.description.outputs for n, u in self.system.units.items()}
+    def _coupling(self, ensemble: Ensemble) -> Coupling:
+        kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}
+        return kinds[self.options.algorithm](ensemble)

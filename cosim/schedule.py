@@ -1,6 +1,5 @@
 """When each unit steps and in which order: whole ticks of one exact grid, what is sampled before what goes on."""
 
-import enum
 import logging
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -14,16 +13,6 @@ _log = logging.getLogger(__name__)
 
 _FINEST = 10_000
 """How many ticks the shortest period may have; more means that the periods do not fit each other."""
-
-
-class Algorithm(enum.Enum):
-    """How units that are due at the same time get their inputs.
-
-    JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values.
-    """
-
-    JACOBI = "jacobi"
-    GAUSS_SEIDEL = "gauss-seidel"
 
 
 @dataclass(frozen=True)
@@ -49,9 +38,8 @@ class Schedule:
         ScheduleError: units depend on each other at once in a loop, or their periods fit no common grid.
     """
 
-    def __init__(self, system: System, algorithm: Algorithm = Algorithm.GAUSS_SEIDEL) -> None:
+    def __init__(self, system: System) -> None:
         units = list(system.units.values())
-        self.algorithm = algorithm
         self.tick = _common_divisor(units)
         self.sampled = self._slots(system, [u for u in units if u.sampled])
         self.continuous = self._slots(system, [u for u in units if not u.sampled])

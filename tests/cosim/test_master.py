@@ -13,8 +13,8 @@ import pytest
 
 from cosim.exceptions import InvalidFmu, ScheduleError, UnitFailure, UnitRefused, WiringError
 from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.recorder import Recorder
-from cosim.schedule import Algorithm
 from cosim.signals import Signals
 from cosim.system import System
 from scenarios.record import Record
@@ -37,7 +37,7 @@ def positions(system: System, stop: Fraction, algorithm: Algorithm = Algorithm.G
     def observe(t: float, signals: Signals) -> None:
         seen[t] = float(signals["mass.x"])
 
-    with Master(system, algorithm) as master:
+    with Master(system, MasterOptions(algorithm=algorithm)) as master:
         master.run(stop, [observe])
     return seen
 
@@ -196,7 +196,7 @@ def test_a_plant_with_feedthrough_is_recorded_as_fmpy_records_it(fmu: FmuOf, alg
         str(fmu("Pushed")), stop_time=1.0, output_interval=0.1, start_values={"f": 1.0, "x_0": 0.0}, output=["x", "a"]
     )
     seen: list[tuple[float, float]] = []
-    with Master(s, algorithm) as master:
+    with Master(s, MasterOptions(algorithm=algorithm)) as master:
         master.run(Fraction(1), [lambda t, y: seen.append((t, float(y["mass.x"])))])
     assert [x for _, x in seen] == pytest.approx(result["x"].tolist(), rel=1e-12)
     assert [t for t, _ in seen] == pytest.approx(result["time"].tolist())
@@ -269,6 +269,7 @@ import os
 from fractions import Fraction
 from pathlib import Path
 from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.recorder import Recorder
 from cosim.system import System
 s = System()

@@ -9,7 +9,7 @@ from typing import Any
 from reference import Record
 
 from cosim.master import Master
-from cosim.schedule import Algorithm
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.signals import Signals
 from cosim.system import PortName, System
 
@@ -42,6 +42,6 @@ def run_in_our_own(
         for unit, seen in rows.items():
             seen.append({port: value for name, port, value in columns if name == unit})
 
-    with Master(system, Algorithm.JACOBI) as master:
+    with Master(system, MasterOptions(algorithm=Algorithm.JACOBI)) as master:
         master.run(steps * step, [observe])
     return {name: Record(seen, []) for name, seen in rows.items()}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cosim.block_description import Description, describe
 from cosim.fmu_description import describe_fmu
 from cosim.master import Master
-from cosim.schedule import Algorithm
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.signals import Signals
 from cosim.system import PortName, System
 from cosim.variable import Kind, Variable
@@ -136,6 +136,8 @@ def _run(system: System, unit: str) -> Record:
         rows.append({c.name.removeprefix("unit."): float(c.values[c.index]) for c in columns})
         pictures.append({name: signals[f"unit.{name}"].tobytes() for name in binaries})
 
-    with Master(system, Algorithm.JACOBI) as master:  # step k takes the inputs that hold at its start
+    with Master(
+        system, MasterOptions(algorithm=Algorithm.JACOBI)
+    ) as master:  # step k takes the inputs that hold at its start
         master.run(drive.STEPS * UNITS[unit].step, [observe])
     return Record(rows, pictures)

@@ -8,7 +8,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from cosim.master import Master
-from cosim.schedule import Algorithm
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.signals import Signals
 from cosim.system import System
 from fmus.build import build_block
@@ -66,7 +66,7 @@ def test_a_robot_gets_the_whole_impulse_in_any_order(folder: Path, algorithm: Al
     def observe(t: float, signals: Signals) -> None:  # noqa: ARG001
         speeds.append(float(signals["robot.v_WB"][0]))
 
-    with Master(system, algorithm) as master:
+    with Master(system, MasterOptions(algorithm=algorithm)) as master:
         master.run(Fraction(16, 125), [observe])
     assert speeds[-1] == pytest.approx(5.0 * 0.05 / 9.584, rel=1e-12)
     at_once = push_first and algorithm is Algorithm.GAUSS_SEIDEL

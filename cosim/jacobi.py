@@ -1,0 +1,28 @@
+"""All units step at once from the values at a communication point."""
+
+from collections.abc import Sequence
+
+from cosim.ensemble import Ensemble
+from cosim.schedule import Slot
+
+
+class Jacobi:
+    """A step's results count from the time where it ends, for sampled units too."""
+
+    def __init__(self, ensemble: Ensemble) -> None:
+        self._ensemble = ensemble
+
+    def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
+        """Fetch what steps that end at t have computed."""
+        for slot in (*sampled, *continuous):
+            self._ensemble.publish(slot.unit)
+
+    def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
+        """Set all inputs, then step."""
+        due = (*sampled, *continuous)
+        for slot in due:
+            self._ensemble.feed(slot.unit, t)
+        with self._ensemble.stopwatch() as charge:
+            for slot in due:
+                self._ensemble.step(slot.unit, t, slot.period)
+                charge(slot.unit)
