@@ -58,11 +58,19 @@ class InvalidFmu(CosimError):
 
 
 class InvalidSsp(CosimError):
-    """A file is not an SSP that can be used; `faults` lists what is wrong with it, each with where and what is right."""
+    """A file is not an SSP that can be used; `faults` lists all that is wrong with it, and where."""
 
     def __init__(self, path: Path, faults: Sequence[str]) -> None:
         super().__init__(f"{path}: {'; '.join(faults)}")
         self.path, self.faults = path, tuple(faults)
+
+
+class NotExportable(CosimError):
+    """A system cannot be written as an SSP; `faults` lists what stands against it."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__(f"it cannot be written as an SSP: {'; '.join(faults)}")
+        self.faults = tuple(faults)
 
 
 class WiringError(CosimError):

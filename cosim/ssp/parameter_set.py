@@ -56,7 +56,7 @@ def read_units(part: SspPart, parent: XmlElement, prefix: str) -> dict[str, Unit
     return units
 
 
-def unit_named(part: SspPart, element: XmlElement, units: Mapping[str, Unit]) -> Unit:
+def unit_named(element: XmlElement, units: Mapping[str, Unit]) -> Unit:
     """Return the unit that a type names: UNKNOWN if none, one that is not defined if there is none of that name."""
     symbol = element.get("unit")
     return units.get(symbol, Unit(symbol, defined=False)) if symbol else UNKNOWN
@@ -92,7 +92,7 @@ def _value(part: SspPart, parameter: XmlElement, units: Mapping[str, Unit]) -> S
         texts = [part.text(element, "value")]
     else:
         texts = part.text(element, "value").split()
-    return SspValue(type_name, tuple(texts), unit_named(part, element, units), part.where(parameter, ""))
+    return SspValue(type_name, tuple(texts), unit_named(element, units), part.where(parameter, ""))
 
 
 def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:

@@ -127,7 +127,7 @@ class _Reader:
             if name in made:
                 raise part.fault(c, f"two connectors are called {name!r}")
             types = [t for t in c.children if local(t.tag) not in _NO_TYPES]
-            unit = unit_named(part, types[0], self._units) if types else UNKNOWN
+            unit = unit_named(types[0], self._units) if types else UNKNOWN
             type_name = local(types[0].tag) if types else ""
             made[name] = SspConnector(name, part.text(c, "kind"), type_name, unit, part.where(c, ""))
         return made
