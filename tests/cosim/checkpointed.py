@@ -15,10 +15,10 @@ from cosim.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
 
-STOP, EVERY = Fraction(40), Fraction(7, 2)
-PASSED = 20.0
+STOP, EVERY = Fraction(20), Fraction(7, 2)
+PASSED = 10.0
 """When a run tells that it may be killed, s."""
-WAITS = 20.9
+WAITS = 10.4
 """When it waits for that, before its next checkpoint, s."""
 
 

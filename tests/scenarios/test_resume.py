@@ -46,7 +46,8 @@ def slow(*values: Any) -> Any:
 @pytest.mark.parametrize(
     ("scenario", "every", "passed", "number"),
     [
-        ("ir_grasp", 3, 7, signal.SIGKILL),
+        ("ir_grasp -p strategy=forward -p forward=0.055", 0.7, 1.6, signal.SIGKILL),
+        slow("ir_grasp", 3, 7, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGINT),
         slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
         slow("vsl_hybrid", 0.5, 1.2, signal.SIGKILL),
@@ -58,7 +59,7 @@ def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
 ):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     waits = passed + every / 3
-    arguments = ("run", scenario, "--seed", "3", "--out")
+    arguments = ("run", *scenario.split(), "--seed", "3", "--out")
     ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
     assert ended in (-signal.SIGKILL, 1)
     assert call(*arguments, whole).exit_code == 0
