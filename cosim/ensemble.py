@@ -2,13 +2,18 @@
 
 import array
 import contextlib
+import functools
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from pathlib import Path
 
+from cosim.endings import Endings
 from cosim.exceptions import CosimError
+from cosim.finite_check import FiniteCheck
 from cosim.fmpy_edge import unpack
+from cosim.fmu_description import FmuPort
+from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance, State
 from cosim.narrowing import Narrowing, narrows
 from cosim.schedule import Slot
@@ -24,21 +29,29 @@ class Ensemble:
         InvalidFmu: an FMU cannot be used; what was loaded until then is freed.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+        """Load the units; with `endings` given, whoever gave them carries them out if this fails."""
         self.system = system
+        self.heartbeat = heartbeat or Heartbeat()
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self._copies: dict[str, Sequence[Copy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
-        with contextlib.ExitStack() as cleanup:
-            self._load(cleanup)
+        self._finite: dict[str, FiniteCheck] = {}
+        self._endings = endings or Endings()
+        try:
+            self._load()
             self._wire()
-            self._cleanup = cleanup.pop_all()
+            self._watch_numbers()
+        except BaseException:
+            if endings is None:
+                self.close()
+            raise
 
     def close(self) -> None:
         """Terminate and free all units."""
-        self._cleanup.close()
+        self._endings.carry_out()
 
     def signals(self) -> Signals:
         """Return the units' outputs as they are."""
@@ -83,8 +96,14 @@ class Ensemble:
         self.instances[unit].step(t, dt)
 
     def publish(self, unit: str) -> None:
-        """Fetch a unit's outputs, for observers and for the units that they feed."""
-        self.instances[unit].get_outputs()
+        """Fetch a unit's outputs, for observers and for the units that they feed.
+
+        Raises:
+            NotFinite: one that feeds a unit is NaN or infinite. UnitFailure: the unit does not give them.
+        """
+        instance = self.instances[unit]
+        instance.get_outputs()
+        self._finite[unit](instance.time, instance.log)
 
     def save(self, units: Collection[str]) -> dict[str, State]:
         """Save the states of units; `restore` goes back to them, `forget` frees them."""
@@ -126,18 +145,29 @@ class Ensemble:
         sources = self.system.sources_of(unit)
         self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
 
-    def _load(self, cleanup: contextlib.ExitStack) -> None:
+    def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        folder = Path(cleanup.enter_context(temporary))
+        self._endings.add(temporary.cleanup)
+        folder = Path(temporary.name)
+        self.heartbeat.tell(scratch=temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name))
-            cleanup.callback(instance.free)
+            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name), self.heartbeat)
+            self._endings.add(functools.partial(self._free, instance))
             self.instances[name] = instance
+
+    def _watch_numbers(self) -> None:
+        read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in self.instances}
+        for name in self.instances:
+            for port, source in self.system.sources_of(name).items():
+                output = self.instances[source.unit].description.outputs[source.port]
+                read[source.unit].setdefault(source.port, (output, []))[1].append(f"{name}.{port}")
+        for name, instance in self.instances.items():
+            self._finite[name] = FiniteCheck(name, instance.description.fmi, instance.y, read[name])
 
     def _wire(self) -> None:
         for name, instance in self.instances.items():
@@ -154,6 +184,16 @@ class Ensemble:
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:
             with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
-                instance.end()
+                if not self._corrupt(instance):
+                    instance.end()
 
-        self._cleanup.callback(end)
+        self._endings.add(end)
+
+    def _free(self, instance: Instance) -> None:
+        if not self._corrupt(instance):
+            instance.free()
+
+    def _corrupt(self, instance: Instance) -> bool:
+        """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
+        path = instance.description.path
+        return any(i.fatal for i in self.instances.values() if i.description.path == path)

@@ -21,7 +21,11 @@ class MasterOptions:
     Attributes:
         algorithm: see `Algorithm`.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
+        call_limit: seconds of wall time that a unit may take for one call; None: any.
+        pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
     compiled: bool = True
+    call_limit: float | None = None
+    pace: float | None = None
