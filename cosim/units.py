@@ -3,7 +3,6 @@
 from dataclasses import dataclass, fields
 from typing import Annotated
 
-
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
