@@ -9,6 +9,7 @@ from cosim.coupling import Coupling
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
 from cosim.exceptions import UnitFailure, UnitRefused
+from cosim.extrapolation import Extrapolation
 from cosim.failures import UnitHung
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
@@ -120,7 +121,9 @@ class Master:
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)
         ensemble.initialize(self.schedule.slots)
-        self._stepper = GridStepper(self.schedule, self._coupling(ensemble))
+        if self.options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick)
+        self._stepper = GridStepper(self.schedule, self._coupling(ensemble), ensemble.lines)
         self._ensemble = ensemble
 
     def _end(self) -> UnitHung | None:
