@@ -16,6 +16,7 @@ from cosim.grid_stepper import GridStepper
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.jacobi import Jacobi
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.pacing import Pacer
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.stepper import Stepper
@@ -49,6 +50,8 @@ class Master:
         self.options = options
         self.schedule = Schedule(system)
         self.heartbeat = heartbeat or Heartbeat()
+        self.pacer = Pacer(options.pace) if options.pace is not None else None
+        """What keeps the run in step with the wall clock, if it is to."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
         self._endings = Endings()
         self._ensemble: Ensemble | None = None
@@ -141,11 +144,15 @@ class Master:
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
+        if self.pacer is not None:
+            self.pacer.start(self.time)
         last = self.schedule.ticks(stop)
         while True:
             ended = self.stepper.arrive(last)
             if self.heartbeat.stopped:
                 raise Abandoned
+            if self.pacer is not None:
+                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():
