@@ -4,6 +4,7 @@ import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
+from typing import TypeVar
 
 from cosim.coupling import Coupling
 from cosim.endings import Endings
@@ -22,6 +23,8 @@ from cosim.signals import Signals
 from cosim.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
+
+T = TypeVar("T")
 
 _PLAIN = MasterOptions()
 
@@ -119,7 +122,15 @@ class Master:
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
-        self._watchdog.carry_out(lambda: self._run(stop, observers, until))
+        self.carry_out(lambda: self._run(stop, observers, until))
+
+    def carry_out(self, job: Callable[[], T]) -> T:
+        """Do something else with the units in the thread that they are called from, with the same time limit.
+
+        Raises:
+            UnitHung: a unit does not return. Besides, whatever the job raises.
+        """
+        return self._watchdog.carry_out(job)
 
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)

@@ -1,6 +1,7 @@
 """Where the command `handover` starts: Ctrl-C counts from its first instant."""
 
 import sys
+from typing import NoReturn
 
 ABORTED = 130
 
@@ -12,9 +13,9 @@ def main() -> None:
     """Run the command; loading it takes a second or so, in which it can be aborted like later."""
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
-            from scenarios.supervisor import can_supervise, end_with, supervise
+            from scenarios.supervisor import can_supervise, run_to_end, supervise
 
-            (supervise if can_supervise() else end_with)(_command)
+            (supervise if can_supervise() else run_to_end)(_command)
         _command()
     except KeyboardInterrupt:
         _abort()
@@ -28,6 +29,6 @@ def _command() -> None:
     command()
 
 
-def _abort() -> None:
+def _abort() -> NoReturn:
     sys.stderr.write("Aborted!\n")
     sys.exit(ABORTED)

@@ -9,6 +9,7 @@ import select
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, NoReturn
 
@@ -19,8 +20,23 @@ _LOOK = 0.25  # s
 _GRACE = 5.0
 """How much later than the child itself the parent gives up a call, s; only a child that cannot act is late."""
 
+_ORDERS = (
+    () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
+)
+"""Signals that ask a process to end: no crash."""
+
 heartbeat = Heartbeat()
 """Of the run in this process; a parent and its child share it."""
+
+_in_child = False
+
+
+def heartbeat_of_run() -> Heartbeat:
+    """Return the heartbeat that a run in this process has to use: the one that the parent reads, if there is one."""
+    global heartbeat
+    if not _in_child:
+        heartbeat = Heartbeat()
+    return heartbeat
 
 
 def can_supervise() -> bool:
@@ -34,29 +50,32 @@ def supervise(command: Callable[[], Any]) -> NoReturn:
     The child is a process group of its own: the parent alone hears of Ctrl-C and passes on what it hears, so that the
     child hears of each once. If the parent dies, so does the child.
     """
+    began = time.monotonic()
     alive, lives = os.pipe()
     parent_alive, parent_lives = os.pipe()
     heard = [signal.SIGINT, signal.SIGTERM, signal.SIGTSTP, signal.SIGCONT]
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
     child = os.fork()
     if child == 0:
+        global _in_child
+        _in_child = True
         os.close(alive)
         os.close(parent_lives)
         os.setpgid(0, 0)
         signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # a group in the background may write to the terminal
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         threading.Thread(target=_die_with_parent, args=(parent_alive,), daemon=True).start()
-        end_with(command)
+        run_to_end(command)
     os.close(lives)
     os.close(parent_alive)
     with contextlib.suppress(OSError):  # it has done so itself, or is gone
         os.setpgid(child, child)
     _pass_on(child)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    _end_as(*_wait(child, alive))
+    _end_as(*_wait(child, alive), began)
 
 
-def end_with(command: Callable[[], Any]) -> NoReturn:
+def run_to_end(command: Callable[[], Any]) -> NoReturn:
     """Run a command and end this process with its status."""
     status = 1
     try:
@@ -115,10 +134,10 @@ def _wait(child: int, alive: int) -> tuple[int, bool]:
             os.kill(child, signal.SIGKILL)
 
 
-def _end_as(status: int, hung: bool) -> NoReturn:
+def _end_as(status: int, hung: bool, began: float) -> NoReturn:
     """End as the child did; where it was not done, tell what it died of."""
     number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else None
-    if number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT):
+    if number is not None and number in _ORDERS:
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
     if heartbeat.status is not None:
@@ -126,4 +145,5 @@ def _end_as(status: int, hung: bool) -> NoReturn:
     from scenarios.death import tell_death
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(tell_death(heartbeat, number, 0 if number is not None else os.WEXITSTATUS(status), hung=hung))
+    code = 0 if number is not None else os.WEXITSTATUS(status)
+    sys.exit(tell_death(heartbeat, number, code, time.monotonic() - began, hung=hung))
