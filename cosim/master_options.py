@@ -1,7 +1,10 @@
 """How a master couples its units."""
 
 import enum
+import math
 from dataclasses import dataclass
+
+from cosim.extrapolation import Extrapolation
 
 
 class Algorithm(enum.Enum):
@@ -20,8 +23,20 @@ class MasterOptions:
 
     Attributes:
         algorithm: see `Algorithm`.
+        extrapolation: what inputs are between communication points; see `Extrapolation`.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
+        call_limit: seconds of wall time that a unit may take for one call; None: any.
+        pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
+    extrapolation: Extrapolation = Extrapolation.HOLD
     compiled: bool = True
+    call_limit: float | None = None
+    pace: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("call_limit", "pace"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise ValueError(f"{name} = {value}: a finite number above 0 is right")
