@@ -122,9 +122,8 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     """Make the run's folder, and tell what has to be known of the run if this process dies."""
     if resumption is None:
         task.folder.make()
-        configuration = {**_configuration(task), **_options(task)}
-        fmus = {n: u.description.path for n, u in master.system.units.items()}
-        task.folder.write_run(configuration, fmus)
+    fmus = {n: u.description.path for n, u in master.system.units.items()}
+    task.folder.write_run({**_configuration(task), **_options(task)}, fmus)
     master.heartbeat.tell(
         folder=str(task.folder.path.absolute()),
         configuration=_configuration(task),
@@ -141,7 +140,7 @@ def _run(
     stop, interruption = task.experiment.stop_time(task.parameters), around.interruption
     rows = 0 if resumption is None else resumption.checkpoint.rows
     with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
-        checkpoints = _checkpoints(task, master, recorder, lambda: pack(watch, task.parameters, around.clock()))
+        checkpoints = _checkpoints(task, master, recorder, watch, around.clock)
 
         def tell(t: float, _signals: Signals) -> None:
             around.progress(t, float(stop))
@@ -167,9 +166,15 @@ def _trouble(failure: UnitFailure | None, master: Master) -> dict[str, Any]:
     return {"failure": None if failure is None else failure.as_data(), **paced}
 
 
-def _checkpoints(task: Task, master: Master, recorder: Recorder, keep: Callable[[], bytes]) -> list[Checkpointer]:
+def _checkpoints(
+    task: Task, master: Master, recorder: Recorder, watch: Watch, clock: Callable[[], Spent]
+) -> list[Checkpointer]:
     if task.every is None:
         return []
+
+    def keep() -> bytes:
+        return pack(watch, task.parameters, task.options, clock())
+
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
