@@ -9,6 +9,7 @@ from typing import Any
 
 from cosim.exceptions import WiringError, nearest
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
+from cosim.linear import Linear
 from cosim.start_values import fault_of
 from cosim.units import UNKNOWN, Unit
 from cosim.variable import Kind
@@ -63,10 +64,11 @@ class PlacedUnit:
 
 @dataclass(frozen=True)
 class Connection:
-    """An output that feeds an input."""
+    """An output that feeds an input; with a transformation, what is fed is made by that from the output's value."""
 
     source: PortName
     target: PortName
+    transformation: Linear | None = None
 
 
 class System:
@@ -104,9 +106,9 @@ class System:
         self.units[name] = unit
         return unit
 
-    def connect(self, source: PortName, target: PortName) -> None:
-        """Let an output feed an input."""
-        self.connections.append(Connection(source, target))
+    def connect(self, source: PortName, target: PortName, transformation: Linear | None = None) -> None:
+        """Let an output feed an input, as it is or by a transformation, which then is in place of units' conversion."""
+        self.connections.append(Connection(source, target, transformation))
         self._sources[target.unit][target.port] = source
 
     def check(self) -> None:
@@ -136,7 +138,7 @@ class System:
         b, fault_b = self._find(c.target, "input")
         if a is None or b is None:
             return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
-        reason = mismatch(a, b)
+        reason = _untransformable(a, b) if c.transformation else mismatch(a, b)
         if reason is None:
             return []
         return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
@@ -181,6 +183,12 @@ def mismatch(a: FmuPort, b: FmuPort) -> str | None:
     if a.kind is Kind.BINARY and a.mime != b.mime:
         return "their MIME types differ"
     return None
+
+
+def _untransformable(a: FmuPort, b: FmuPort) -> str | None:
+    if a.kind is not Kind.REAL or b.kind is not Kind.REAL:
+        return "only reals can be transformed"
+    return "their shapes differ" if a.shape != b.shape else None
 
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:

@@ -74,7 +74,7 @@ def test_memory_of_a_long_record(
 ) -> None:
     """10^7 values are 76 MB."""
     fmu = native_fmu("trivial", 2)
-    grown = float(benchmark.pedantic(lambda: script("record_memory.py", environment, fmu)))
+    grown: float = benchmark.pedantic(script, args=("record_memory.py", environment, fmu))  # pyright: ignore
     print(f"\na record of 10^7 values: the peak of resident memory grew by {grown:.1f} MB")
     assert grown < 10.0
 
