@@ -126,7 +126,7 @@ def copy(left: Path, tmp_path: Path) -> Path:
 
 
 def test_a_run_that_can_go_on_is_told_how(copy: Path, capsys: pytest.CaptureFixture[str]):
-    summary = {
+    summary: dict[str, Any] = {
         "scenario": "ir_grasp",
         "success": False,
         "reason": "interrupted",
