@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import InvalidFmu, UnitFailure, last_line
+from cosim.exceptions import InvalidFmu, last_line
+from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
@@ -97,7 +98,7 @@ class Instance:
         if status > 1:
             self._fail(f"{self._prefix}DoStep", status)
         if self._fmi == 3 and self._terminate.value:
-            raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
+            raise UnitEnded(self.name, "fmi3DoStep", t, tuple(self.log))
         self.time = t + dt
 
     def save_state(self) -> State:
@@ -188,8 +189,7 @@ class Instance:
 
     def _fail(self, call: str, status: int) -> None:
         self._failed = status
-        told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        raise UnitFailure(self.name, call, self.time, told, tuple(self.log))
+        raise failure_of(self.name, call, self.time, status, tuple(self.log))
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
