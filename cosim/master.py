@@ -12,6 +12,8 @@ from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
 from cosim.jacobi import Jacobi
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.plan.choice import plan_stepper
+from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.stepper import Stepper
@@ -50,7 +52,9 @@ class Master:
         ensemble = Ensemble(self.system)
         try:
             ensemble.initialize(self.schedule.slots)
-            self._stepper = GridStepper(self.schedule, self._coupling(ensemble))
+            ensemble.measures_cpu = self.options.cpu_times
+            plan = plan_stepper(self.schedule, ensemble, self.options)
+            self._stepper = plan or GridStepper(self.schedule, self._coupling(ensemble))
         except UnitFailure as e:
             ensemble.close()
             raise UnitRefused(e) from e
@@ -86,7 +90,10 @@ class Master:
 
     @property
     def cpu(self) -> "dict[str, array.array[float]]":
-        """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        """CPU seconds of every step, by unit, if the options ask for it.
+
+        With Gauss-Seidel, setting inputs and getting outputs are included.
+        """
         return self.ensemble.cpu
 
     @property
@@ -106,6 +113,9 @@ class Master:
         """
         signals = self.signals
         last = self.schedule.ticks(stop)
+        if isinstance(self.stepper, PlanStepper):
+            self.stepper.run(last, signals, observers, None if until is never else until)
+            return
         while True:
             ended = self.stepper.arrive(last)
             for observe in observers:

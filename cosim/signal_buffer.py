@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,24 @@ _VALUES: dict[str, Any] = {
 }
 
 
+@dataclass(frozen=True)
+class NativeCall:
+    """What a program in C needs to make a buffer's call itself.
+
+    Attributes:
+        function: the function's address.
+        component: the instance's.
+        references: the value references.
+        arrays: the memory: values; of binaries addresses and sizes.
+    """
+
+    fmi: int
+    function: int
+    component: int
+    references: "ctypes.Array[ctypes.c_uint]"
+    arrays: Views
+
+
 class SignalBuffer:
     """The variables of one FMI type of one instance, in the order given, in one block of memory.
 
@@ -46,6 +65,7 @@ class SignalBuffer:
         self._arrays, arguments = _arrays(first, fmi, n)
         count = () if fmi == 2 else (n,)
         self._arguments = (component, vrs, len(references), *arguments, *count)
+        self._fmi = fmi
         self.views: dict[str, Views] = {}
         at = 0
         for p in ports:
@@ -56,15 +76,29 @@ class SignalBuffer:
         """Set or get all values; return the FMI status."""
         return self._function(*self._arguments)
 
+    @property
+    def native(self) -> NativeCall:
+        """The same call for a program in C."""
+        component, references, *_ = self._arguments
+        function = ctypes.cast(self._function, ctypes.c_void_p).value or 0
+        return NativeCall(self._fmi, function, component, references, self._arrays)
+
 
 class OutputBuffer(SignalBuffer):
-    """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call."""
+    """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call.
+
+    Attributes:
+        is_text: whether it reads strings.
+        kept_elsewhere: what keeps the memory alive that others than this buffer copy them to.
+    """
+
+    kept_elsewhere: object = None
 
     def __init__(
         self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
     ) -> None:
         super().__init__(name, function, component, fmi, ports)
-        self._is_text = ports[0].fmi_type == "String"
+        self.is_text = ports[0].fmi_type == "String"
         self._kept: list[Any] = [ctypes.create_string_buffer(1) for _ in range(len(self._arrays[0]))]
 
     def __call__(self) -> int:
@@ -78,7 +112,7 @@ class OutputBuffer(SignalBuffer):
     def _keep(self, i: int) -> None:
         addresses = self._arrays[0]
         address = int(addresses[i])
-        if self._is_text:
+        if self.is_text:
             self._kept[i] = ctypes.create_string_buffer(ctypes.string_at(address) if address else b"")
         else:
             size = int(self._arrays[1][i])
