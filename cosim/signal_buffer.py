@@ -64,7 +64,7 @@ class SignalBuffer:
         vrs = (ctypes.c_uint * len(references))(*references)
         self._arrays, arguments = _arrays(first, fmi, n)
         count = () if fmi == 2 else (n,)
-        self._arguments = (component, vrs, len(references), *arguments, *count)
+        self._arguments: tuple[Any, ...] = (component, vrs, len(references), *arguments, *count)
         self._fmi = fmi
         self.views: dict[str, Views] = {}
         at = 0
@@ -83,12 +83,20 @@ class SignalBuffer:
         function = ctypes.cast(self._function, ctypes.c_void_p).value or 0
         return NativeCall(self._fmi, function, component, references, self._arrays)
 
+    def contents(self) -> list[bytes]:
+        """Return what the buffer holds."""
+        return [a.tobytes() for a in self._arrays]
+
+    def refill(self, contents: Sequence[bytes]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        for array, content in zip(self._arrays, contents, strict=True):
+            array[:] = np.frombuffer(content, dtype=array.dtype)
+
 
 class OutputBuffer(SignalBuffer):
     """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call.
 
     Attributes:
-        is_text: whether it reads strings.
         kept_elsewhere: what keeps the memory alive that others than this buffer copy them to.
     """
 
@@ -98,7 +106,7 @@ class OutputBuffer(SignalBuffer):
         self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
     ) -> None:
         super().__init__(name, function, component, fmi, ports)
-        self.is_text = ports[0].fmi_type == "String"
+        self._is_text = ports[0].fmi_type == "String"
         self._kept: list[Any] = [ctypes.create_string_buffer(1) for _ in range(len(self._arrays[0]))]
 
     def __call__(self) -> int:
@@ -109,10 +117,24 @@ class OutputBuffer(SignalBuffer):
                 self._keep(i)
         return status
 
+    def contents(self) -> list[bytes]:
+        """Return the texts or binaries that the buffer holds."""
+        addresses = map(int, self._arrays[0])
+        if self._is_text:
+            return [ctypes.string_at(a) if a else b"" for a in addresses]
+        return [ctypes.string_at(a, int(size)) for a, size in zip(addresses, self._arrays[1], strict=True)]
+
+    def refill(self, contents: Sequence[bytes]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        self._kept = [ctypes.create_string_buffer(content) for content in contents]
+        self._arrays[0][:] = [ctypes.addressof(kept) for kept in self._kept]
+        if not self._is_text:
+            self._arrays[1][:] = [len(content) for content in contents]
+
     def _keep(self, i: int) -> None:
         addresses = self._arrays[0]
         address = int(addresses[i])
-        if self.is_text:
+        if self._is_text:
             self._kept[i] = ctypes.create_string_buffer(ctypes.string_at(address) if address else b"")
         else:
             size = int(self._arrays[1][i])

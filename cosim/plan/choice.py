@@ -3,6 +3,7 @@
 import logging
 
 from cosim.ensemble import Ensemble
+from cosim.extrapolation import Extrapolation
 from cosim.master_options import MasterOptions
 from cosim.plan.memory import loop
 from cosim.plan.plan_stepper import PlanStepper
@@ -30,6 +31,8 @@ def plan_stepper(schedule: Schedule, ensemble: Ensemble, options: MasterOptions)
 def _obstacle(schedule: Schedule, options: MasterOptions) -> str | None:
     if not options.compiled:
         return "the options ask for none"
+    if options.extrapolation is not Extrapolation.HOLD:
+        return "inputs are extrapolated"
     if max(schedule.tick.numerator, schedule.tick.denominator) >= _WIDEST:
         return f"a tick of {schedule.tick} s is too long a fraction"
     return None
