@@ -2,19 +2,40 @@
 
 import array
 import contextlib
+import functools
+import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
+from cosim.endings import Endings
 from cosim.exceptions import CosimError
+from cosim.finite_check import FiniteCheck
 from cosim.fmpy_edge import unpack
+from cosim.fmu_description import FmuPort
+from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance, State
+from cosim.linear_inputs import LinearInputs
 from cosim.narrowing import Narrowing, narrows
+from cosim.saved_states import SavedStates
+from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
-from cosim.system import System
+from cosim.system import PortName, System
+
+_log = logging.getLogger(__name__)
+
+
+class Feeding(NamedTuple):
+    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
+
+    narrowings: Sequence[Narrowing]
+    copies: Sequence[Copy]
+    scaled: Sequence[ScaledCopy]
 
 
 class Ensemble:
@@ -24,21 +45,34 @@ class Ensemble:
         InvalidFmu: an FMU cannot be used; what was loaded until then is freed.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+        """Load the units; with `endings` given, whoever gave them carries them out if this fails."""
         self.system = system
+        self.heartbeat = heartbeat or Heartbeat()
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.measures_cpu = False
+        """Whether CPU time is taken of steps."""
+        self.lines: LinearInputs | None = None
+        """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
+        self._scaled: dict[str, list[ScaledCopy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
-        with contextlib.ExitStack() as cleanup:
-            self._load(cleanup)
+        self._finite: dict[str, FiniteCheck] = {}
+        self._endings = endings or Endings()
+        try:
+            self._load()
             self._wire()
-            self._cleanup = cleanup.pop_all()
+            self._watch_numbers()
+        except BaseException:
+            if endings is None:
+                self.close()
+            raise
 
     def close(self) -> None:
         """Terminate and free all units."""
-        self._cleanup.close()
+        self._endings.carry_out()
 
     def signals(self) -> Signals:
         """Return the units' outputs as they are."""
@@ -65,14 +99,24 @@ class Ensemble:
             self.publish(slot.unit)
             self._end_at_close(self.instances[slot.unit])
 
-    def feed(self, unit: str, t: float) -> None:
-        """Set a unit's inputs from their sources.
+    def extrapolate(self, tick: Fraction) -> None:
+        """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
+        self.lines = LinearInputs(self.system, self.instances, tick)
+
+    def feed(self, unit: str, t: float, dt: float | None = None) -> None:
+        """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
 
         Raises:
             UnitFailure: the unit does not take them.
         """
         self._copy(unit, t)
+        if self.lines is not None and dt is not None:
+            self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
+
+    def feeding(self, unit: str) -> Feeding:
+        """Return what `feed` does before it sets a unit's inputs, where none are extrapolated."""
+        return Feeding(self._narrowings[unit], self._copies[unit], self._scaled[unit])
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt.
@@ -81,17 +125,30 @@ class Ensemble:
             UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
+        if self.lines is not None:
+            self.lines.step(unit)
 
     def publish(self, unit: str) -> None:
-        """Fetch a unit's outputs, for observers and for the units that they feed."""
-        self.instances[unit].get_outputs()
+        """Fetch a unit's outputs, for observers and for the units that they feed.
 
-    def save(self, units: Collection[str]) -> dict[str, State]:
+        Raises:
+            NotFinite: one that feeds a unit is NaN or infinite. UnitFailure: the unit does not give them.
+        """
+        instance = self.instances[unit]
+        instance.get_outputs()
+        self._finite[unit](instance.time, instance.log)
+        if self.lines is not None:
+            self.lines.publish(unit)
+
+    def save(self, units: Collection[str]) -> SavedStates:
         """Save the states of units; `restore` goes back to them, `forget` frees them."""
-        return {name: self.instances[name].save_state() for name in units}
+        lines = self.lines.save(units) if self.lines is not None else {}
+        return SavedStates({name: self.instances[name].save_state() for name in units}, lines)
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
+        if self.lines is not None and isinstance(states, SavedStates):
+            self.lines.restore(states.lines)
         for name, state in states.items():
             self.instances[name].restore_state(state)
             self.publish(name)
@@ -101,16 +158,21 @@ class Ensemble:
         for name, state in states.items():
             self.instances[name].free_state(state)
 
+    def finite_check(self, unit: str) -> FiniteCheck:
+        """Return the check that `publish` makes of a unit's outputs."""
+        return self._finite[unit]
+
     @contextlib.contextmanager
     def stopwatch(self) -> Generator[Callable[[str], None], None, None]:
         """Give a function that charges the CPU time since it was last called, or since the start, to a unit."""
-        began = time.process_time()
+        began = time.process_time() if self.measures_cpu else 0.0
 
         def charge(unit: str) -> None:
             nonlocal began
-            ended = time.process_time()
-            self.cpu[unit].append(ended - began)
-            began = ended
+            if self.measures_cpu:
+                ended = time.process_time()
+                self.cpu[unit].append(ended - began)
+                began = ended
 
         yield charge
 
@@ -119,6 +181,8 @@ class Ensemble:
             narrowing.check(t)
         for target, source in self._copies[unit]:
             target[...] = source
+        for scaled in self._scaled[unit]:
+            scaled()
 
     def _feed_known(self, unit: str, known: Collection[str]) -> None:
         """Set only inputs whose sources are known already; the others keep their start values."""
@@ -126,27 +190,45 @@ class Ensemble:
         sources = self.system.sources_of(unit)
         self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
 
-    def _load(self, cleanup: contextlib.ExitStack) -> None:
+    def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        folder = Path(cleanup.enter_context(temporary))
+        self._endings.add(temporary.cleanup)
+        folder = Path(temporary.name)
+        self.heartbeat.tell(scratch=temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name))
-            cleanup.callback(instance.free)
+            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name), self.heartbeat)
+            self._endings.add(functools.partial(self._free, instance))
             self.instances[name] = instance
 
+    def _watch_numbers(self) -> None:
+        read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in self.instances}
+        for name in self.instances:
+            for port, source in self.system.sources_of(name).items():
+                output = self.instances[source.unit].description.outputs[source.port]
+                read[source.unit].setdefault(source.port, (output, []))[1].append(f"{name}.{port}")
+        for name, instance in self.instances.items():
+            self._finite[name] = FiniteCheck(name, instance.description.fmi, instance.y, read[name])
+
     def _wire(self) -> None:
+        changes = {c.target: change for c in self.system.connections if (change := self.system.change_by(c))}
         for name, instance in self.instances.items():
             copies: list[Copy] = []
+            self._scaled[name] = []
             self._narrowings[name] = []
             for port, source in self.system.sources_of(name).items():
                 other, target = self.instances[source.unit], instance.description.inputs[port]
-                copies += zip(instance.u[port], other.y[source.port], strict=True)
-                if target.width and narrows(other.description.outputs[source.port], target):
+                output, change = other.description.outputs[source.port], changes.get(PortName(name, port))
+                if change is not None:
+                    self._scaled[name].append(ScaledCopy(instance.u[port][0], other.y[source.port][0], change))
+                    _log.info("%s (%s) -> %s.%s (%s): %s", source, output.unit, name, port, target.unit, change)
+                else:
+                    copies += zip(instance.u[port], other.y[source.port], strict=True)
+                if target.width and narrows(output, target):
                     values = other.y[source.port][0]
                     self._narrowings[name].append(Narrowing(str(source), name, port, target.width, values))
             self._copies[name] = joined(copies)
@@ -154,6 +236,16 @@ class Ensemble:
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:
             with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
-                instance.end()
+                if not self._corrupt(instance):
+                    instance.end()
 
-        self._cleanup.callback(end)
+        self._endings.add(end)
+
+    def _free(self, instance: Instance) -> None:
+        if not self._corrupt(instance):
+            instance.free()
+
+    def _corrupt(self, instance: Instance) -> bool:
+        """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
+        path = instance.description.path
+        return any(i.fatal for i in self.instances.values() if i.description.path == path)

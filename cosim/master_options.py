@@ -3,6 +3,8 @@
 import enum
 from dataclasses import dataclass
 
+from cosim.extrapolation import Extrapolation
+
 
 class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs.
@@ -20,8 +22,16 @@ class MasterOptions:
 
     Attributes:
         algorithm: see `Algorithm`.
+        extrapolation: what inputs are between communication points; see `Extrapolation`.
+        cpu_times: whether `Master.cpu` has the CPU time of every step; to take it costs 0.2 us a step.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
+        call_limit: seconds of wall time that a unit may take for one call; None: any.
+        pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
+    extrapolation: Extrapolation = Extrapolation.HOLD
+    cpu_times: bool = False
     compiled: bool = True
+    call_limit: float | None = None
+    pace: float | None = None

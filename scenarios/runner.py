@@ -13,6 +13,7 @@ import numpy as np
 
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
+from cosim.master_options import MasterOptions
 from cosim.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.experiment import Experiment, Metric, Outcome, Watch
@@ -58,7 +59,7 @@ def carry_out(task: Task, progress: Progress, interruption: Interruption) -> End
     failure: UnitFailure | None = None
     began, cpu_began = time.perf_counter(), time.process_time()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
-    with Master(system) as master:
+    with Master(system, MasterOptions(cpu_times=True)) as master:
         interruption.begin()
         task.folder.make()
         with Recorder(task.folder.signals) as recorder:
