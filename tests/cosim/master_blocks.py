@@ -238,3 +238,42 @@ class Pushed(Mass):
     def step(self, t: float, dt: float, u: MassInputs) -> PushedOutputs:  # type: ignore[override]
         super().step(t, dt, u)
         return self.outputs(t + dt, u)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiaryParams:
+    name: str = parameter("a", "what it writes")
+
+
+@dataclass(kw_only=True)
+class DiaryInputs:
+    heard: str = port("", "a text")
+
+
+@dataclass(kw_only=True)
+class DiaryOutputs:
+    text: str = output("name and the end of what it heard at each step; longer from step to step")
+    pages: int = output("number of characters")
+
+
+class Diary:
+    """Writes down what it hears."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: DiaryParams) -> None:
+        self.name, self.text = params.name, ""
+
+    def outputs(self, t: float, u: DiaryInputs) -> DiaryOutputs:  # noqa: ARG002
+        return DiaryOutputs(text=self.text, pages=len(self.text))
+
+    def step(self, t: float, dt: float, u: DiaryInputs) -> DiaryOutputs:
+        self.text += f"{self.name}{u.heard[-7:]}é"
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return self.text.encode()
+
+    def set_state(self, state: bytes) -> None:
+        self.text = state.decode()

@@ -5,7 +5,6 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
-from cosim.fmu_description import describe_fmu
 from cosim.master import Master
 from cosim.recorder import Recorder
 from cosim.ssp.ssp_file import SspFile
