@@ -242,7 +242,7 @@ class Pushed(Mass):
 
 @dataclass(frozen=True, kw_only=True)
 class DiaryParams:
-    name: str = parameter("a", "what it writes")
+    mark: str = parameter("a", "what it writes")
 
 
 @dataclass(kw_only=True)
@@ -252,7 +252,7 @@ class DiaryInputs:
 
 @dataclass(kw_only=True)
 class DiaryOutputs:
-    text: str = output("name and the end of what it heard at each step; longer from step to step")
+    text: str = output("mark and the end of what it heard at each step; longer from step to step")
     pages: int = output("number of characters")
 
 
@@ -263,13 +263,13 @@ class Diary:
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: DiaryParams) -> None:
-        self.name, self.text = params.name, ""
+        self.mark, self.text = params.mark, ""
 
     def outputs(self, t: float, u: DiaryInputs) -> DiaryOutputs:  # noqa: ARG002
         return DiaryOutputs(text=self.text, pages=len(self.text))
 
     def step(self, t: float, dt: float, u: DiaryInputs) -> DiaryOutputs:
-        self.text += f"{self.name}{u.heard[-7:]}é"
+        self.text += f"{self.mark}{u.heard[-7:]}é"
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:

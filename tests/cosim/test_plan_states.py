@@ -8,6 +8,7 @@ from native_units import native_fmu
 
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
+from cosim.linear import Linear
 from cosim.master import Master
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.stepper import Stepper
@@ -20,7 +21,7 @@ def build(fmu: FmuOf) -> System:
     eye = s.add("eye", fmu("Echo"), period=Fraction(1, 20), sampled=True)
     mass = s.add("mass", native_fmu("mass", 2), period=Fraction(1, 50), k=2.0)
     s.connect(camera.y.picture, eye.u.picture)
-    s.connect(eye.y.brightness, mass.u.f)
+    s.connect(eye.y.brightness, mass.u.f, Linear(0.5))
     return s
 
 
