@@ -68,3 +68,31 @@ def test_an_exception_in_a_block_is_told_with_its_log(fmu: FmuOf, tmp_path: Path
     assert ran.failure.cause.startswith("failing: fmi3DoStep at t = 0.4 s: ")
     assert any("count 5 was asked to fail" in line for line in ran.failure.log)
     assert expect_alike(build, Fraction(1), tmp_path, Algorithm.GAUSS_SEIDEL).failure is not None
+
+
+@pytest.mark.parametrize("factor", [3, -3])
+@pytest.mark.parametrize("algorithm", list(Algorithm))
+def test_a_number_that_has_become_too_large_for_its_reader(
+    fmu: FmuOf, factor: int, algorithm: Algorithm, tmp_path: Path
+):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Tally"), factor=factor), s.add("b", fmu("Tally"))
+        s.connect(a.y.power, b.u.small)
+        return s
+
+    failure = expect_alike(build, Fraction(3), tmp_path, algorithm).failure
+    assert failure is not None
+    assert f"a.power is {factor**5}, which does not fit Int8" in str(failure)
+
+
+def test_a_negative_number_has_no_place_where_signs_have_none(fmu: FmuOf, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Tally"), factor=-1), s.add("b", fmu("Tally"))
+        s.connect(a.y.power, b.u.whole)
+        return s
+
+    failure = expect_alike(build, Fraction(3), tmp_path, Algorithm.JACOBI).failure
+    assert failure is not None
+    assert "a.power is -1, which does not fit UInt64" in str(failure)
