@@ -4,6 +4,7 @@ import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
+from typing import TypeVar
 
 from cosim.coupling import Coupling
 from cosim.endings import Endings
@@ -16,6 +17,7 @@ from cosim.grid_stepper import GridStepper
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.jacobi import Jacobi
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.pacing import Pacer
 from cosim.plan.choice import plan_stepper
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
@@ -23,6 +25,8 @@ from cosim.signals import Signals
 from cosim.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
+
+T = TypeVar("T")
 
 _PLAIN = MasterOptions()
 
@@ -51,6 +55,8 @@ class Master:
         self.options = options
         self.schedule = Schedule(system)
         self.heartbeat = heartbeat or Heartbeat()
+        self.pacer = Pacer(options.pace) if options.pace is not None else None
+        """What keeps the run in step with the wall clock, if it is to."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
         self._endings = Endings()
         self._ensemble: Ensemble | None = None
@@ -121,7 +127,15 @@ class Master:
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
-        self._watchdog.carry_out(lambda: self._run(stop, observers, until))
+        self.carry_out(lambda: self._run(stop, observers, until))
+
+    def carry_out(self, job: Callable[[], T]) -> T:
+        """Do something else with the units in the thread that they are called from, with the same time limit.
+
+        Raises:
+            UnitHung: a unit does not return. Besides, whatever the job raises.
+        """
+        return self._watchdog.carry_out(job)
 
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)
@@ -148,19 +162,33 @@ class Master:
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
+        if self.pacer is not None:
+            self.pacer.start(self.time)
         last = self.schedule.ticks(stop)
         if isinstance(self.stepper, PlanStepper):
-            self.stepper.run(last, signals, observers, None if until is never else until)
+            pause = None if self.pacer is None else self._pause(until)
+            self.stepper.run(last, signals, observers, None if until is never else until, pause)
             return
         while True:
             ended = self.stepper.arrive(last)
             if self.heartbeat.stopped:
                 raise Abandoned
+            if self.pacer is not None:
+                self._pause(until)()
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():
                 break
             self.stepper.depart()
+
+    def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
+        """Return what waits until the wall clock is where the simulated time is."""
+
+        def pause() -> None:
+            if self.pacer is not None:
+                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
+
+        return pause
 
     def _coupling(self, ensemble: Ensemble) -> Coupling:
         kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}

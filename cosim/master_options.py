@@ -1,6 +1,7 @@
 """How a master couples its units."""
 
 import enum
+import math
 from dataclasses import dataclass
 
 from cosim.extrapolation import Extrapolation
@@ -35,3 +36,9 @@ class MasterOptions:
     compiled: bool = True
     call_limit: float | None = None
     pace: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("call_limit", "pace"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise ValueError(f"{name} = {value}: a finite number above 0 is right")

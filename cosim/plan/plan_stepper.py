@@ -81,9 +81,10 @@ class PlanStepper:
         self._concluded(self._library.plan_depart(self._plan))
 
     def run(
-        self, last: int, signals: Signals, observers: Sequence[Observer], until: Callable[[], bool] | None = None
-    ) -> None:
-        """Go on to tick `last` as `Master.run` says.
+        self, last: int, signals: Signals, observers: Sequence[Observer],
+        until: Callable[[], bool] | None = None, pause: Callable[[], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Go on to tick `last` as `Master.run` says; `pause` is called before observers look.
 
         The loop itself writes the rows of a recorder that stands first among the observers. Nobody else watching, it
         takes many communication points at once.
@@ -91,7 +92,7 @@ class PlanStepper:
         recorder = observers[0] if observers and isinstance(observers[0], Recorder) else None
         watching = observers if recorder is None else observers[1:]
         rows = None if recorder is None else _rows_of(recorder, signals)
-        watched = bool(watching) or until is not None
+        watched = bool(watching) or until is not None or pause is not None
         points, leave = 1, False
         while True:
             began = time.perf_counter()
@@ -99,6 +100,8 @@ class PlanStepper:
             self._concluded(outcome)
             if recorder is not None and recorder.block.filled == recorder.block.capacity:
                 recorder.flush()
+            if pause is not None:
+                pause()
             for observe in watching:
                 observe(self.time, signals)
             if outcome == _LAST_REACHED or (until is not None and until()):
