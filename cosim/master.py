@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
 
+from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
 from cosim.exceptions import UnitFailure, UnitRefused
@@ -35,7 +36,8 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`.
+        WiringError: the system has faults. InvalidFmu: an FMU cannot be used.
+        ScheduleError: see `Schedule` and `check_control`.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -44,6 +46,8 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
+        if options.adaptive is not None:
+            check_control(system)
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
 
@@ -51,9 +55,7 @@ class Master:
         ensemble = Ensemble(self.system)
         try:
             ensemble.initialize(self.schedule.slots)
-            if self.options.extrapolation is Extrapolation.LINEAR:
-                ensemble.extrapolate(self.schedule.tick)
-            self._stepper = GridStepper(self.schedule, self._coupling(ensemble), ensemble.lines)
+            self._stepper = self._stepper_of(ensemble)
         except UnitFailure as e:
             ensemble.close()
             raise UnitRefused(e) from e
@@ -116,6 +118,15 @@ class Master:
             if ended or until():
                 break
             self.stepper.depart()
+
+    def _stepper_of(self, ensemble: Ensemble) -> Stepper:
+        control = self.options.adaptive
+        if self.options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
+        coupling = self._coupling(ensemble)
+        if control is None:
+            return GridStepper(self.schedule, coupling, ensemble.lines)
+        return AdaptiveStepper(self.schedule, coupling, ensemble, control, self.options.order)
 
     def _coupling(self, ensemble: Ensemble) -> Coupling:
         kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}

@@ -3,6 +3,7 @@
 import enum
 from dataclasses import dataclass
 
+from cosim.adaptive_step import AdaptiveStep
 from cosim.extrapolation import Extrapolation
 
 
@@ -23,9 +24,16 @@ class MasterOptions:
     Attributes:
         algorithm: see `Algorithm`.
         extrapolation: what inputs are between communication points; see `Extrapolation`.
+        adaptive: how the step follows the error; None for fixed steps.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
     extrapolation: Extrapolation = Extrapolation.HOLD
+    adaptive: AdaptiveStep | None = None
     compiled: bool = True
+
+    @property
+    def order(self) -> int:
+        """The power of the step with which the error of a run goes: see `Extrapolation`."""
+        return 2 if self.extrapolation is Extrapolation.LINEAR else 1
