@@ -15,8 +15,8 @@ class PiController:
     """Proportional-integral control of the step, which is smoother than to follow the last error alone.
 
     After a step with the error r, in units of what is tolerated, the next one is longer by
-    s (1/r)^(k_I/k) (r_before/r)^(k_P/k), k_I = 0.3, k_P = 0.4, for an error that goes with the k-th power of the step; s
-    is a margin. After a rejected step, and in the first step after that, the error alone counts: s (1/r)^(1/k).
+    s (1/r)^(k_I/k) (r_before/r)^(k_P/k), k_I = 0.3, k_P = 0.4, for an error that goes with the k-th power of the step;
+    s is a margin. After a rejected step, and in the first step after that, the error alone counts: s (1/r)^(1/k).
 
     Source: K. Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods, ACM
     Trans. Math. Softw. 17 (1991) 533-554.

@@ -52,10 +52,10 @@ def test_fewer_steps_for_the_same_error_where_a_transient_dies_away():
     errors: list[float] = []
     for options in (following(1e-3, Algorithm.JACOBI), fixed_options):
         with Master(STIFF.three_units(H, 3), options) as master:
-            errors.append(STIFF.largest_error_of(master, Fraction(5)))
+            errors.append(STIFF.largest_error_of(master, Fraction(8)))
             steps.append(len(master.cpu["a"]))
     assert errors[0] < errors[1]
-    assert steps[0] < steps[1] / 3  # trials and halves counted
+    assert steps[0] < steps[1] / 2  # trials and halves counted
 
 
 def test_a_first_step_that_is_too_long_is_rolled_back():
