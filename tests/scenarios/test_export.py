@@ -1,0 +1,90 @@
+from fractions import Fraction
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner, Result
+
+from cosim.master import Master
+from cosim.recorder import Recorder
+from cosim.ssp.ssp_file import SspFile
+from cosim.system import System
+from fmus.build import cached
+from scenarios.catalog import SCENARIOS
+from scenarios.command import main
+from scenarios.parameters import parse_parameters
+
+CHEAP = "ir_grasp"
+STOPS = {"ir_grasp": Fraction(1, 2), "helix_handover": Fraction(3, 10)}
+"""Shortened; long enough for every unit to step several times and for signals to change."""
+
+
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def recorded(system: System, stop: Fraction, path: Path) -> "pa.Table":
+    with Master(system) as master, Recorder(path) as recorder:
+        master.run(stop, [recorder])
+    return pq.read_table(path)
+
+
+@pytest.mark.parametrize("name", [n if n == CHEAP else pytest.param(n, marks=pytest.mark.slow) for n in SCENARIOS])
+def test_an_exported_scenario_gives_the_same_signals_as_the_scenario(name: str, tmp_path: Path):
+    scenario, stop = SCENARIOS[name], STOPS.get(name, Fraction(2))
+    parameters = parse_parameters(scenario, [])
+    system = scenario().build(parameters, 3, lambda unit: cached(scenario.units[unit], 3))
+    wanted = recorded(system, stop, tmp_path / "wanted.parquet")
+    file = tmp_path / "exported.ssp"
+    result = call("export", name, "--ssp", file, "--seed", "3")
+    assert result.exit_code == 0, result.output
+    with SspFile(file) as ssp:
+        assert ssp.stop == scenario().stop_time(parameters)
+        assert {u.description.fmi for u in ssp.system.units.values()} <= {2, 3}
+        found = recorded(ssp.system, stop, tmp_path / "found.parquet")
+    assert found.num_rows > 3
+    assert sum(len(set(column.to_pylist())) > 2 for column in found.columns) > 3
+    assert found.column_names == wanted.column_names
+    for column in wanted.column_names:
+        assert found[column].equals(wanted[column]), column
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("ir_gasp", "--ssp", "a.ssp"), "did you mean ir_grasp"),
+        (("IrReflex", "--ssp", "a.ssp"), "IrReflex is a unit, not a scenario"),
+        (("ir_grasp", "--ssp", "a.zip"), "--ssp a.zip: a name that ends with .ssp is right"),
+        (("ir_grasp",), "Missing option '--ssp'"),
+        (("ir_grasp", "--ssp", "a.ssp", "-p", "standof=1"), "did you mean standoff?"),
+        (("ir_grasp", "--ssp", "a.ssp", "--unit", "reflex=missing.fmu"), "missing.fmu: there is no such file"),
+        (("ir_grasp", "--ssp", "a.ssp", "--unit", "reflexes=a.fmu"), "did you mean reflex?"),
+        (("ir_grasp", "--ssp", "file/a.ssp"), "is a file, so no folder can be made in it"),
+        (("ir_grasp", "--ssp", "folder.ssp"), "there is a folder of that name"),
+    ],
+)
+def test_what_cannot_be_exported_is_told_and_nothing_is_written(
+    arguments: tuple[str, ...], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.ssp").mkdir()
+    result = call("export", *arguments)
+    assert result.exit_code == 2, result.output
+    assert told in " ".join(result.output.split())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.ssp"]
+
+
+def test_parameters_and_other_units_are_exported(tmp_path: Path):
+    other = tmp_path / "Other.fmu"
+    other.write_bytes(cached("IrReflex", 3, scalar=True).read_bytes())
+    file = tmp_path / "new" / "a.ssp"
+    result = call("export", CHEAP, "--ssp", file, "-p", "strategy=forward", "--unit", f"reflex={other}")
+    assert result.exit_code == 0, result.output
+    assert result.output == f"{file}\n"
+    with SspFile(file) as ssp:
+        units = ssp.system.units
+        assert (units["scene"].description.fmi, units["reflex"].description.fmi) == (2, 3)
+        assert units["reflex"].description.path.name == "Other.fmu"
+        assert units["reflex"].start["strategy"] == "FORWARD"
