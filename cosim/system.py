@@ -1,5 +1,6 @@
 """Units, their parameters and the connections between them, checked before anything starts."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -74,6 +75,7 @@ class System:
     def __init__(self) -> None:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
+        self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
@@ -105,6 +107,7 @@ class System:
     def connect(self, source: PortName, target: PortName) -> None:
         """Let an output feed an input."""
         self.connections.append(Connection(source, target))
+        self._sources[target.unit][target.port] = source
 
     def check(self) -> None:
         """Check all names, values and connections.
@@ -126,7 +129,7 @@ class System:
 
     def sources_of(self, unit: str) -> dict[str, PortName]:
         """Return, by input's name, the outputs that feed a unit."""
-        return {c.target.port: c.source for c in self.connections if c.target.unit == unit}
+        return dict(self._sources.get(unit, {}))
 
     def _connection_faults(self, c: Connection) -> list[str]:
         a, fault_a = self._find(c.source, "output")
