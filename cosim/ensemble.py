@@ -2,6 +2,7 @@
 
 import array
 import contextlib
+import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
@@ -11,10 +12,13 @@ from cosim.exceptions import CosimError
 from cosim.fmpy_edge import unpack
 from cosim.instance import Instance, State
 from cosim.narrowing import Narrowing, narrows
+from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
-from cosim.system import System
+from cosim.system import PortName, System
+
+_log = logging.getLogger(__name__)
 
 
 class Ensemble:
@@ -30,6 +34,7 @@ class Ensemble:
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self._copies: dict[str, Sequence[Copy]] = {}
+        self._scaled: dict[str, list[ScaledCopy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
         with contextlib.ExitStack() as cleanup:
             self._load(cleanup)
@@ -119,6 +124,8 @@ class Ensemble:
             narrowing.check(t)
         for target, source in self._copies[unit]:
             target[...] = source
+        for scaled in self._scaled[unit]:
+            scaled()
 
     def _feed_known(self, unit: str, known: Collection[str]) -> None:
         """Set only inputs whose sources are known already; the others keep their start values."""
@@ -140,13 +147,20 @@ class Ensemble:
             self.instances[name] = instance
 
     def _wire(self) -> None:
+        changes = {c.target: change for c in self.system.connections if (change := self.system.change_by(c))}
         for name, instance in self.instances.items():
             copies: list[Copy] = []
+            self._scaled[name] = []
             self._narrowings[name] = []
             for port, source in self.system.sources_of(name).items():
                 other, target = self.instances[source.unit], instance.description.inputs[port]
-                copies += zip(instance.u[port], other.y[source.port], strict=True)
-                if target.width and narrows(other.description.outputs[source.port], target):
+                output, change = other.description.outputs[source.port], changes.get(PortName(name, port))
+                if change is not None:
+                    self._scaled[name].append(ScaledCopy(instance.u[port][0], other.y[source.port][0], change))
+                    _log.info("%s (%s) -> %s.%s (%s): %s", source, output.unit, name, port, target.unit, change)
+                else:
+                    copies += zip(instance.u[port], other.y[source.port], strict=True)
+                if target.width and narrows(output, target):
                     values = other.y[source.port][0]
                     self._narrowings[name].append(Narrowing(str(source), name, port, target.width, values))
             self._copies[name] = joined(copies)

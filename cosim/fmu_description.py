@@ -41,12 +41,25 @@ def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 @dataclass(frozen=True, kw_only=True)
 class FmuPort(Declared):
-    """A parameter, input or output of an FMU. `references` has one value reference in all, or one for each entry."""
+    """A parameter, input or output of an FMU.
+
+    Attributes:
+        references: one value reference in all, or one for each entry.
+        variability: as the standards call it.
+        nominal: the magnitude that its values usually have, in its unit, where the FMU says.
+    """
 
     fmi_type: str
     references: tuple[int, ...]
     start: str | None = None
     mime: str | None = None
+    variability: str = "continuous"
+    nominal: float | None = None
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether its value is a real number that changes between instants."""
+        return self.kind is Kind.REAL and self.variability == "continuous"
 
     @property
     def signature(self) -> str:
@@ -132,6 +145,10 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)
+    relative = v.relativeQuantity
+    if relative is None:
+        relative = declared is not None and declared.relativeQuantity
+    nominal = v.nominal if v.nominal is not None or declared is None else declared.nominal
     items: list[Any] = declared.items if declared is not None and kind is Kind.ENUMERATION else []
     low = v.min if v.min is not None or declared is None else declared.min
     high = v.max if v.max is not None or declared is None else declared.max
@@ -142,15 +159,25 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         fmi_type=v.type,
         references=(v.valueReference,),
         shape=tuple(v.shape or ()),
-        unit=units.get(unit, Unit(unit, defined=False)) if unit else UNKNOWN,
+        unit=_unit_of(unit, units, relative),
         start=v.start,
         minimum=float(low) if low is not None else None,
         maximum=float(high) if high is not None else None,
         items=tuple((i.name, int(i.value)) for i in items),
         mime=mimes.get(v.name),
+        variability=v.variability or "continuous",
+        nominal=float(nominal) if nominal is not None else None,
         width=_WIDTHS.get(v.type),
         description=v.description or "",
     )
+
+
+def _unit_of(name: str | None, units: Mapping[str, Unit], relative: bool) -> Unit:
+    """Return a variable's unit; that of a difference (5 degC of warming) has no offset."""
+    if not name:
+        return UNKNOWN
+    unit = units.get(name, Unit(name, defined=False))
+    return replace(unit, offset=0.0) if relative else unit
 
 
 def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
@@ -165,7 +192,7 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         first = members[0][1]
         shape = members[-1][0]
         whole = [m[0] for m in members] == indices_of(shape)
-        alike = len({(p.fmi_type, p.causality, p.unit) for _, p in members}) == 1
+        alike = len({(p.fmi_type, p.causality, p.unit, p.variability) for _, p in members}) == 1
         if shape and whole and alike:
             starts = [p.start for _, p in members]
             start = None if None in starts else " ".join(str(s) for s in starts)
