@@ -41,7 +41,7 @@ class FixedPoint:
             x, before = x + weight * residual, residual
             residual = residual_of(g, x, iteration + 1)
         if np.any(self.magnitudes.moving(x, residual)):
-            raise Unsolved("it has not settled", self._most, residual)
+            raise Unsolved("values have not settled", self._most, x, residual)
         self.magnitudes.learn(x)
         return Solution(x, self._most)
 

@@ -38,11 +38,13 @@ class GridStepper:
             self._due[slot.unit] += slot.every
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the ticks; see `Stepper`."""
-        return {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
+        """Return the ticks and what the coupling keeps; see `Stepper`."""
+        coupling = self._coupling.get_state()
+        return {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted), "coupling": coupling}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to ticks that `get_state` gave."""
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
+        self._coupling.set_state(state["coupling"])
         self.time = self._schedule.time(self._tick)

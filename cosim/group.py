@@ -16,10 +16,12 @@ class Group:
     Attributes:
         units: their names.
         circle: the connections that make the circle; a unit by itself has none.
+        told: the algebraic loops among them, spelled out; empty if there is none.
     """
 
     units: tuple[str, ...]
     circle: tuple[Connection, ...] = ()
+    told: str = ""
 
     def back(self, units: Collection[str]) -> list[Connection]:
         """Return the circle's connections that lead back when only some of its units step, one after another."""
@@ -30,7 +32,7 @@ class Group:
 
 def groups_of_loops(units: Sequence[str], loops: Sequence[AlgebraicLoop]) -> list[Group]:
     """Return the units, those of a loop together, and those of loops that share a unit."""
-    return _groups(units, [c for loop in loops for c in loop.connections])
+    return _groups(units, [c for loop in loops for c in loop.connections], loops)
 
 
 def groups_of_data_flow(system: System, units: Sequence[str], loops: Sequence[AlgebraicLoop]) -> list[Group]:
@@ -43,7 +45,7 @@ def groups_of_data_flow(system: System, units: Sequence[str], loops: Sequence[Al
     flow = [c for c in system.connections if c.source.unit in period and c.target.unit in period]
     looped = {c for loop in loops for c in loop.connections}
     together = [c for c in flow if period[c.source.unit] == period[c.target.unit] or c in looped]
-    groups = _groups(units, together)
+    groups = _groups(units, together, loops)
     return in_order(groups, _needs(units, together), _needs(units, flow), _silent, _silent)
 
 
@@ -63,7 +65,7 @@ def in_order(
     return [groups[i] for i in ordered(firm_groups, soft_groups, told_soft, told_firm)]
 
 
-def _groups(units: Sequence[str], connections: Sequence[Connection]) -> list[Group]:
+def _groups(units: Sequence[str], connections: Sequence[Connection], loops: Sequence[AlgebraicLoop]) -> list[Group]:
     needs = _needs(units, connections)
     sets = strongly_connected(needs)
     place = {n: i for i, names in enumerate(sets) for n in names}
@@ -71,7 +73,12 @@ def _groups(units: Sequence[str], connections: Sequence[Connection]) -> list[Gro
     for c in connections:
         if place[c.source.unit] == place[c.target.unit]:
             circles[place[c.source.unit]].append(c)
-    return [Group(tuple(_easily_ordered(names, needs)), tuple(circles[i])) for i, names in enumerate(sets)]
+    told: dict[int, str] = {}
+    for loop in loops:
+        i = place.get(loop.units[0], -1)
+        told[i] = f"{told[i]}; {loop.told}" if i in told else loop.told
+    orders = [_easily_ordered(names, needs) for names in sets]
+    return [Group(tuple(order), tuple(circles[i]), told.get(i, "")) for i, order in enumerate(orders)]
 
 
 def _easily_ordered(names: Sequence[str], needs: Needs[str]) -> list[str]:

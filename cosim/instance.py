@@ -2,13 +2,16 @@
 
 import collections
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.magnitudes import Floats
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 from cosim.variable import Kind
@@ -46,6 +49,8 @@ class Instance:
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
+        self.goes_back = False
+        """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
         self._do_step = self._function("DoStep")
 
@@ -93,12 +98,36 @@ class Instance:
             UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
         """
         self.time = t
-        status = self._do_step(self._component, t, dt, *self._step_arguments)
+        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
         if status > 1:
             self._fail(f"{self._prefix}DoStep", status)
         if self._fmi == 3 and self._terminate.value:
             raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
         self.time = t + dt
+
+    def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return how outputs change with inputs at this instant, the unit's state being as it is.
+
+        Args:
+            outputs: names of real outputs.
+            inputs: a direction: how fast each of some real inputs changes, all its entries in row-major order.
+
+        Returns:
+            How fast the outputs change then, by name.
+
+        Raises:
+            UnitFailure: it does not tell.
+        """
+        d = self.description
+        unknowns, knowns = [d.outputs[y] for y in outputs], [d.inputs[u] for u in inputs]
+        seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
+        found = np.zeros(sum(p.size for p in unknowns))
+        references = (_references(unknowns), _references(knowns))
+        lengths = ((), ()) if self._fmi == 2 else ((len(seed),), (len(found),))
+        vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
+        self._call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
+        ends = np.cumsum([p.size for p in unknowns])[:-1]
+        return dict(zip(outputs, np.split(found, ends), strict=True))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -135,11 +164,11 @@ class Instance:
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:
-            return (True,)
+            return ()
         self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._last_time = ctypes.c_double()
         flags = (self._event, self._terminate, self._early)
-        return (True, *(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
+        return (*(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
 
     def _buffers(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
         by_type: dict[str, list[FmuPort]] = collections.defaultdict(list)
@@ -195,3 +224,12 @@ class Instance:
         if status > 0:
             told = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
             self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {told}")
+
+
+def _references(ports: Sequence[FmuPort]) -> Any:
+    references = [r for p in ports for r in p.references]
+    return (ctypes.c_uint * len(references))(*references)
+
+
+def _doubles(values: Floats) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

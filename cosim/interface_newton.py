@@ -10,7 +10,7 @@ from cosim.magnitudes import Floats, Magnitudes
 
 _SINGULAR = 1e-7
 """Least singular value of I - dg/dx, in magnitudes, at which differences of g still tell a solution from none."""
-_NO_SOLUTION = "its equations are singular: signals act on themselves with a gain of 1"
+_NO_SOLUTION = "the equations are singular: signals act on themselves with a gain of 1"
 _SLOW = 0.5
 """A step that leaves more than this part of the residual shows that the Jacobian is out of date."""
 
@@ -46,7 +46,7 @@ class InterfaceNewton:
                 dx = self._step(x, residual)
             if dx is None or self._kept is None:
                 self._kept = None
-                raise Unsolved(_NO_SOLUTION, iteration, residual)
+                raise Unsolved(_NO_SOLUTION, iteration, x, residual)
             moved: Floats = x + dx
             after = residual_of(g, moved, iteration + 1)
             slow = not fresh and self.magnitudes.length(moved, after) > _SLOW * self.magnitudes.length(moved, residual)
@@ -54,7 +54,7 @@ class InterfaceNewton:
             x, residual, fresh = moved, after, False
         if np.any(self.magnitudes.moving(x, residual)):
             self._kept = None
-            raise Unsolved("it has not settled", self._most, residual)
+            raise Unsolved("values have not settled", self._most, x, residual)
         return self._solved(x, self._most)
 
     def get_state(self) -> Mapping[str, Any]:

@@ -24,11 +24,11 @@ class Solution:
 
 
 class Unsolved(Exception):
-    """No x was found; `residual` is how far each g(x) is from its x at last."""
+    """No x was found; `residual` is how far g(x) is from the last `x`."""
 
-    def __init__(self, why: str, iterations: int, residual: Floats) -> None:
+    def __init__(self, why: str, iterations: int, x: Floats, residual: Floats) -> None:
         super().__init__(why)
-        self.why, self.iterations, self.residual = why, iterations, residual
+        self.why, self.iterations, self.x, self.residual = why, iterations, x, residual
 
 
 class InterfaceSolver(Protocol):
@@ -61,5 +61,5 @@ def residual_of(g: Map, x: Floats, iterations: int) -> Floats:
     """
     residual = g(x) - x
     if not np.all(np.isfinite(residual)):
-        raise Unsolved("the values leave all bounds", iterations, residual)
+        raise Unsolved("values leave all bounds", iterations, x, residual)
     return residual

@@ -38,7 +38,12 @@ class Magnitudes:
 
     def length(self, x: Floats, residual: Floats) -> float:
         """Return the length of a difference of signals that have the values x."""
-        return float(np.linalg.norm(residual / self.of(x)))
+        return float(np.linalg.norm(self.shares(x, residual)))
+
+    def shares(self, x: Floats, residual: Floats) -> Floats:
+        """Return the parts that differences make of the magnitudes of signals that have the values x."""
+        parts: Floats = np.abs(residual) / self.of(x)
+        return np.nan_to_num(parts, nan=np.inf)
 
     def learn(self, x: Floats) -> None:
         """Remember how large the signals of a solution are."""
