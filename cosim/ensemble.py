@@ -2,16 +2,24 @@
 
 import array
 import contextlib
+import functools
 import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 
+from cosim.endings import Endings
 from cosim.exceptions import CosimError
+from cosim.finite_check import FiniteCheck
 from cosim.fmpy_edge import unpack
+from cosim.fmu_description import FmuPort
+from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance, State
+from cosim.linear_inputs import LinearInputs
 from cosim.narrowing import Narrowing, narrows
+from cosim.saved_states import SavedStates
 from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
@@ -28,22 +36,32 @@ class Ensemble:
         InvalidFmu: an FMU cannot be used; what was loaded until then is freed.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+        """Load the units; with `endings` given, whoever gave them carries them out if this fails."""
         self.system = system
+        self.heartbeat = heartbeat or Heartbeat()
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.lines: LinearInputs | None = None
+        """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
         self._scaled: dict[str, list[ScaledCopy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
-        with contextlib.ExitStack() as cleanup:
-            self._load(cleanup)
+        self._finite: dict[str, FiniteCheck] = {}
+        self._endings = endings or Endings()
+        try:
+            self._load()
             self._wire()
-            self._cleanup = cleanup.pop_all()
+            self._watch_numbers()
+        except BaseException:
+            if endings is None:
+                self.close()
+            raise
 
     def close(self) -> None:
         """Terminate and free all units."""
-        self._cleanup.close()
+        self._endings.carry_out()
 
     def signals(self) -> Signals:
         """Return the units' outputs as they are."""
@@ -70,13 +88,19 @@ class Ensemble:
             self.publish(slot.unit)
             self._end_at_close(self.instances[slot.unit])
 
-    def feed(self, unit: str, t: float) -> None:
-        """Set a unit's inputs from their sources.
+    def extrapolate(self, tick: Fraction) -> None:
+        """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
+        self.lines = LinearInputs(self.system, self.instances, tick)
+
+    def feed(self, unit: str, t: float, dt: float | None = None) -> None:
+        """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
 
         Raises:
             UnitFailure: the unit does not take them.
         """
         self.gather(unit, t)
+        if self.lines is not None and dt is not None:
+            self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
 
     def feed_known(self, unit: str, known: Collection[str]) -> None:
@@ -117,17 +141,30 @@ class Ensemble:
             UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
+        if self.lines is not None:
+            self.lines.step(unit)
 
     def publish(self, unit: str) -> None:
-        """Fetch a unit's outputs, for observers and for the units that they feed."""
-        self.instances[unit].get_outputs()
+        """Fetch a unit's outputs, for observers and for the units that they feed.
 
-    def save(self, units: Collection[str]) -> dict[str, State]:
+        Raises:
+            NotFinite: one that feeds a unit is NaN or infinite. UnitFailure: the unit does not give them.
+        """
+        instance = self.instances[unit]
+        instance.get_outputs()
+        self._finite[unit](instance.time, instance.log)
+        if self.lines is not None:
+            self.lines.publish(unit)
+
+    def save(self, units: Collection[str]) -> SavedStates:
         """Save the states of units; `restore` goes back to them, `forget` frees them."""
-        return {name: self.instances[name].save_state() for name in units}
+        lines = self.lines.save(units) if self.lines is not None else {}
+        return SavedStates({name: self.instances[name].save_state() for name in units}, lines)
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
+        if self.lines is not None and isinstance(states, SavedStates):
+            self.lines.restore(states.lines)
         for name, state in states.items():
             self.instances[name].restore_state(state)
             self.publish(name)
@@ -150,18 +187,29 @@ class Ensemble:
 
         yield charge
 
-    def _load(self, cleanup: contextlib.ExitStack) -> None:
+    def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        folder = Path(cleanup.enter_context(temporary))
+        self._endings.add(temporary.cleanup)
+        folder = Path(temporary.name)
+        self.heartbeat.tell(scratch=temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name))
-            cleanup.callback(instance.free)
+            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name), self.heartbeat)
+            self._endings.add(functools.partial(self._free, instance))
             self.instances[name] = instance
+
+    def _watch_numbers(self) -> None:
+        read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in self.instances}
+        for name in self.instances:
+            for port, source in self.system.sources_of(name).items():
+                output = self.instances[source.unit].description.outputs[source.port]
+                read[source.unit].setdefault(source.port, (output, []))[1].append(f"{name}.{port}")
+        for name, instance in self.instances.items():
+            self._finite[name] = FiniteCheck(name, instance.description.fmi, instance.y, read[name])
 
     def _wire(self) -> None:
         changes = {c.target: change for c in self.system.connections if (change := self.system.change_by(c))}
@@ -185,6 +233,16 @@ class Ensemble:
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:
             with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
-                instance.end()
+                if not self._corrupt(instance):
+                    instance.end()
 
-        self._cleanup.callback(end)
+        self._endings.add(end)
+
+    def _free(self, instance: Instance) -> None:
+        if not self._corrupt(instance):
+            instance.free()
+
+    def _corrupt(self, instance: Instance) -> bool:
+        """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
+        path = instance.description.path
+        return any(i.fatal for i in self.instances.values() if i.description.path == path)

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from cosim.exceptions import InvalidFmu, UnitFailure, last_line
+from cosim.exceptions import InvalidFmu, last_line
+from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.magnitudes import Floats
+from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 from cosim.variable import Kind
@@ -20,39 +23,51 @@ State = ctypes.c_void_p
 """A saved state of one instance, which alone knows what it points to."""
 
 _LOG_LINES = 30
-_FATAL = 4
+_DISCARD, _FATAL = 2, 4
 
 
 class Instance:
     """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
 
+    Each call is told to `heartbeat`. If a call returns after the unit was given up, `Abandoned` is raised.
+
     Raises:
         InvalidFmu: the library does not load or does not instantiate.
     """
 
-    def __init__(self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str]) -> None:
+    def __init__(
+        self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
+        heartbeat: Heartbeat | None = None,
+    ) -> None:  # fmt: skip
         self.name = name
         self.description = description
         self.time = 0.0
         self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
         self._fmi = description.fmi
         self._prefix = f"fmi{self._fmi}"
+        self._heartbeat = heartbeat or Heartbeat()
+        self._codes: dict[str, int] = {}
+        self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
         load = load_fmi2 if self._fmi == 2 else load_fmi3
         d = description
         try:
-            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
+            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line, self._begins)
         except InvalidFmu as e:
             raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
+        finally:
+            self._returned()
         self._component = self._fmu.component
         self._failed: int | None = None
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
+        self.du: dict[str, Views] = {}
+        """Time derivatives of inputs that `interpolate` named."""
         self.goes_back = False
         """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
-        self._do_step = self._function("DoStep")
+        self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
 
     def set_start(self, values: Mapping[str, Any]) -> None:
         """Set parameters or start values of inputs, before initialisation."""
@@ -75,7 +90,7 @@ class Instance:
         self._call("ExitInitializationMode")
 
     def set_inputs(self) -> None:
-        """Hand the contents of `u` to the unit."""
+        """Hand the contents of `u`, and of `du`, to the unit."""
         self._carry_out(self._setters)
 
     def set_some_inputs(self, names: Iterable[str]) -> None:
@@ -86,6 +101,13 @@ class Instance:
                 for mine, held in zip(views, self.u[name], strict=True):
                     mine[:] = held
         self._carry_out(setters)
+
+    def interpolate(self, names: Iterable[str]) -> None:
+        """Hand these inputs' time derivatives to the unit too, whenever inputs are set (FMI 2)."""
+        ports = [self.description.inputs[n] for n in names]
+        buffer = RateBuffer(self._function("SetRealInputDerivatives"), self._component, ports)
+        self._setters.append(buffer)
+        self.du = dict(buffer.views)
 
     def get_outputs(self) -> None:
         """Fetch the unit's outputs into `y`."""
@@ -98,11 +120,13 @@ class Instance:
             UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
         """
         self.time = t
+        self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
+        self._returned()
         if status > 1:
             self._fail(f"{self._prefix}DoStep", status)
         if self._fmi == 3 and self._terminate.value:
-            raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
+            raise UnitEnded(self.name, "fmi3DoStep", t, tuple(self.log))
         self.time = t + dt
 
     def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -151,16 +175,78 @@ class Instance:
         """Free a saved state."""
         self._call("FreeFMUstate" if self._fmi == 2 else "FreeFMUState", ctypes.byref(state))
 
+    def serialise_state(self) -> bytes:
+        """Return the unit's state as bytes that mean the same in another process.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state, size = self.save_state(), ctypes.c_size_t()
+        try:
+            name = "FMUstate" if self._fmi == 2 else "FMUState"
+            self._call(f"Serialized{name}Size", state, ctypes.byref(size))
+            data = (self._byte * size.value)()
+            self._call(f"Serialize{name}", state, data, size)
+            return bytes(data)
+        finally:
+            self.free_state(state)
+
+    def deserialise_state(self, data: bytes) -> None:
+        """Go to a state that `serialise_state` gave.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state = State()
+        held = (self._byte * len(data)).from_buffer_copy(data)
+        name = "DeSerializeFMUstate" if self._fmi == 2 else "DeserializeFMUState"
+        self._call(name, held, ctypes.c_size_t(len(data)), ctypes.byref(state))
+        try:
+            self.restore_state(state)
+        finally:
+            self.free_state(state)
+
+    def contents(self) -> list[list[bytes]]:
+        """Return what `y` and the plain values of `u` hold: not always the unit's values at its present time."""
+        return [b.contents() for b in self._held()]
+
+    def refill(self, contents: Sequence[Sequence[bytes]]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        for buffer, content in zip(self._held(), contents, strict=True):
+            buffer.refill(content)
+
     def end(self) -> None:
-        """Terminate the unit, unless a call failed: the standards forbid it then."""
-        if self._failed is None:
+        """Terminate the unit, unless a call failed: the standards forbid it then, but for Discard."""
+        if self._failed in (None, _DISCARD) and not self._abandoned:
             self._call("Terminate")
 
     def free(self) -> None:
-        """Free the unit and its library; after a fatal error the standards forbid any call, and it is left."""
-        if self._component is not None and self._failed != _FATAL:
+        """Free the unit and its library; it is left after a fatal error, as the standards ask, or if a call hangs."""
+        if self._component is not None and not self.fatal and not self._abandoned:
             self._component = None
+            self._begins(f"{self._prefix}FreeInstance")
             self._fmu.freeInstance()
+            self._returned()
+
+    @property
+    def fatal(self) -> bool:
+        """Whether a call was answered with Fatal."""
+        return self._failed == _FATAL
+
+    @property
+    def _abandoned(self) -> bool:
+        return self.name in self._heartbeat.abandoned
+
+    def _begins(self, call: str) -> None:
+        code = self._codes.get(call)
+        if code is None:
+            code = self._codes[call] = self._heartbeat.code(self.name, call)
+        self._heartbeat.begin(code, self.time)
+
+    def _returned(self) -> None:
+        self._heartbeat.end()
+        if self._heartbeat.abandoned and self._abandoned:
+            raise Abandoned
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:
@@ -184,9 +270,15 @@ class Instance:
         call = f"{self._prefix}{verb}{kind}"
         return make(call, self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
 
+    def _held(self) -> list[SignalBuffer]:
+        """Return the buffers but those of inputs that hold addresses of others' outputs, which are copied anew."""
+        return [*self._getters, *(b for b in self._setters if not b.name.endswith(("String", "Binary")))]
+
     def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:
+            self._begins(buffer.name)
             status = buffer()
+            self._returned()
             if status > 1:
                 self._fail(buffer.name, status)
 
@@ -196,14 +288,14 @@ class Instance:
         if port.kind is Kind.STRING:
             kept = ctypes.create_string_buffer(str(value).encode())
             views[0][0] = ctypes.addressof(kept)
-            status = buffer()
         elif port.kind is Kind.BINARY:
-            data = ctypes.create_string_buffer(bytes(value), len(value))
-            views[0][0], views[1][0] = ctypes.addressof(data), len(value)
-            status = buffer()
+            kept = ctypes.create_string_buffer(bytes(value), len(value))
+            views[0][0], views[1][0] = ctypes.addressof(kept), len(value)
         else:
             views[0][:] = numbers_of(port, value)
-            status = buffer()
+        self._begins(buffer.name)
+        status = buffer()
+        self._returned()
         if status > 1:
             self._fail(f"setting {port.name}", status)
 
@@ -211,19 +303,22 @@ class Instance:
         return getattr(self._fmu.dll, self._prefix + name)
 
     def _call(self, name: str, *arguments: Any) -> None:
+        self._begins(self._prefix + name)
         status = self._function(name)(self._component, *arguments)
+        self._returned()
         if status > 1:
             self._fail(self._prefix + name, status)
 
     def _fail(self, call: str, status: int) -> None:
         self._failed = status
-        told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        raise UnitFailure(self.name, call, self.time, told, tuple(self.log))
+        raise failure_of(self.name, call, self.time, status, tuple(self.log))
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
             told = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
-            self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {told}")
+            line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
+            self.log.append(line)
+            self._heartbeat.log(self.name, line)
 
 
 def _references(ports: Sequence[FmuPort]) -> Any:

@@ -6,12 +6,16 @@ from fractions import Fraction
 from types import TracebackType
 
 from cosim.coupling import Coupling
+from cosim.endings import Endings
 from cosim.ensemble import Ensemble
 from cosim.exceptions import UnitFailure, UnitRefused
+from cosim.extrapolation import Extrapolation
+from cosim.failures import UnitHung
 from cosim.fixed_point import FixedPoint
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
 from cosim.group import Group, groups_of_data_flow
+from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.initial_values import InitialValues
 from cosim.interface import Interface
 from cosim.interface_newton import InterfaceNewton
@@ -24,6 +28,7 @@ from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.stepper import Stepper
 from cosim.system import System
+from cosim.watchdog import Watchdog
 
 _PLAIN = MasterOptions()
 
@@ -47,36 +52,40 @@ class Master:
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
-    def __init__(self, system: System, options: MasterOptions = _PLAIN) -> None:
+    def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
         system.check()
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
+        self.heartbeat = heartbeat or Heartbeat()
+        self._watchdog = Watchdog(self.heartbeat, options.call_limit)
+        self._endings = Endings()
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
         self._coupling: Coupling | None = None
 
     def __enter__(self) -> "Master":
-        ensemble = Ensemble(self.system)
         try:
-            ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
-            self._coupling = self._couple(ensemble)
-            self._stepper = GridStepper(self.schedule, self._coupling)
+            self._watchdog.carry_out(self._start)
+        except UnitHung:
+            self._end()
+            raise
         except UnitFailure as e:
-            ensemble.close()
+            self._end()
             raise UnitRefused(e) from e
         except BaseException:
-            ensemble.close()
+            self._end()
             raise
-        self._ensemble = ensemble
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.ensemble.close()
+        hung = self._end()
+        if hung is not None and error is None:
+            raise hung
 
     @property
     def ensemble(self) -> Ensemble:
@@ -125,13 +134,42 @@ class Master:
         signals at t, then the other units go on from t. Jacobi: a step's results count from the time where it ends, for
         sampled units too. A second call goes on where the first one ended.
 
+        With `MasterOptions.call_limit` everything, observers included, is called from a thread of the master's own.
+
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
+        self._watchdog.carry_out(lambda: self._run(stop, observers, until))
+
+    def _start(self) -> None:
+        ensemble = Ensemble(self.system, self.heartbeat, self._endings)
+        ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
+        if self.options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick)
+        self._coupling = self._couple(ensemble)
+        self._stepper = GridStepper(self.schedule, self._coupling, ensemble.lines)
+        self._ensemble = ensemble
+
+    def _end(self) -> UnitHung | None:
+        """Terminate and free all units but those that do not return; return the first of these as a failure."""
+        first: UnitHung | None = None
+        while True:
+            try:
+                self._watchdog.carry_out(self._endings.carry_out)
+            except UnitHung as e:
+                first = first or e
+            else:
+                break
+        self._watchdog.close()
+        return first
+
+    def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
         last = self.schedule.ticks(stop)
         while True:
             ended = self.stepper.arrive(last)
+            if self.heartbeat.stopped:
+                raise Abandoned
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():

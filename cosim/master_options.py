@@ -3,6 +3,8 @@
 import enum
 from dataclasses import dataclass
 
+from cosim.extrapolation import Extrapolation
+
 
 class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs.
@@ -33,10 +35,16 @@ class MasterOptions:
         algorithm: see `Algorithm`.
         tolerance: the largest difference, relative to a signal's magnitude, at which iterated signals agree.
         most_iterations: after so many iterations of a step, the run fails.
+        extrapolation: what inputs are between communication points; see `Extrapolation`.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
+        call_limit: seconds of wall time that a unit may take for one call; None: any.
+        pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
     tolerance: float = 1e-8
     most_iterations: int = 100
+    extrapolation: Extrapolation = Extrapolation.HOLD
     compiled: bool = True
+    call_limit: float | None = None
+    pace: float | None = None
