@@ -9,7 +9,9 @@ from typing import Any
 from cosim.adaptive_step import AdaptiveStep
 from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
-from cosim.exceptions import ScheduleError
+from cosim.exceptions import ScheduleError, UnitFailure
+from cosim.failures import NotFinite, UnitDiscarded
+from cosim.not_converged import NotConverged
 from cosim.pi_controller import PiController
 from cosim.schedule import Schedule, Slot
 from cosim.step_error import StepError, WorstSignal
@@ -17,6 +19,8 @@ from cosim.step_statistics import StepStatistics
 from cosim.step_too_small import StepTooSmall
 from cosim.system import System
 
+_TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
+"""What a shorter step may cure."""
 _RESOLUTION = 8
 """Ticks of the fine grid in the smallest step."""
 
@@ -26,8 +30,9 @@ class AdaptiveStepper:
 
     Each step is taken as one, rolled back, and taken again as two of half the length. What the two attempts differ by
     tells the error, see `StepError`, and the error the next step's length, see `PiController`. A step with a larger
-    error than tolerated is rolled back and tried shorter; else the units go on from the two halves. Sampled units act
-    at their instants, once.
+    error than tolerated is rolled back and tried shorter, and so is one that a unit discards, that gives no numbers, or
+    whose iteration does not converge; else the units go on from the two halves. Sampled units act at their instants,
+    once.
 
     Communication points are whole ticks of a grid that divides the schedule's by a power of two, and every instant of
     a sampled unit and the stop time is one of them.
@@ -70,7 +75,7 @@ class AdaptiveStepper:
         """Step sampled units that are due, and take the others to the next communication point.
 
         Raises:
-            StepTooSmall: an error is not tolerated even with the smallest step.
+            StepTooSmall: an error is not tolerated even with the smallest step. UnitFailure: a unit's call failed.
         """
         due = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick]
         self._coupling.depart(self.time, due, ())
@@ -80,7 +85,7 @@ class AdaptiveStepper:
         try:
             while not self._attempt(self._length()):
                 self._ensemble.restore(states)
-        except StepTooSmall:
+        except (StepTooSmall, *_TOO_LONG):
             self._ensemble.restore(states)
             raise
         finally:
@@ -94,6 +99,7 @@ class AdaptiveStepper:
             "due": dict(self._due),
             "acted": dict(self._acted),
             "wanted": self._wanted,
+            "coupling": self._coupling.get_state(),
             "controller": self._controller.get_state(),
             "largest": self._error.get_state(),
             "statistics": dataclasses.asdict(self.statistics),
@@ -105,6 +111,7 @@ class AdaptiveStepper:
         self._tick, self._wanted = state["tick"], state["wanted"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self.time = self._seconds(self._tick)
+        self._coupling.set_state(state["coupling"])
         self._controller.set_state(state["controller"])
         self._error.set_state(state["largest"])
         self.statistics = StepStatistics(**state["statistics"])
@@ -113,11 +120,16 @@ class AdaptiveStepper:
 
     def _attempt(self, length: int) -> bool:
         """Try a step from where the units are; return whether it was accepted."""
-        worst = self._try(length)
+        failure: UnitFailure | None = None
+        try:
+            worst = self._try(length)
+        except _TOO_LONG as e:
+            failure, worst = e, WorstSignal(e.unit, "", math.inf)
         if worst.error > 1:
             self.statistics.rejected += 1
             if length <= self._smallest:
-                raise StepTooSmall(worst.unit, worst.name, self.time, self._seconds(length), worst.error)
+                step = self._seconds(length)
+                raise failure or StepTooSmall(worst.unit, worst.name, self.time, step, worst.error)
             self._wanted = self._within_limits(int(length * self._controller.after_rejection(worst.error)))
             return False
         self.statistics.accept(self._seconds(length))
