@@ -20,6 +20,7 @@ Memory = Mapping[str, Any]
 class _Line:
     """An input, the trace of its source, and where in the step the input is evaluated, in halves of the step."""
 
+    port: str
     trace: Trace
     target: NDArray[Any]
     change: Linear
@@ -31,6 +32,12 @@ class _Line:
         self.target[...] = self.trace.at(half_ticks) * factor + offset
         if self.rate is not None:
             self.rate[...] = self.trace.rate(tick) * factor
+
+    def lead(self, begin: NDArray[Any], dt: float) -> None:
+        change = self.target - begin
+        self.target[...] = begin + change * (self.halves / 2)
+        if self.rate is not None:
+            self.rate[...] = change / dt
 
 
 class LinearInputs:
@@ -71,6 +78,12 @@ class LinearInputs:
         for line in self._lines[unit]:
             line.feed(at + line.halves * long, self._tick)
 
+    def lead(self, unit: str, begin: Mapping[str, NDArray[Any]], dt: float) -> None:
+        """Let inputs that were written for the end of a step of length dt come from values `begin`, by port."""
+        for line in self._lines[unit]:
+            if line.port in begin:
+                line.lead(begin[line.port], dt)
+
     def step(self, unit: str) -> None:
         """Take note that a unit has gone on."""
         self._at[unit] = self._ticks(self._instances[unit].time)
@@ -109,6 +122,7 @@ class LinearInputs:
         values = self._instances[c.source.unit].y[c.source.port][0]
         rate = target.du.get(c.target.port)
         return _Line(
+            port=c.target.port,
             trace=traces.setdefault(c.source.port, Trace(values)),
             target=target.u[c.target.port][0],
             change=system.change_by(c) or Linear(),
