@@ -2,6 +2,7 @@
 
 import logging
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ CIRCLE = (-2.0, 0.5, 3.0)
 every = pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT, Algorithm.NEWTON])
 
 
-def circle(gains: tuple[float, ...] = CIRCLE, fmi: int = 3, **flags: bool) -> System:
+def circle(gains: tuple[float, ...] = CIRCLE, fmi: int = 3, **flags: Any) -> System:
     """Return units y = a u + 1, each of which feeds the next, the last one the first."""
     s = System()
     units = [s.add(f"u{i}", native_fmu("gain", fmi, **flags), a=a, b=1.0) for i, a in enumerate(gains)]
@@ -48,12 +49,12 @@ def test_a_loop_of_three_units_is_solved_at_the_start(algorithm: Algorithm, fmi:
 def test_jacobi_solves_loops_at_the_start_alone():
     seen: list[float] = []
     with Master(circle(), MasterOptions(algorithm=Algorithm.JACOBI)) as master:
-        master.run(Fraction(1, 10), [lambda t, y: seen.append(float(y["u0.y"]))])  # noqa: ARG005
+        master.run(Fraction(1, 10), [lambda _t, y: seen.append(float(y["u0.y"]))])
     assert seen == pytest.approx([solution()[0]] * 2, rel=1e-7)
     assert not master.iterates
 
 
-def driven(sampled: bool = False, **flags: bool) -> System:
+def driven(sampled: bool = False, **flags: Any) -> System:
     """Return x' = 1 and y = x - 2 z, z = 3 y + 1: a loop of two units whose solution moves with time."""
     s = System()
     ramp = s.add("ramp", native_fmu("integrator"), u=1.0, period=Fraction(1, 10))
@@ -169,14 +170,14 @@ def test_directional_derivatives_give_what_differences_give(
     asked: list[str] = []
     told = Instance.directional_derivative
 
-    def spy(self: Instance, *arguments: object) -> object:
+    def spy(self: Instance, *arguments: Any) -> Any:
         asked.append(self.name)
-        return told(self, *arguments)  # type: ignore[arg-type]
+        return told(self, *arguments)
 
     monkeypatch.setattr(Instance, "directional_derivative", spy)
     flag = "providesDirectionalDerivative" + ("" if fmi == 2 else "s")
     for given in (True, False):
-        s = circle(fmi=fmi, **{flag: given})
+        s = circle(CIRCLE, fmi, **{flag: given})
         s.connections[1] = type(s.connections[1])(s.connections[1].source, s.connections[1].target, Linear(100.0, 1.0))
         with caplog.at_level(logging.ERROR), Master(s) as master:
             y = [float(master.signals[f"u{i}.y"]) for i in range(3)]

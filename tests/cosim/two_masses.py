@@ -7,6 +7,7 @@ them, takes those and gives the force.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from native_units import native_fmu
@@ -32,7 +33,7 @@ class TwoMasses:
     def system(self, period: Fraction, fmi: int = 3, **flags: bool) -> System:
         """Return it as two units."""
         s = System()
-        own: Mapping[str, float] = {"m": self.m, "k": self.k, "d": self.d, "x0": 1.0}
+        own: Mapping[str, Any] = {"m": self.m, "k": self.k, "d": self.d, "x0": 1.0}
         a = s.add("a", native_fmu("mass", fmi, **flags), period=period, **own)
         b = s.add("b", native_fmu("sprung_mass", fmi, **flags), period=period, k_c=self.k_c, d_c=self.d_c, **own)
         s.connect(a.y.x, b.u.x1)
@@ -70,9 +71,9 @@ class TwoMasses:
 START = np.array([1.0, 0.0, 1.0, 0.0])
 
 
-def held(A: object, B: object, dt: float) -> tuple[Floats, Floats]:
+def held(a: object, b: object, dt: float) -> tuple[Floats, Floats]:
     """Return x(t + dt) = a x(t) + b u of x' = A x + B u with u held."""
-    A, B = np.array(A, dtype=np.float64), np.array(B, dtype=np.float64)
+    A, B = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
     n, m = B.shape
     whole = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * dt)
     return whole[:n, :n], whole[:n, n:]
