@@ -50,10 +50,6 @@ class Interface:
         for _, place, view in self._places.get(unit, ()):
             view[:] = x[place]
 
-    def held(self, unit: str) -> dict[str, Floats]:
-        """Return, by port, what a unit's buffers hold."""
-        return {port: np.array(view) for port, _, view in self._places.get(unit, ())}
-
     def parts(self, unit: str, x: Floats) -> dict[str, Floats]:
         """Return, by port, the numbers that belong to a unit's inputs."""
         return {port: x[place] for port, place, _ in self._places.get(unit, ())}

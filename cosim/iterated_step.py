@@ -78,12 +78,9 @@ class IteratedStep:
 
     def _step_one(self, t: float, slot: Slot, x: Floats) -> None:
         self._ensemble.gather(slot.unit, t)
-        lines, begin = self._ensemble.lines, self._interface.held(slot.unit)
-        if lines is not None:
-            lines.feed(slot.unit, t, slot.period)
         self._interface.write(slot.unit, x)
-        if lines is not None:
-            lines.lead(slot.unit, begin, slot.period)
+        if self._ensemble.lines is not None:
+            self._ensemble.lines.feed(slot.unit, t, slot.period, self._interface.parts(slot.unit, x))
         self._ensemble.instances[slot.unit].set_inputs()
         self._ensemble.step(slot.unit, t, slot.period)
         self._ensemble.publish(slot.unit)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
 
+from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from cosim.coupling import Coupling
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
@@ -47,8 +48,8 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`, or units
-            make circles that cannot be solved.
+        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule` and
+            `check_control`, or units make circles that cannot be solved.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -57,6 +58,8 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
+        if options.adaptive is not None:
+            check_control(system)
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
@@ -144,10 +147,8 @@ class Master:
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)
         ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
-        if self.options.extrapolation is Extrapolation.LINEAR:
-            ensemble.extrapolate(self.schedule.tick)
         self._coupling = self._couple(ensemble)
-        self._stepper = GridStepper(self.schedule, self._coupling, ensemble.lines)
+        self._stepper = self._stepper_of(ensemble, self._coupling)
         self._ensemble = ensemble
 
     def _end(self) -> UnitHung | None:
@@ -175,6 +176,14 @@ class Master:
             if ended or until():
                 break
             self.stepper.depart()
+
+    def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
+        control = self.options.adaptive
+        if self.options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
+        if control is None:
+            return GridStepper(self.schedule, coupling, ensemble.lines)
+        return AdaptiveStepper(self.schedule, coupling, ensemble, control, self.options.order)
 
     def _groups(self) -> Sequence[Group]:
         """Return the units that are not sampled, those together that have to agree at each step."""

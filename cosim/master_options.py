@@ -3,6 +3,7 @@
 import enum
 from dataclasses import dataclass
 
+from cosim.adaptive_step import AdaptiveStep
 from cosim.extrapolation import Extrapolation
 
 
@@ -36,6 +37,7 @@ class MasterOptions:
         tolerance: the largest difference, relative to a signal's magnitude, at which iterated signals agree.
         most_iterations: after so many iterations of a step, the run fails.
         extrapolation: what inputs are between communication points; see `Extrapolation`.
+        adaptive: how the step follows the error; None for fixed steps.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
@@ -45,6 +47,12 @@ class MasterOptions:
     tolerance: float = 1e-8
     most_iterations: int = 100
     extrapolation: Extrapolation = Extrapolation.HOLD
+    adaptive: AdaptiveStep | None = None
     compiled: bool = True
     call_limit: float | None = None
     pace: float | None = None
+
+    @property
+    def order(self) -> int:
+        """The power of the step with which the error of a run goes: see `Extrapolation`."""
+        return 2 if self.extrapolation is Extrapolation.LINEAR else 1
