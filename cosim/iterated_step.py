@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 
 from cosim.ensemble import Ensemble
+from cosim.failures import NotFinite
 from cosim.instance import State
 from cosim.interface import Interface
 from cosim.interface_solver import InterfaceSolver, Unsolved
@@ -16,10 +17,10 @@ from cosim.schedule import Slot
 class IteratedStep:
     """Lets units step one after another until the inputs that lead back have the values that come out at the end.
 
-    Each goes from t with its inputs held at the values of the end of the step, or on lines to these where inputs are
-    extrapolated. States are saved before and restored for
-    each further iteration. Inputs that lead back but are not real keep the values of t. FMI leaves no other way to
-    outputs for other inputs: after a step, outputs may not be fetched again once inputs are set.
+    Each goes from t with its inputs held at the values of the end of the step, or where inputs are extrapolated with
+    inputs that lie on the line from the values of t to those. States are saved before and restored for each further
+    iteration. Inputs that lead back but are not real keep the values of t. FMI leaves no other way to outputs for other
+    inputs: after a step, outputs may not be fetched again once inputs are set.
 
     Args:
         ensemble: the units.
@@ -47,10 +48,10 @@ class IteratedStep:
         states = self._ensemble.save([s.unit for s in slots])
         try:
             self._iterate(t, slots, states)
-        except NotConverged:
+        except (NotConverged, NotFinite):
             self._ensemble.forget(states)
             raise
-        self._ensemble.forget(states)  # not after a unit's failure: whether it still takes the call is not known
+        self._ensemble.forget(states)  # not after another failure: whether it still takes the call is not known
 
     def _iterate(self, t: float, slots: Sequence[Slot], states: "dict[str, State]") -> None:
         spent = {s.unit: 0.0 for s in slots}
