@@ -146,7 +146,7 @@ class UnitRefused(CosimError):
         self.failure = failure
 
 
-class BadOptions(CosimError):
+class BadOptions(CosimError, ValueError):
     """Options of a master that make no sense; `faults` lists everything that is wrong with them."""
 
     def __init__(self, faults: Sequence[str]) -> None:

@@ -4,6 +4,7 @@ import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
+from typing import TypeVar
 
 from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from cosim.coupling import Coupling
@@ -25,11 +26,14 @@ from cosim.iteration_count import IterationCount
 from cosim.jacobi import Jacobi
 from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.pacing import Pacer
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
+
+T = TypeVar("T")
 
 _PLAIN = MasterOptions()
 
@@ -63,6 +67,8 @@ class Master:
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
+        self.pacer = Pacer(options.pace) if options.pace is not None else None
+        """What keeps the run in step with the wall clock, if it is to."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
         self._endings = Endings()
         self._ensemble: Ensemble | None = None
@@ -142,7 +148,15 @@ class Master:
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
-        self._watchdog.carry_out(lambda: self._run(stop, observers, until))
+        self.carry_out(lambda: self._run(stop, observers, until))
+
+    def carry_out(self, job: Callable[[], T]) -> T:
+        """Do something else with the units in the thread that they are called from, with the same time limit.
+
+        Raises:
+            UnitHung: a unit does not return. Besides, whatever the job raises.
+        """
+        return self._watchdog.carry_out(job)
 
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)
@@ -166,11 +180,15 @@ class Master:
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
+        if self.pacer is not None:
+            self.pacer.start(self.time)
         last = self.schedule.ticks(stop)
         while True:
             ended = self.stepper.arrive(last)
             if self.heartbeat.stopped:
                 raise Abandoned
+            if self.pacer is not None:
+                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():

@@ -1,9 +1,11 @@
 """How a master couples its units."""
 
 import enum
+import math
 from dataclasses import dataclass
 
 from cosim.adaptive_step import AdaptiveStep
+from cosim.exceptions import BadOptions
 from cosim.extrapolation import Extrapolation
 
 
@@ -41,6 +43,9 @@ class MasterOptions:
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
+
+    Raises:
+        BadOptions: with every number that makes no sense.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
@@ -51,6 +56,17 @@ class MasterOptions:
     compiled: bool = True
     call_limit: float | None = None
     pace: float | None = None
+
+    def __post_init__(self) -> None:
+        faults = [
+            f"{name} = {value}: a finite number above 0 is right"
+            for name in ("tolerance", "call_limit", "pace")
+            if (value := getattr(self, name)) is not None and not 0 < value < math.inf
+        ]
+        if self.most_iterations < 1:
+            faults.append(f"most_iterations = {self.most_iterations}: a whole number from 1 on is right")
+        if faults:
+            raise BadOptions(faults)
 
     @property
     def order(self) -> int:

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from fmus.build import cached
 from scenarios.command import main
 from scenarios.record import Record
+from scenarios.run_folder import RunFolder
 
 sys.path.insert(0, str(Path(__file__).parent))  # killed_run
 
@@ -37,6 +38,8 @@ def assert_same(joined: Path, whole: Path) -> None:
     assert summary_of(joined) == summary_of(whole)
     names = {str(p.relative_to(whole)) for p in whole.rglob("*")}
     assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
+    told, wanted = (json.loads((folder / "run.json").read_text()) for folder in (joined, whole))
+    assert told | {"checkpoint": None} == wanted
 
 
 def slow(*values: Any) -> Any:
@@ -46,7 +49,8 @@ def slow(*values: Any) -> Any:
 @pytest.mark.parametrize(
     ("scenario", "every", "passed", "number"),
     [
-        ("ir_grasp", 3, 7, signal.SIGKILL),
+        ("ir_grasp -p strategy=forward -p forward=0.055", 0.7, 1.6, signal.SIGKILL),
+        slow("ir_grasp", 3, 7, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGINT),
         slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
         slow("vsl_hybrid", 0.5, 1.2, signal.SIGKILL),
@@ -58,10 +62,11 @@ def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
 ):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     waits = passed + every / 3
-    arguments = ("run", scenario, "--seed", "3", "--out")
+    arguments = ("run", *scenario.split(), "--seed", "3", "--out")
     ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
     assert ended in (-signal.SIGKILL, 1)
     assert call(*arguments, whole).exit_code == 0
+    RunFolder.left_at(killed).add_to_run(failure={"kind": "killed"})  # as whoever completes the folder of a dead run
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
