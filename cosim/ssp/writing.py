@@ -9,7 +9,6 @@ from pathlib import Path
 from cosim.exceptions import NotExportable
 from cosim.fmu_description import FmuPort
 from cosim.linear import Linear
-from cosim.ssp.changes import converted
 from cosim.ssp.connected_ports import entry_names
 from cosim.ssp.described_types import DescribedTypes, add_dimensions
 from cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
@@ -126,7 +125,7 @@ class _Structure:
                 one, other = (c.source, c.target) if len(from_) < len(to) else (c.target, c.source)
                 faults.append(f"{one} is one array variable and each entry of {other} one; FMUs of one form are right")
                 continue
-            change = c.transformation or converted(a.unit, b.unit)
+            change = c.transformation or self._system.change_by(c)
             for y, u in zip(from_, to, strict=True):
                 ends = {"startElement": c.source.unit, "startConnector": y}
                 ends |= {"endElement": c.target.unit, "endConnector": u}
