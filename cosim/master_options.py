@@ -2,7 +2,9 @@
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
 
 from cosim.adaptive_step import AdaptiveStep
 from cosim.exceptions import BadOptions
@@ -67,6 +69,19 @@ class MasterOptions:
             faults.append(f"most_iterations = {self.most_iterations}: a whole number from 1 on is right")
         if faults:
             raise BadOptions(faults)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return what decides on a run's signals, as JSON can hold it; exact numbers of seconds are texts."""
+        control = None if self.adaptive is None else asdict(self.adaptive)
+        if control is not None:
+            control = {name: str(value) if isinstance(value, Fraction) else value for name, value in control.items()}
+        return {
+            "algorithm": self.algorithm.value,
+            "tolerance": self.tolerance,
+            "iterations": self.most_iterations,
+            "extrapolation": self.extrapolation.value,
+            "adaptive": control,
+        }
 
     @property
     def order(self) -> int:

@@ -4,7 +4,7 @@ import math
 import statistics
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -209,7 +209,8 @@ def _speed(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
     for name, spent in master.cpu.items():
         total = float(np.sum(spent))
         metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
-        simulated = len(spent) * float(master.system.units[name].period)
+        unit = master.system.units[name]  # its own period says nothing of steps that follow their error
+        simulated = master.time if master.steps and not unit.sampled else len(spent) * float(unit.period)
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
     return metrics
 
@@ -225,7 +226,7 @@ def _peak_memory() -> float | None:
 
 def _configuration(task: Task) -> dict[str, Any]:
     values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
-    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed}
+    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed, "master": task.options.as_data()}
 
 
 def _options(task: Task) -> dict[str, Any]:
@@ -243,6 +244,7 @@ def _summary(
         "reason": outcome.reason,
         "metrics": {k: _metric(m) for k, m in metrics.items()},
         "simulated_seconds": master.time,
+        **({} if master.steps is None else {"steps": asdict(master.steps)}),
         "wall_seconds": spent.wall,
         "cpu_seconds": spent.cpu,
     }
