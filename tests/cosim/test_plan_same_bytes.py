@@ -8,7 +8,10 @@ from both_paths import expect_alike
 from fmu_of import FmuOf
 from native_units import native_fmu
 
+from cosim.linear import Linear
+from cosim.master import Master
 from cosim.master_options import Algorithm
+from cosim.signal_buffer import SignalBuffer
 from cosim.system import System
 
 SECOND = Fraction(1)
@@ -60,6 +63,19 @@ def test_a_second_run_goes_on_where_the_first_ended(algorithm: Algorithm, tmp_pa
 
 
 @algorithms
+def test_sampled_units_act_once_where_one_run_ends_and_another_begins(
+    fmu: FmuOf, algorithm: Algorithm, tmp_path: Path
+):
+    def build() -> System:
+        s = System()
+        s.add("sampled", fmu("Counter"), sampled=True)
+        s.add("other", native_fmu("ramp", 2), period=Fraction(1, 5))
+        return s
+
+    expect_alike(build, SECOND, tmp_path, algorithm, [Fraction(1, 2), Fraction(1, 2), SECOND])
+
+
+@algorithms
 def test_units_of_measurement_on_their_way(algorithm: Algorithm, tmp_path: Path):
     def build() -> System:
         s = System()
@@ -68,6 +84,8 @@ def test_units_of_measurement_on_their_way(algorithm: Algorithm, tmp_path: Path)
         for name in ("angle", "length", "temperature"):
             s.connect(source.y.y, getattr(other.u, f"{name}_in"))
             s.connect(getattr(other.y, name), getattr(si.u, f"{name}_in"))
+        reader = s.add("reader", native_fmu("integrator", 2))
+        s.connect(source.y.y, reader.u.u, Linear(0.3, 0.7))
         return s
 
     expect_alike(build, 5 * SECOND, tmp_path, algorithm)
