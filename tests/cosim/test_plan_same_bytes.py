@@ -149,3 +149,16 @@ def test_numbers_of_other_widths(fmu: FmuOf, fmi: int, algorithm: Algorithm, tmp
         return s
 
     assert expect_alike(build, 2 * SECOND, tmp_path, algorithm).failure is None
+
+
+def test_what_a_unit_gave_does_not_stay_in_its_memory():
+    s = System()
+    s.add("passer", native_fmu("binary_passer", 3), u=b"some bytes")
+    with Master(s) as master:
+        master.run(SECOND)
+        (getter,) = master.ensemble.instances["passer"].getters
+        kept = int(getter.native.arrays[0][0])
+        SignalBuffer.__call__(getter)  # without the copy that an OutputBuffer makes
+        assert int(getter.native.arrays[0][0]) != kept
+        getter.native.arrays[0][0] = kept
+        assert master.signals["passer.y"].tobytes() == b"some bytes"
