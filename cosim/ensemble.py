@@ -194,7 +194,7 @@ class Ensemble:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
         self._endings.add(temporary.cleanup)
         folder = Path(temporary.name)
-        self.heartbeat.tell(scratch=temporary.name)
+        self.heartbeat.tell_scratch(temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description

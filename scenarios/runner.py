@@ -126,7 +126,7 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
         fmus = {n: u.description.path for n, u in master.system.units.items()}
         task.folder.write_run(configuration, fmus)
     master.heartbeat.tell(
-        folder=str(task.folder.path.absolute()),
+        folder=str(task.folder.path),
         configuration=_configuration(task),
         title=task.experiment.title,
         parameters=_parameter_rows(task),
