@@ -4,7 +4,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from both_paths import expect_alike
+from both_paths import PLAIN, expect_alike
 from fmu_of import FmuOf
 from native_units import native_fmu
 
@@ -15,7 +15,7 @@ from cosim.signal_buffer import SignalBuffer
 from cosim.system import System
 
 SECOND = Fraction(1)
-algorithms = pytest.mark.parametrize("algorithm", list(Algorithm))
+algorithms = pytest.mark.parametrize("algorithm", PLAIN)
 
 
 def two_masses(fmi: tuple[int, int], *, slower: int = 1, step: Fraction = Fraction(1, 64)) -> System:
@@ -63,9 +63,7 @@ def test_a_second_run_goes_on_where_the_first_ended(algorithm: Algorithm, tmp_pa
 
 
 @algorithms
-def test_sampled_units_act_once_where_one_run_ends_and_another_begins(
-    fmu: FmuOf, algorithm: Algorithm, tmp_path: Path
-):
+def test_sampled_units_act_once_where_one_run_ends_and_another_begins(fmu: FmuOf, algorithm: Algorithm, tmp_path: Path):
     def build() -> System:
         s = System()
         s.add("sampled", fmu("Counter"), sampled=True)
@@ -132,7 +130,6 @@ def test_bytes_of_native_units(algorithm: Algorithm, tmp_path: Path):
         return s
 
     expect_alike(build, SECOND, tmp_path, algorithm)
-
 
 
 @algorithms
