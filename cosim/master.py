@@ -27,6 +27,8 @@ from cosim.jacobi import Jacobi
 from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.pacing import Pacer
+from cosim.plan.choice import plan_stepper
+from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.step_statistics import StepStatistics
@@ -134,7 +136,10 @@ class Master:
 
     @property
     def cpu(self) -> "dict[str, array.array[float]]":
-        """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        """CPU seconds of every step, by unit, if the options ask for it.
+
+        With Gauss-Seidel, setting inputs and getting outputs are included.
+        """
         return self.ensemble.cpu
 
     @property
@@ -166,6 +171,7 @@ class Master:
 
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)
+        ensemble.measures_cpu = self.options.cpu_times
         ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
         self._coupling = self._couple(ensemble)
         self._stepper = self._stepper_of(ensemble, self._coupling)
@@ -189,24 +195,38 @@ class Master:
         if self.pacer is not None:
             self.pacer.start(self.time)
         last = self.schedule.ticks(stop)
+        if isinstance(self.stepper, PlanStepper):
+            pause = None if self.pacer is None else self._pause(until)
+            self.stepper.run(last, signals, observers, None if until is never else until, pause)
+            return
         while True:
             ended = self.stepper.arrive(last)
             if self.heartbeat.stopped:
                 raise Abandoned
             if self.pacer is not None:
-                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
+                self._pause(until)()
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():
                 break
             self.stepper.depart()
 
+    def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
+        """Return what waits until the wall clock is where the simulated time is."""
+
+        def pause() -> None:
+            if self.pacer is not None:
+                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
+
+        return pause
+
     def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         control = self.options.adaptive
         if self.options.extrapolation is Extrapolation.LINEAR:
             ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
         if control is None:
-            return GridStepper(self.schedule, coupling, ensemble.lines)
+            plan = plan_stepper(self.schedule, ensemble, coupling, self.options, iterates=self.iterates)
+            return plan or GridStepper(self.schedule, coupling, ensemble.lines)
         return AdaptiveStepper(self.schedule, coupling, ensemble, control, self.options.order)
 
     def _groups(self) -> Sequence[Group]:

@@ -42,6 +42,7 @@ class MasterOptions:
         most_iterations: after so many iterations of a step, the run fails.
         extrapolation: what inputs are between communication points; see `Extrapolation`.
         adaptive: how the step follows the error; None for fixed steps.
+        cpu_times: whether `Master.cpu` has the CPU time of every step; to take it costs 0.2 us a step.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
@@ -55,6 +56,7 @@ class MasterOptions:
     most_iterations: int = 100
     extrapolation: Extrapolation = Extrapolation.HOLD
     adaptive: AdaptiveStep | None = None
+    cpu_times: bool = False
     compiled: bool = True
     call_limit: float | None = None
     pace: float | None = None

@@ -4,7 +4,7 @@ import math
 import statistics
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -83,7 +83,7 @@ def carry_out(
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
     if task.every is not None:
         check_states(system)
-    master = Master(system, task.options, heartbeat_of_run())
+    master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())
     began = False
     try:
         with master:
