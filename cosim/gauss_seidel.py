@@ -39,12 +39,14 @@ class GaussSeidel:
         self._continuous.step(t, continuous)
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return what was learnt and counted; see `Coupling`."""
+        """Return what was learnt and counted, nothing where no unit iterates; see `Coupling`."""
+        if not self.count.steps:
+            return {}
         sampled, continuous = self._sampled.get_state(), self._continuous.get_state()
         return {"sampled": sampled, "continuous": continuous, "count": self.count.get_state()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to what `get_state` gave."""
-        self._sampled.set_state(state["sampled"])
-        self._continuous.set_state(state["continuous"])
-        self.count.set_state(state["count"])
+        self._sampled.set_state(state.get("sampled", []))
+        self._continuous.set_state(state.get("continuous", []))
+        self.count.set_state(state.get("count", IterationCount().get_state()))

@@ -1,7 +1,7 @@
 """Steps groups of units one after another; the units of a circle until they agree."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from cosim.ensemble import Ensemble
@@ -36,7 +36,8 @@ class GroupStepping:
         self._place = {name: (i, j) for i, group in enumerate(groups) for j, name in enumerate(group.units)}
         self._iterated: dict[tuple[str, ...], IteratedStep | None] = {}
         for name, (i, _) in self._place.items():
-            ensemble.instances[name].goes_back = bool(groups[i].circle)
+            if groups[i].circle:
+                ensemble.instances[name].goes_back = True
 
     def step(self, t: float, due: Sequence[Slot]) -> None:
         """Step units that are due.
@@ -45,31 +46,33 @@ class GroupStepping:
             UnitFailure: a unit's call failed. NotConverged: a circle did not come to agree.
         """
         in_order = sorted(due, key=lambda slot: self._place[slot.unit])
-        for i, members in itertools.groupby(in_order, key=lambda slot: self._place[slot.unit][0]):
+        for circle, members in itertools.groupby(in_order, key=self._circle_of):
             slots = list(members)
-            iterated = self._iterated_step(self._groups[i], slots)
+            iterated = None if circle is None else self._iterated_step(self._groups[circle], slots)
             if iterated is None:
                 self._one_after_another(t, slots)
             else:
                 iterated.step(t, slots)
 
-    def get_state(self) -> Mapping[str, Any]:
-        """Return what solvers have learnt; JSON can hold it."""
-        learnt = [[list(units), step.solver.get_state()] for units, step in self._iterated.items() if step is not None]
-        return {"learnt": learnt}
+    def get_state(self) -> list[Any]:
+        """Return, by units that iterate together, what their solver has learnt; JSON can hold it."""
+        return [[list(units), step.solver.get_state()] for units, step in self._iterated.items() if step is not None]
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
+    def set_state(self, state: list[Any]) -> None:
         """Go back to where `get_state` was called."""
         self._iterated.clear()
-        for units, learnt in state["learnt"]:
+        for units, learnt in state:
             step = self._make(self._groups[self._place[units[0]][0]], units)
             if step is not None:
                 step.solver.set_state(learnt)
             self._iterated[tuple(units)] = step
 
+    def _circle_of(self, slot: Slot) -> int | None:
+        """Return the place of the group that a unit iterates with; None for those that step by themselves."""
+        i, _ = self._place[slot.unit]
+        return i if self._groups[i].circle else None
+
     def _iterated_step(self, group: Group, slots: Sequence[Slot]) -> IteratedStep | None:
-        if not group.circle:
-            return None
         units = tuple(s.unit for s in slots)
         if units not in self._iterated:
             self._iterated[units] = self._make(group, units)

@@ -15,6 +15,7 @@ from cosim.checkpoint import check_states
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
+from cosim.iteration_count import IterationCount
 from cosim.master import Master, Observer
 from cosim.master_options import MasterOptions
 from cosim.recorder import Recorder
@@ -212,7 +213,17 @@ def _speed(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
         unit = master.system.units[name]  # its own period says nothing of steps that follow their error
         simulated = master.time if master.steps and not unit.sampled else len(spent) * float(unit.period)
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
-    return metrics
+    return {**metrics, **_iterations(master.iterations)}
+
+
+def _iterations(count: IterationCount) -> dict[str, Metric]:
+    if not count.steps:
+        return {}
+    told = f"mean number of iterations of a step that was iterated, {count.most} at most"
+    return {
+        "iterations": Metric(count.iterations / count.steps, "1", told),
+        "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
+    }
 
 
 def _peak_memory() -> float | None:

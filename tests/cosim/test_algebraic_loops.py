@@ -83,6 +83,19 @@ def test_a_loop_is_solved_at_each_step(algorithm: Algorithm, sampled: bool):
     assert seen[-1][0] == pytest.approx(1.0)
 
 
+def test_of_a_loop_of_several_rates_those_iterate_that_are_due():
+    s = System()
+    fast = s.add("fast", native_fmu("gain"), a=-2.0, b=1.0, period=Fraction(1, 10), sampled=True)
+    slow = s.add("slow", native_fmu("gain"), a=0.5, b=1.0, period=Fraction(1, 5), sampled=True)
+    s.connect(fast.y.y, slow.u.u)
+    s.connect(slow.y.y, fast.u.u)
+    with Master(s) as master:
+        master.run(Fraction(1, 2))
+        y = [float(master.signals[name]) for name in ("fast.y", "slow.y")]
+        assert master.iterations.steps == 3  # at 0, 0.2 and 0.4 s
+    assert y == pytest.approx([-0.5, 0.75], rel=1e-7)
+
+
 def test_a_circle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCaptureFixture):
     s = System()
     both = s.add("both", native_fmu("discrete_passer"), count_in=7)
