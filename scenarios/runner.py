@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.checkpoint import check_states
+from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
@@ -107,7 +107,7 @@ def carry_out(
     if failure is not None:
         task.folder.add_to_run(failure=failure.as_data())
     if complete:
-        task.folder.checkpoint.unlink(missing_ok=True)
+        remove_checkpoint(task.folder.checkpoint)
     _present(task, watch, summary, system_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
 

@@ -61,6 +61,19 @@ def test_a_checkpoint_is_written_at_the_first_communication_point_that_is_not_be
     assert times == [2 / 3, 1.0, 5 / 3, 2.0, 8 / 3, 3.0]
 
 
+def test_a_checkpoint_that_cannot_be_written_is_told_and_the_run_goes_on(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    s = System()
+    s.add("sine", native_fmu("sine"))
+    checkpoint_of(tmp_path).mkdir()
+    with Master(s) as master, Recorder(record_of(tmp_path)) as recorder:
+        write = checkpointed.Checkpointer(checkpoint_of(tmp_path), Fraction(1), master, recorder)
+        master.run(Fraction(3, 2), [recorder, write])
+        assert master.time == 1.5
+    assert "checkpoint.zip cannot be written at t = 1 s, the former one stays: Is a directory" in caplog.text
+
+
 @pytest.mark.parametrize("algorithm", Algorithm)
 def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, algorithm: Algorithm):
     options = MasterOptions(algorithm=algorithm)
@@ -157,6 +170,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_former_one(tmp_path: Pat
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert read_checkpoint(file) == _some()
+    assert os.listdir(tmp_path) == [file.name]
 
 
 def _some(kept: bytes = b"kept") -> Checkpoint:

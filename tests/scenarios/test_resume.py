@@ -1,5 +1,6 @@
 import fcntl
 import json
+import pickle
 import shutil
 import signal
 import sys
@@ -11,7 +12,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fmus.build import cached
+from scenarios.catalog import SCENARIOS
 from scenarios.command import main
+from scenarios.parameters import parse_parameters
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
 
@@ -34,7 +37,8 @@ def summary_of(folder: Path) -> dict[str, Any]:
 
 
 def assert_same(joined: Path, whole: Path) -> None:
-    assert (joined / "signals.parquet").read_bytes() == (whole / "signals.parquet").read_bytes()
+    for record in whole.glob("signals.*"):
+        assert (joined / record.name).read_bytes() == record.read_bytes(), record.name
     assert summary_of(joined) == summary_of(whole)
     names = {str(p.relative_to(whole)) for p in whole.rglob("*")}
     assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
@@ -49,7 +53,7 @@ def slow(*values: Any) -> Any:
 @pytest.mark.parametrize(
     ("scenario", "every", "passed", "number"),
     [
-        ("ir_grasp -p strategy=forward -p forward=0.055", 0.7, 1.6, signal.SIGKILL),
+        ("ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat", 0.7, 1.6, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGINT),
         slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
@@ -66,6 +70,7 @@ def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
     ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
     assert ended in (-signal.SIGKILL, 1)
     assert call(*arguments, whole).exit_code == 0
+    (killed / "checkpoint.zip.part").write_text("of a process that died as it wrote one")
     RunFolder.left_at(killed).add_to_run(failure={"kind": "killed"})  # as whoever completes the folder of a dead run
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
@@ -89,6 +94,14 @@ def test_a_run_of_an_ssp_goes_on(tmp_path: Path):
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_what_judges_a_run_can_be_kept(name: str):
+    experiment = SCENARIOS[name]()
+    watch = experiment.watch(parse_parameters(SCENARIOS[name], []))
+    kept = pickle.loads(pickle.dumps(watch))
+    assert vars(kept).keys() == vars(watch).keys()
 
 
 @pytest.fixture(scope="module")
