@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cosim.exceptions import InvalidFmu, last_line
 from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
+from cosim.magnitudes import Floats
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
@@ -169,6 +172,30 @@ class Instance:
         function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
         flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
         return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
+
+    def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return how outputs change with inputs at this instant, the unit's state being as it is.
+
+        Args:
+            outputs: names of real outputs.
+            inputs: a direction: how fast each of some real inputs changes, all its entries in row-major order.
+
+        Returns:
+            How fast the outputs change then, by name.
+
+        Raises:
+            UnitFailure: it does not tell.
+        """
+        d = self.description
+        unknowns, knowns = [d.outputs[y] for y in outputs], [d.inputs[u] for u in inputs]
+        seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
+        found = np.zeros(sum(p.size for p in unknowns))
+        references = (_references(unknowns), _references(knowns))
+        lengths = ((), ()) if self._fmi == 2 else ((len(seed),), (len(found),))
+        vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
+        self._call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
+        ends = np.cumsum([p.size for p in unknowns])[:-1]
+        return dict(zip(outputs, np.split(found, ends), strict=True))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -336,3 +363,12 @@ class Instance:
             line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
             self.log.append(line)
             self._heartbeat.log(self.name, line)
+
+
+def _references(ports: Sequence[FmuPort]) -> Any:
+    references = [r for p in ports for r in p.references]
+    return (ctypes.c_uint * len(references))(*references)
+
+
+def _doubles(values: Floats) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
