@@ -152,3 +152,11 @@ class UnitRefused(CosimError):
     def __init__(self, failure: UnitFailure) -> None:
         super().__init__(f"{failure.unit} does not start: {failure.told}")
         self.failure = failure
+
+
+class BadOptions(CosimError, ValueError):
+    """Options of a master that make no sense; `faults` lists everything that is wrong with them."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("; ".join(faults))
+        self.faults = tuple(faults)
