@@ -4,6 +4,7 @@ import enum
 from dataclasses import dataclass
 
 from cosim.adaptive_step import AdaptiveStep
+from cosim.exceptions import BadOptions
 from cosim.extrapolation import Extrapolation
 
 
@@ -41,6 +42,9 @@ class MasterOptions:
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
+
+    Raises:
+        BadOptions: with everything that is wrong.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
@@ -51,6 +55,15 @@ class MasterOptions:
     compiled: bool = True
     call_limit: float | None = None
     pace: float | None = None
+
+    def __post_init__(self) -> None:
+        faults: list[str] = []
+        if not 0 < self.tolerance < 1:
+            faults.append(f"the tolerance of iterated signals is {self.tolerance!r}; it must be above 0 and below 1")
+        if self.most_iterations < 2:
+            faults.append(f"{self.most_iterations} iterations at most; at least 2 are needed to see an agreement")
+        if faults:
+            raise BadOptions(faults)
 
     @property
     def order(self) -> int:
