@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
 from cosim.endings import Endings
 from cosim.exceptions import CosimError
@@ -29,6 +30,14 @@ from cosim.system import PortName, System
 _log = logging.getLogger(__name__)
 
 
+class Feeding(NamedTuple):
+    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
+
+    narrowings: Sequence[Narrowing]
+    copies: Sequence[Copy]
+    scaled: Sequence[ScaledCopy]
+
+
 class Ensemble:
     """Loads a system's units and carries out what an algorithm wants of them, one unit at a time.
 
@@ -43,6 +52,8 @@ class Ensemble:
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.measures_cpu = False
+        """Whether CPU time is taken of steps."""
         self.lines: LinearInputs | None = None
         """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
@@ -102,6 +113,10 @@ class Ensemble:
         if self.lines is not None and dt is not None:
             self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
+
+    def feeding(self, unit: str) -> Feeding:
+        """Return what `feed` does before it sets a unit's inputs, where none are extrapolated."""
+        return Feeding(self._narrowings[unit], self._copies[unit], self._scaled[unit])
 
     def feed_known(self, unit: str, known: Collection[str]) -> None:
         """Set only the inputs whose sources are units that are known; the others keep what they have.
@@ -174,16 +189,21 @@ class Ensemble:
         for name, state in states.items():
             self.instances[name].free_state(state)
 
+    def finite_check(self, unit: str) -> FiniteCheck:
+        """Return the check that `publish` makes of a unit's outputs."""
+        return self._finite[unit]
+
     @contextlib.contextmanager
     def stopwatch(self) -> Generator[Callable[[str], None], None, None]:
         """Give a function that charges the CPU time since it was last called, or since the start, to a unit."""
-        began = time.process_time()
+        began = time.process_time() if self.measures_cpu else 0.0
 
         def charge(unit: str) -> None:
             nonlocal began
-            ended = time.process_time()
-            self.cpu[unit].append(ended - began)
-            began = ended
+            if self.measures_cpu:
+                ended = time.process_time()
+                self.cpu[unit].append(ended - began)
+                began = ended
 
         yield charge
 
@@ -191,7 +211,7 @@ class Ensemble:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
         self._endings.add(temporary.cleanup)
         folder = Path(temporary.name)
-        self.heartbeat.tell(scratch=temporary.name)
+        self.heartbeat.tell_scratch(temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description

@@ -115,19 +115,23 @@ class Heartbeat:
         self._seconds[_LIMIT] = limit
 
     @property
-    def over(self) -> bool:
-        """Whether the process that writes ends because it is done, not within a call."""
-        return self._cells[_OVER] != 0
+    def status(self) -> int | None:
+        """With what status the process that writes ends because it is done; None: it is not done."""
+        return self._cells[_OVER] - 1 if self._cells[_OVER] else None
 
-    @over.setter
-    def over(self, over: bool) -> None:
-        self._cells[_OVER] = over
+    @status.setter
+    def status(self, status: int) -> None:
+        self._cells[_OVER] = status + 1
 
     def tell(self, **facts: Any) -> None:
         """Keep facts, which JSON can hold, for the case that this process dies."""
         text = json.dumps({**self.facts, **facts})
         self._notes.clear()
         self._notes.append(text)
+
+    def tell_scratch(self, folder: str) -> None:
+        """Keep the place of a folder that is to be removed if this process dies."""
+        self.tell(scratch=[*self.facts.get("scratch", []), folder])
 
     @property
     def facts(self) -> dict[str, Any]:

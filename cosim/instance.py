@@ -3,6 +3,7 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,16 @@ State = ctypes.c_void_p
 
 _LOG_LINES = 30
 _DISCARD, _FATAL = 2, 4
+
+
+@dataclass(frozen=True)
+class NativeStep:
+    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
+
+    fmi: int
+    function: int
+    component: int
+    flags: tuple[int, ...]
 
 
 class Instance:
@@ -123,11 +134,44 @@ class Instance:
         self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
         self._returned()
-        if status > 1:
-            self._fail(f"{self._prefix}DoStep", status)
-        if self._fmi == 3 and self._terminate.value:
-            raise UnitEnded(self.name, "fmi3DoStep", t, tuple(self.log))
+        self.judge_step(status)
         self.time = t + dt
+
+    def judge_step(self, status: int) -> None:
+        """Look at what a step that was taken at `time` answered.
+
+        Raises:
+            UnitFailure: anything but OK or a warning, or the wish to end the simulation.
+        """
+        self.judge(f"{self._prefix}DoStep", status)
+        if self._fmi == 3 and self._terminate.value:
+            raise UnitEnded(self.name, "fmi3DoStep", self.time, tuple(self.log))
+
+    def judge(self, call: str, status: int) -> None:
+        """Look at what a call answered at `time`.
+
+        Raises:
+            UnitFailure: anything but OK or a warning.
+        """
+        if status > 1:
+            self._fail(call, status)
+
+    @property
+    def setters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `set_inputs` sets."""
+        return self._setters
+
+    @property
+    def getters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `get_outputs` fetches."""
+        return self._getters
+
+    @property
+    def native_step(self) -> NativeStep:
+        """The call that `step` makes, for a program in C."""
+        function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
+        flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
+        return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
 
     def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return how outputs change with inputs at this instant, the unit's state being as it is.

@@ -4,6 +4,7 @@ import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
+from typing import TypeVar
 
 from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from cosim.coupling import Coupling
@@ -25,11 +26,16 @@ from cosim.iteration_count import IterationCount
 from cosim.jacobi import Jacobi
 from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.pacing import Pacer
+from cosim.plan.choice import plan_stepper
+from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
+
+T = TypeVar("T")
 
 _PLAIN = MasterOptions()
 
@@ -63,6 +69,8 @@ class Master:
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
+        self.pacer = Pacer(options.pace) if options.pace is not None else None
+        """What keeps the run in step with the wall clock, if it is to."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
         self._endings = Endings()
         self._ensemble: Ensemble | None = None
@@ -122,7 +130,10 @@ class Master:
 
     @property
     def cpu(self) -> "dict[str, array.array[float]]":
-        """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        """CPU seconds of every step, by unit, if the options ask for it.
+
+        With Gauss-Seidel, setting inputs and getting outputs are included.
+        """
         return self.ensemble.cpu
 
     @property
@@ -142,10 +153,19 @@ class Master:
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
-        self._watchdog.carry_out(lambda: self._run(stop, observers, until))
+        self.carry_out(lambda: self._run(stop, observers, until))
+
+    def carry_out(self, job: Callable[[], T]) -> T:
+        """Do something else with the units in the thread that they are called from, with the same time limit.
+
+        Raises:
+            UnitHung: a unit does not return. Besides, whatever the job raises.
+        """
+        return self._watchdog.carry_out(job)
 
     def _start(self) -> None:
         ensemble = Ensemble(self.system, self.heartbeat, self._endings)
+        ensemble.measures_cpu = self.options.cpu_times
         ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
         self._coupling = self._couple(ensemble)
         self._stepper = self._stepper_of(ensemble, self._coupling)
@@ -166,23 +186,41 @@ class Master:
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
+        if self.pacer is not None:
+            self.pacer.start(self.time)
         last = self.schedule.ticks(stop)
+        if isinstance(self.stepper, PlanStepper):
+            pause = None if self.pacer is None else self._pause(until)
+            self.stepper.run(last, signals, observers, None if until is never else until, pause)
+            return
         while True:
             ended = self.stepper.arrive(last)
             if self.heartbeat.stopped:
                 raise Abandoned
+            if self.pacer is not None:
+                self._pause(until)()
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():
                 break
             self.stepper.depart()
 
+    def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
+        """Return what waits until the wall clock is where the simulated time is."""
+
+        def pause() -> None:
+            if self.pacer is not None:
+                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
+
+        return pause
+
     def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         control = self.options.adaptive
         if self.options.extrapolation is Extrapolation.LINEAR:
             ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
         if control is None:
-            return GridStepper(self.schedule, coupling, ensemble.lines)
+            plan = plan_stepper(self.schedule, ensemble, coupling, self.options, iterates=self.iterates)
+            return plan or GridStepper(self.schedule, coupling, ensemble.lines)
         return AdaptiveStepper(self.schedule, coupling, ensemble, control, self.options.order)
 
     def _groups(self) -> Sequence[Group]:

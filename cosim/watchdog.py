@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from cosim.failures import UnitHung
 from cosim.heartbeat import Call, Heartbeat
+from cosim.stillness import Stillness
 
 T = TypeVar("T")
 
@@ -77,17 +78,10 @@ class Watchdog:
 
     def _watch(self, task: _Task, limit: float) -> None:
         look = min(limit / 4, _SLOWEST_LOOK)
-        seen: tuple[int, int] | None = None
-        waited, looked = 0.0, self._clock()
+        stillness = Stillness(self._heartbeat, 2 * look, self._clock)
         while not task.done.wait(look):
-            passed, looked = self._clock() - looked, self._clock()
-            beat = self._heartbeat.beat
-            if beat is None or beat != seen:
-                seen, waited = beat, 0.0
-                continue
-            waited += min(passed, 2 * look)
-            if waited >= limit:
-                self._give_up(task, beat, limit)
+            if stillness.look() >= limit and stillness.beat is not None:
+                self._give_up(task, stillness.beat, limit)
 
     def _give_up(self, task: _Task, beat: tuple[int, int], limit: float) -> None:
         """Leave the thread in its call and raise UnitHung, unless the call returns in this very moment."""
