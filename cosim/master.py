@@ -31,6 +31,7 @@ from cosim.plan.choice import plan_stepper
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
+from cosim.step_statistics import StepStatistics
 from cosim.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
@@ -122,6 +123,11 @@ class Master:
         """Whether units go over steps again; the steps of others are plain."""
         going_back = self.options.algorithm is not Algorithm.JACOBI
         return going_back and any(g.circle for g in (*self.schedule.sampled_groups, *self._continuous))
+
+    @property
+    def steps(self) -> StepStatistics | None:
+        """What became of steps that follow their error; None where steps are fixed."""
+        return self._stepper.statistics if isinstance(self._stepper, AdaptiveStepper) else None
 
     @property
     def time(self) -> float:

@@ -2,7 +2,9 @@
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
 
 from cosim.adaptive_step import AdaptiveStep
 from cosim.exceptions import BadOptions
@@ -46,7 +48,7 @@ class MasterOptions:
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
 
     Raises:
-        BadOptions: with everything that is wrong.
+        BadOptions: with every number that makes no sense.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
@@ -60,17 +62,28 @@ class MasterOptions:
     pace: float | None = None
 
     def __post_init__(self) -> None:
-        faults: list[str] = []
-        if not 0 < self.tolerance < 1:
-            faults.append(f"the tolerance of iterated signals is {self.tolerance!r}; it must be above 0 and below 1")
-        if self.most_iterations < 2:
-            faults.append(f"{self.most_iterations} iterations at most; at least 2 are needed to see an agreement")
-        for name in ("call_limit", "pace"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                faults.append(f"{name} = {value}: a finite number above 0 is right")
+        faults = [
+            f"{name} = {value}: a finite number above 0 is right"
+            for name in ("tolerance", "call_limit", "pace")
+            if (value := getattr(self, name)) is not None and not 0 < value < math.inf
+        ]
+        if self.most_iterations < 1:
+            faults.append(f"most_iterations = {self.most_iterations}: a whole number from 1 on is right")
         if faults:
             raise BadOptions(faults)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return what decides on a run's signals, as JSON can hold it; exact numbers of seconds are texts."""
+        control = None if self.adaptive is None else asdict(self.adaptive)
+        if control is not None:
+            control = {name: str(value) if isinstance(value, Fraction) else value for name, value in control.items()}
+        return {
+            "algorithm": self.algorithm.value,
+            "tolerance": self.tolerance,
+            "iterations": self.most_iterations,
+            "extrapolation": self.extrapolation.value,
+            "adaptive": control,
+        }
 
     @property
     def order(self) -> int:

@@ -26,7 +26,7 @@ def following(
     tolerance: float, algorithm: Algorithm = Algorithm.GAUSS_SEIDEL, initial: Fraction | None = None
 ) -> MasterOptions:
     control = AdaptiveStep(relative=tolerance, absolute=tolerance / 10, initial=initial)
-    return MasterOptions(algorithm=algorithm, extrapolation=Extrapolation.LINEAR, adaptive=control)
+    return MasterOptions(algorithm=algorithm, extrapolation=Extrapolation.LINEAR, adaptive=control, cpu_times=True)
 
 
 def statistics(master: Master) -> StepStatistics:
@@ -47,7 +47,7 @@ def test_the_global_error_follows_the_tolerance(algorithm: Algorithm, fmi: int):
 
 
 def test_fewer_steps_for_the_same_error_where_a_transient_dies_away():
-    fixed_options = MasterOptions(algorithm=Algorithm.JACOBI, extrapolation=Extrapolation.LINEAR)
+    fixed_options = MasterOptions(algorithm=Algorithm.JACOBI, extrapolation=Extrapolation.LINEAR, cpu_times=True)
     steps: list[int] = []
     errors: list[float] = []
     for options in (following(1e-3, Algorithm.JACOBI), fixed_options):
@@ -100,6 +100,23 @@ def test_a_run_goes_on_bit_by_bit_from_a_state():
             master.stepper.set_state(state)
         master.ensemble.forget(units)
     assert found[0] == found[1]
+
+
+def test_a_step_that_a_unit_discards_is_tried_shorter():
+    """It takes 0.04 s at most, and y = t shows no error."""
+    s = System()
+    s.add("impatient", native_fmu("discards"), period=Fraction(1, 10))
+    seen: dict[float, float] = {}
+
+    def observe(t: float, signals: Signals) -> None:
+        seen[t] = float(signals["impatient.y"])
+
+    with Master(s, following(1e-4)) as master:
+        master.run(Fraction(1), [observe])
+        found = statistics(master)
+    assert list(seen.values()) == pytest.approx(list(seen))
+    assert found.rejected >= 1
+    assert found.longest <= 0.08  # two halves
 
 
 def test_units_that_cannot_be_rolled_back_or_vary_their_step_are_all_named():

@@ -8,7 +8,7 @@ import pytest
 from native_units import native_fmu
 from two_masses import TwoMasses
 
-from cosim.exceptions import BadOptions, ScheduleError
+from cosim.exceptions import ScheduleError
 from cosim.instance import Instance
 from cosim.master import Master, Observer
 from cosim.master_options import Algorithm, MasterOptions
@@ -84,13 +84,6 @@ def test_what_does_not_converge_is_told_with_signals_time_and_iterations(algorit
     assert "a, b: iterating at t = 0 s came to no solution in 2 iterations" in str(e)
     assert "b.f -> a.f still moves by" in str(e)
     assert json.loads(json.dumps(e.as_data()))["moving"].keys() == {"b.f -> a.f"}
-
-
-def test_options_that_cannot_be_met_are_refused_together():
-    with pytest.raises(BadOptions) as caught:
-        MasterOptions(tolerance=0.0, most_iterations=1)
-    assert "the tolerance of iterated signals is 0.0" in str(caught.value)
-    assert "1 iterations at most" in str(caught.value)
 
 
 @both
