@@ -135,9 +135,12 @@ class Ensemble:
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name))
+            instance = self._make(name, unpacked[d.path])
             cleanup.callback(instance.free)
             self.instances[name] = instance
+
+    def _make(self, name: str, folder: Path) -> Instance:
+        return Instance(name, self.system.units[name].description, folder, self.system.sources_of(name))
 
     def _wire(self) -> None:
         for name, instance in self.instances.items():

@@ -21,8 +21,13 @@ Logger = Callable[[int, str], None]
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
-def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger) -> Any:
-    """Load and instantiate an FMI 3 co-simulation FMU; return FMPy's `FMU3Slave`.
+def load_fmi3(
+    path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger, *, events: bool = False
+) -> Any:
+    """Load and instantiate an FMI 3 co-simulation FMU, with event mode and early return or without.
+
+    Returns:
+        FMPy's `FMU3Slave`.
 
     Raises:
         InvalidFmu: the library does not load, lacks a function, or does not instantiate.
@@ -36,7 +41,7 @@ def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: s
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
         with _unloading(fmu):
-            fmu.instantiate(loggingOn=True, logMessage=log_message)
+            fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
         return fmu
 
 

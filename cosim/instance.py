@@ -6,18 +6,23 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from cosim.event_failures import EndRequested, StepDiscarded
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
+from cosim.step_end import StepEnd
 from cosim.variable import Kind
 
 State = ctypes.c_void_p
 """A saved state of one instance, which alone knows what it points to."""
 
 _LOG_LINES = 30
+_DISCARD = 2
 _FATAL = 4
+_PENDING = 5
+_LAST_SUCCESSFUL_TIME, _TERMINATED = ctypes.c_int(2), ctypes.c_int(3)  # of fmi2StatusKind
 
 
 class Instance:
@@ -34,10 +39,9 @@ class Instance:
         self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
         self._fmi = description.fmi
         self._prefix = f"fmi{self._fmi}"
-        load = load_fmi2 if self._fmi == 2 else load_fmi3
         d = description
         try:
-            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
+            self._fmu = self._load(folder)
         except InvalidFmu as e:
             raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
         self._component = self._fmu.component
@@ -95,10 +99,37 @@ class Instance:
         self.time = t
         status = self._do_step(self._component, t, dt, *self._step_arguments)
         if status > 1:
-            self._fail(f"{self._prefix}DoStep", status)
+            reached = self._discarded_at(status)
+            raise self.discarded(reached, "steps are not repeated unless the master is told to (repeat_discarded)")
         if self._fmi == 3 and self._terminate.value:
-            raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
+            raise EndRequested(self.name, "fmi3DoStep", t, tuple(self.log))
         self.time = t + dt
+
+    def try_step(self, t: float, dt: float) -> StepEnd:
+        """Advance from t by dt, or as far as the unit goes.
+
+        Raises:
+            UnitFailure: the unit answered anything but OK, a warning or a discard, or ended the simulation.
+        """
+        self.time = t
+        status = self._do_step(self._component, t, dt, *self._step_arguments)
+        if status > 1:
+            return StepEnd(self._discarded_at(status), early=True, discarded=True)
+        if self._fmi == 2:
+            self.time = t + dt
+            return StepEnd(self.time)
+        if self._terminate.value:
+            raise EndRequested(self.name, "fmi3DoStep", self._last_time.value, tuple(self.log))
+        early = self._early.value and self._last_time.value < t + dt
+        self.time = self._last_time.value if early else t + dt
+        if not self.time >= t:
+            told = f"a return at t = {self.time:.9g} s, which is before the step's begin"
+            raise UnitFailure(self.name, "fmi3DoStep", t, told, tuple(self.log))
+        return StepEnd(self.time, early, self._event.value)
+
+    def discarded(self, reached: float, reason: str) -> StepDiscarded:
+        """Return the failure of a step that the unit discarded and that is not repeated, for a reason."""
+        return StepDiscarded(self.name, f"{self._prefix}DoStep", self.time, reached, reason, tuple(self.log))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -132,6 +163,27 @@ class Instance:
         if self._component is not None and self._failed != _FATAL:
             self._component = None
             self._fmu.freeInstance()
+
+    def _load(self, folder: Path) -> Any:
+        load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
+        return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line)
+
+    def _discarded_at(self, status: int) -> float:
+        """Return how far a step came that was not carried out; raise if it was not discarded."""
+        if status == _PENDING:
+            # the standard knows asynchronous steps; nothing is won by waiting here for what could have been waited for
+            self._function("CancelStep")(self._component)
+        if status != _DISCARD:
+            self._fail(f"{self._prefix}DoStep", status)
+        if self._fmi == 3:
+            return self.time
+        reached, ended = ctypes.c_double(self.time), ctypes.c_int()
+        if self._function("GetRealStatus")(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) > 1:
+            reached.value = self.time
+        told = self._function("GetBooleanStatus")(self._component, _TERMINATED, ctypes.byref(ended))
+        if told <= 1 and ended.value:
+            raise EndRequested(self.name, "fmi2DoStep", reached.value, tuple(self.log))
+        return reached.value
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:

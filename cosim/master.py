@@ -7,6 +7,8 @@ from types import TracebackType
 
 from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
+from cosim.event_ensemble import EventEnsemble
+from cosim.event_stepper import EventStepper
 from cosim.exceptions import UnitFailure, UnitRefused
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
@@ -47,10 +49,10 @@ class Master:
         self._stepper: Stepper | None = None
 
     def __enter__(self) -> "Master":
-        ensemble = Ensemble(self.system)
+        ensemble = EventEnsemble(self.system) if self.has_events else Ensemble(self.system)
         try:
             ensemble.initialize(self.schedule.slots)
-            self._stepper = GridStepper(self.schedule, self._coupling(ensemble))
+            self._stepper = self._make_stepper(ensemble)
         except UnitFailure as e:
             ensemble.close()
             raise UnitRefused(e) from e
@@ -64,6 +66,11 @@ class Master:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.ensemble.close()
+
+    @property
+    def has_events(self) -> bool:
+        """Whether steps may end off the schedule's grid; without, a run is a plain sequence of fixed steps."""
+        return self.system.has_events or self.options.repeat_discarded
 
     @property
     def ensemble(self) -> Ensemble:
@@ -113,6 +120,12 @@ class Master:
             if ended or until():
                 break
             self.stepper.depart()
+
+    def _make_stepper(self, ensemble: Ensemble) -> Stepper:
+        coupling = self._coupling(ensemble)
+        if isinstance(ensemble, EventEnsemble):
+            return EventStepper(self.schedule, ensemble, coupling)
+        return GridStepper(self.schedule, coupling)
 
     def _coupling(self, ensemble: Ensemble) -> Coupling:
         kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}

@@ -21,7 +21,10 @@ class MasterOptions:
     Attributes:
         algorithm: see `Algorithm`.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
+        repeat_discarded: whether a step that a unit discards is repeated shorter, by all units. They then save their
+            states at every step; else a discarded step ends the run. Systems with events do so anyway.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
     compiled: bool = True
+    repeat_discarded: bool = False
