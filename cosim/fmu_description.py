@@ -115,9 +115,8 @@ def describe_fmu(path: Path) -> FmuDescription:
     outputs = [v for v in md.modelVariables if v.causality == "output"]
     capabilities = capabilities_of(root, 2 if is_fmi2 else 3)
     clocks = _clocks(path, root)
-    acts_at_instants = (
-        bool(outputs) and not capabilities.varies_step and all(v.variability == "discrete" for v in outputs)
-    )
+    is_discrete = bool(outputs) and all(v.variability == "discrete" for v in outputs)
+    is_clocked = not without_clocks(clocks) or any(p.clocks for p in grouped)
     return FmuDescription(
         path=path,
         fmi=2 if is_fmi2 else 3,
