@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# A test file stays in one process: what its tests share is made once.
+PARALLEL := --numprocesses auto --dist loadfile
 
 .PHONY: demo test test-slow lint bench install clean
 
@@ -11,10 +13,10 @@ demo: $(VENV)/.installed
 install: $(VENV)/.installed
 
 test: lint $(VENV)/.installed-test
-	$(BIN)/python -m pytest -m "not slow and not paper"
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not paper"
 
 test-slow: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest $(PARALLEL) -m slow
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .

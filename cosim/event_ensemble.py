@@ -2,7 +2,7 @@
 
 import contextlib
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,6 +86,34 @@ class EventEnsemble(Ensemble):
         self.ends[unit] = replace(end, reached=t)
         self.publish(unit)
         return True
+
+    def get_begins(self, units: Iterable[str]) -> dict[str, tuple[float, str]]:
+        """Return where the steps of units began, and their serialised states there; of units that can go back."""
+        begins: dict[str, tuple[float, str]] = {}
+        for unit in units:
+            if unit in self._begun:
+                begin, state = self._begun[unit]
+                with self._at(unit, lambda i, state=state: i.restore_state(state)) as instance:
+                    begins[unit] = begin, instance.serialise_state().hex()
+        return begins
+
+    def set_begins(self, begins: Mapping[str, tuple[float, str]]) -> None:
+        """Take over what `get_begins` gave."""
+        for unit, (begin, state) in begins.items():
+            with self._at(unit, lambda i, state=state: i.deserialise_state(bytes.fromhex(state))):
+                self._keep_begin(unit, begin)
+
+    @contextlib.contextmanager
+    def _at(self, unit: str, go: Callable[[Instance], None]) -> Generator[Instance, None, None]:
+        """Let a unit be in another state for a while."""
+        instance = self.instances[unit]
+        here = instance.save_state()
+        try:
+            go(instance)
+            yield instance
+        finally:
+            instance.restore_state(here)
+            instance.free_state(here)
 
     def _repeat(self, instance: Instance, t: float, dt: float, end: StepEnd) -> StepEnd:
         """Repeat a step that was discarded, shorter: as far as the unit came, or else half as far, and so on."""

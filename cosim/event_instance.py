@@ -40,7 +40,7 @@ class EventInstance(Instance):
         self._fed = [description.inputs[i] for i in fed]
         self._outputs = list(description.outputs.values())
         self._initialized = False
-        self._held: dict[str, bytes] = {}
+        self._given: dict[str, bytes] = {}
         self._parts: dict[tuple[str, tuple[str, ...]], list[SignalBuffer]] = {}
         self._clock_calls = ClockCalls(self._call, description.clocks)
         self._flags = [ctypes.c_bool() for _ in range(5)]
@@ -122,7 +122,7 @@ class EventInstance(Instance):
     def get_timing(self) -> Mapping[str, Any]:
         """Return what a run that goes on from here must know besides the unit's state; JSON can hold it."""
         return {
-            "held": {name: content.hex() for name, content in self._held.items()},
+            "held": {name: content.hex() for name, content in self._given.items()},
             "ticks": {t.clock.name: None if t.next is None else str(t.next) for t in self.timers},
             "next_event": self.next_event,
             "in_event_mode": self.in_event_mode,
@@ -130,7 +130,7 @@ class EventInstance(Instance):
 
     def set_timing(self, timing: Mapping[str, Any]) -> None:
         """Go back to what `get_timing` gave."""
-        self._held = {name: bytes.fromhex(content) for name, content in timing["held"].items()}
+        self._given = {name: bytes.fromhex(content) for name, content in timing["held"].items()}
         self.next_event, self.in_event_mode = timing["next_event"], timing["in_event_mode"]
         for timer in self.timers:
             told = timing["ticks"][timer.clock.name]
@@ -148,11 +148,11 @@ class EventInstance(Instance):
         return [p for p in self._fed if self._is_reachable(p) and (anything or not p.discrete)]
 
     def _is_other(self, port: FmuPort) -> bool:
-        return content_of(port, self.u[port.name]) != self._held[port.name]
+        return content_of(port, self.u[port.name]) != self._given[port.name]
 
     def _hold(self, ports: Iterable[FmuPort]) -> None:
         for p in ports:
-            self._held[p.name] = content_of(p, self.u[p.name])
+            self._given[p.name] = content_of(p, self.u[p.name])
 
     def _transfer(self, verb: str, ports: list[FmuPort]) -> None:
         """Set or get ports; where they are not all of them, by way of buffers of their own."""

@@ -84,12 +84,10 @@ class EventStepper:
             course.reached = Fraction(end.reached) if end.early and end.reached < float(target) else target
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the times; see `Stepper`.
-
-        What a unit needs to go back within the step that it is in is not among it: a unit that is ahead of the
-        others stays there when a run goes on from here.
-        """
+        """Return the times, and the states to which units that are ahead may have to go back; see `Stepper`."""
+        ahead = [n for n, c in self._courses.items() if float(c.reached) > self.time]
         return {
+            "begins": self._ensemble.get_begins(ahead),
             "now": str(self._now),
             "due": {n: str(t) for n, t in self._due.items()},
             "acted": {n: str(t) for n, t in self._acted.items()},
@@ -107,6 +105,7 @@ class EventStepper:
             self._courses[name] = Course(self._periods[name], Fraction(begun), Fraction(reached), event)
         for name, timing in state["units"].items():
             self._ensemble.event_units[name].set_timing(timing)
+        self._ensemble.set_begins(state["begins"])
 
     def _present(self) -> list[str]:
         return [n for n, c in self._courses.items() if float(c.reached) == self.time]

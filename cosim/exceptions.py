@@ -57,6 +57,22 @@ class InvalidFmu(CosimError):
         self.path, self.fault, self.log = path, fault, tuple(log)
 
 
+class InvalidSsp(CosimError):
+    """A file is not an SSP that can be used; `faults` lists all that is wrong with it, and where."""
+
+    def __init__(self, path: Path, faults: Sequence[str]) -> None:
+        super().__init__(f"{path}: {'; '.join(faults)}")
+        self.path, self.faults = path, tuple(faults)
+
+
+class NotExportable(CosimError):
+    """A system cannot be written as an SSP; `faults` lists what stands against it."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__(f"it cannot be written as an SSP: {'; '.join(faults)}")
+        self.faults = tuple(faults)
+
+
 class WiringError(CosimError):
     """A system is wired wrongly; `faults` lists everything that is wrong with it."""
 

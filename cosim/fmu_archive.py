@@ -3,6 +3,7 @@
 import zipfile
 import zlib
 from pathlib import Path
+from typing import ClassVar
 
 from cosim.archive_faults import STANDARD_METHODS, archive_faults, listed
 from cosim.exceptions import InvalidFmu, one_line
@@ -26,9 +27,13 @@ class FmuArchive:
         InvalidFmu: no such file, not a zip archive, or with members that are not to be unpacked; all of them are told.
     """
 
+    kind: ClassVar[str] = "FMU"
+    description_name: ClassVar[str] = DESCRIPTION
+    """Where at the top of the archive it is told what it holds."""
+
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._members = _members(path)
+        self._members = _members(path, self.kind)
         faults = archive_faults(self._members, path.stat().st_size)
         if faults:
             raise InvalidFmu(path, "; ".join(faults))
@@ -40,22 +45,23 @@ class FmuArchive:
         return tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
 
     def description(self) -> bytes:
-        """Return modelDescription.xml.
+        """Return modelDescription.xml, or what stands in its place in another kind of archive.
 
         Raises:
             InvalidFmu: it is missing, perhaps one folder too deep, or damaged.
         """
-        if DESCRIPTION in self.names:
-            return self.read(DESCRIPTION)
-        deeper = [n for n in self.names if n.endswith(f"/{DESCRIPTION}")]
-        like = [n for n in self.names if n.lower() == DESCRIPTION.lower()]
+        wanted = self.description_name
+        if wanted in self.names:
+            return self.read(wanted)
+        deeper = [n for n in self.names if n.endswith(f"/{wanted}")]
+        like = [n for n in self.names if n.lower() == wanted.lower()]
         if deeper:
             why = f"it is at {deeper[0]}; zip what is in that folder, not the folder"
         elif like:
             why = f"there is {like[0]}; upper and lower case count"
         else:
             why = f"the archive holds {listed(self.names) or 'nothing'}"
-        raise InvalidFmu(self.path, f"no {DESCRIPTION} at the top of the archive: {why}")
+        raise InvalidFmu(self.path, f"no {wanted} at the top of the archive: {why}")
 
     def read(self, name: str) -> bytes:
         """Return a text member's content.
@@ -120,7 +126,7 @@ class FmuArchive:
             raise InvalidFmu(self.path, f"cannot be unpacked: {one_line(e)}") from e
 
 
-def _members(path: Path) -> list[zipfile.ZipInfo]:
+def _members(path: Path, kind: str) -> list[zipfile.ZipInfo]:
     if path.is_dir():
         raise InvalidFmu(path, FOLDER_FAULT)
     if not path.is_file():
@@ -129,7 +135,7 @@ def _members(path: Path) -> list[zipfile.ZipInfo]:
         with path.open("rb") as file:
             begin = file.read(4)
         if not zipfile.is_zipfile(path):
-            raise InvalidFmu(path, _no_zip(begin))
+            raise InvalidFmu(path, _no_zip(begin, kind))
         with zipfile.ZipFile(path) as z:
             return z.infolist()
     except PermissionError as e:
@@ -138,9 +144,9 @@ def _members(path: Path) -> list[zipfile.ZipInfo]:
         raise InvalidFmu(path, f"the archive is damaged: {one_line(e)}") from e
 
 
-def _no_zip(begin: bytes) -> str:
+def _no_zip(begin: bytes, kind: str) -> str:
     if not begin:
-        return "not an FMU: the file is empty"
+        return f"not an {kind}: the file is empty"
     if begin.startswith(b"PK\x03\x04"):
         return "the archive is damaged: it begins as a zip archive, but its end is missing; copy or fetch it again"
-    return "not an FMU: an FMU is a zip archive, and this file is not one"
+    return f"not an {kind}: an {kind} is a zip archive, and this file is not one"

@@ -65,7 +65,7 @@ def check_xml(content: bytes) -> None:
     except defusedxml.DTDForbidden as e:
         raise UnsafeXml(
             "it has a document type (<!DOCTYPE ...>), in which entities could be declared that exhaust memory or "
-            "fetch other files; FMUs need none: remove it"
+            "fetch other files; none is needed: remove it"
         ) from e
     except defusedxml.DefusedXmlException as e:
         raise UnsafeXml(f"it refers to what lies outside of it: {' '.join(str(e).split())}") from e

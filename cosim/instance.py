@@ -2,7 +2,7 @@
 
 import collections
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ class Instance:
         self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
         self._fmi = description.fmi
         self._prefix = f"fmi{self._fmi}"
+        self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
         d = description
         try:
             self._fmu = self._load(folder)
@@ -153,6 +154,46 @@ class Instance:
         """Free a saved state."""
         self._call("FreeFMUstate" if self._fmi == 2 else "FreeFMUState", ctypes.byref(state))
 
+    def serialise_state(self) -> bytes:
+        """Return the unit's state as bytes that mean the same in another process.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state, size = self.save_state(), ctypes.c_size_t()
+        try:
+            name = "FMUstate" if self._fmi == 2 else "FMUState"
+            self._call(f"Serialized{name}Size", state, ctypes.byref(size))
+            data = (self._byte * size.value)()
+            self._call(f"Serialize{name}", state, data, size)
+            return bytes(data)
+        finally:
+            self.free_state(state)
+
+    def deserialise_state(self, data: bytes) -> None:
+        """Go to a state that `serialise_state` gave.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state = State()
+        held = (self._byte * len(data)).from_buffer_copy(data)
+        name = "DeSerializeFMUstate" if self._fmi == 2 else "DeserializeFMUState"
+        self._call(name, held, ctypes.c_size_t(len(data)), ctypes.byref(state))
+        try:
+            self.restore_state(state)
+        finally:
+            self.free_state(state)
+
+    def contents(self) -> list[list[bytes]]:
+        """Return what `y` and the plain values of `u` hold: not always the unit's values at its present time."""
+        return [b.contents() for b in self._held()]
+
+    def refill(self, contents: Sequence[Sequence[bytes]]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        for buffer, content in zip(self._held(), contents, strict=True):
+            buffer.refill(content)
+
     def end(self) -> None:
         """Terminate the unit, unless a call failed: the standards forbid it then."""
         if self._failed is None:
@@ -206,6 +247,10 @@ class Instance:
         make = OutputBuffer if verb == "Get" and kind in ("String", "Binary") else SignalBuffer
         call = f"{self._prefix}{verb}{kind}"
         return make(call, self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
+
+    def _held(self) -> list[SignalBuffer]:
+        """Return the buffers but those of inputs that hold addresses of others' outputs, which are copied anew."""
+        return [*self._getters, *(b for b in self._setters if not b.name.endswith(("String", "Binary")))]
 
     def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:

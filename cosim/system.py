@@ -1,5 +1,6 @@
 """Units, their parameters and the connections between them, checked before anything starts."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,6 +11,7 @@ from cosim.event_wiring import clock_mismatch, event_faults, once_faults
 from cosim.exceptions import WiringError, nearest
 from cosim.fmu_clock import FmuClock
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
+from cosim.linear import Linear
 from cosim.start_values import fault_of
 from cosim.units import UNKNOWN, Unit
 from cosim.variable import Kind
@@ -72,10 +74,11 @@ class PlacedUnit:
 
 @dataclass(frozen=True)
 class Connection:
-    """An output that feeds an input."""
+    """An output that feeds an input; with a transformation, what is fed is made by that from the output's value."""
 
     source: PortName
     target: PortName
+    transformation: Linear | None = None
 
 
 class System:
@@ -84,6 +87,7 @@ class System:
     def __init__(self) -> None:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
+        self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
@@ -112,9 +116,10 @@ class System:
         self.units[name] = unit
         return unit
 
-    def connect(self, source: PortName, target: PortName) -> None:
-        """Let an output feed an input."""
-        self.connections.append(Connection(source, target))
+    def connect(self, source: PortName, target: PortName, transformation: Linear | None = None) -> None:
+        """Let an output feed an input, as it is or by a transformation, which then is in place of units' conversion."""
+        self.connections.append(Connection(source, target, transformation))
+        self._sources[target.unit][target.port] = source
 
     def check(self) -> None:
         """Check all names, values and connections.
@@ -143,14 +148,13 @@ class System:
 
     def sources_of(self, unit: str) -> dict[str, PortName]:
         """Return, by input's name, the outputs that feed a unit; its clocks are not among them."""
-        return {c.target.port: c.source for c in self.connections if c.target.unit == unit and not self._is_clock(c)}
+        sources = self._sources.get(unit, {})
+        clocks = self.units[unit].description.clocks if unit in self.units else {}
+        return {port: source for port, source in sources.items() if port not in clocks}
 
     def clock_connections(self) -> list[Connection]:
         """Return the connections that let a clock tick with another."""
-        return [c for c in self.connections if self._is_clock(c)]
-
-    def _is_clock(self, c: Connection) -> bool:
-        return c.target.port in self.units[c.target.unit].description.clocks
+        return [c for c in self.connections if c.target.port in self.units[c.target.unit].description.clocks]
 
     def _clock(self, end: PortName) -> FmuClock | None:
         unit = self.units.get(end.unit)
@@ -165,7 +169,7 @@ class System:
         b, fault_b = self._find(c.target, "input")
         if a is None or b is None:
             return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
-        reason = mismatch(a, b)
+        reason = _untransformable(a, b) if c.transformation else mismatch(a, b)
         if reason is None:
             return []
         return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
@@ -210,6 +214,12 @@ def mismatch(a: FmuPort, b: FmuPort) -> str | None:
     if a.kind is Kind.BINARY and a.mime != b.mime:
         return "their MIME types differ"
     return None
+
+
+def _untransformable(a: FmuPort, b: FmuPort) -> str | None:
+    if a.kind is not Kind.REAL or b.kind is not Kind.REAL:
+        return "only reals can be transformed"
+    return "their shapes differ" if a.shape != b.shape else None
 
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from cosim.block_description import describe
+from cosim.zip_writing import write_archive
 from fmus import interpreter
-from fmus.archive import write_archive
 from fmus.binaries import binaries
 from fmus.catalog import Entry, find_unit
 from fmus.compile import cache_folder

@@ -1,10 +1,11 @@
 """The command `handover`."""
 
+import contextlib
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -15,13 +16,16 @@ from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.build_command import build_command
 from scenarios.catalog import SCENARIOS
 from scenarios.check_command import check
-from scenarios.experiment import Experiment
+from scenarios.chosen import fmus_of, replacements, scenario_named
+from scenarios.export_command import export_command
 from scenarios.interruption import Interruption
 from scenarios.listing import print_catalog, print_scenario, print_summary, print_unit
 from scenarios.parameters import parse_parameters
 from scenarios.progress import progress_bar
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Task, carry_out
+from scenarios.ssp_call import open_experiment, refuse_for_ssp, ssp_options
+from scenarios.ssp_run import NoParameters, is_ssp
 from scenarios.vsl_train_command import vsl_train
 
 _PATH = click.Path(path_type=Path)
@@ -38,6 +42,8 @@ handover list VslArm                   a unit's parameters, inputs and outputs
 handover run helix_handover            one run; leaves a folder with a report
 handover build TendonArm --fmi both    units for other tools
 handover check Their.fmu               what is wrong with an FMU, whoever made it
+handover export ir_grasp --ssp x.ssp   a scenario for other tools
+handover run x.ssp --stop 5            a system from another tool
 handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -77,60 +83,50 @@ def list_(name: str | None) -> None:
 
 main.add_command(build_command)
 main.add_command(check)
+main.add_command(export_command)
 main.add_command(vsl_train)
 
 
 @main.command("run", context_settings={"show_default": True})
-@click.argument("scenario")
+@click.argument("scenario", metavar="SCENARIO|FILE.ssp")
 @click.option(
     "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
 @click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Let another FMU take a unit's place.")
+@ssp_options
 @click.option("--out", type=_PATH, help="Folder for the results [default: a new one in runs/].")
-def run_(scenario: str, parameters: Sequence[str], seed: int, replaced: Sequence[str], out: Path | None) -> None:
+def run_(
+    scenario: str,
+    parameters: Sequence[str],
+    seed: int,
+    replaced: Sequence[str],
+    stop: Fraction | None,
+    step: Fraction | None,
+    out: Path | None,
+) -> None:
     """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
+
+    FILE.ssp is a system from another tool (SSP 1.0 or 2.0), or from `handover export`: it runs until its stop time.
 
     Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
     """
-    experiment = _scenario(scenario)
-    with Interruption() as interruption, told_in_one_line():
-        values = parse_parameters(experiment, parameters)
-        folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{scenario}"))
-        fmus = _fmus(experiment, _replacements(experiment, replaced))
-        task = Task(experiment=experiment(), parameters=values, seed=seed, fmus=fmus, folder=folder)
+    if is_ssp(scenario):
+        refuse_for_ssp(**{"-p": parameters, "--seed": seed, "--unit": replaced})
+    elif stop is not None or step is not None:
+        raise BadCall("--stop and --step are for an SSP; a scenario has its own")
+    with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
+        if is_ssp(scenario):
+            experiment, values = open_experiment(Path(scenario), stop, step, opened), NoParameters()
+        else:
+            experiment = scenario_named(scenario)()
+            values = parse_parameters(type(experiment), parameters)
+        folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{Path(scenario).stem}"))
+        fmus = fmus_of(type(experiment), replacements(type(experiment), replaced), lambda unit: cached(unit, 3))
+        task = Task(experiment=experiment, parameters=values, seed=seed, fmus=fmus, folder=folder)
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption)
     if ended.failure:
         click.echo(str(ended.failure), err=True)
     print_summary(ended, experiment.headline, folder)
     sys.exit(UNIT_FAILED if ended.failure else 0 if ended.outcome.success else TASK_FAILED)
-
-
-def _scenario(name: str) -> type[Experiment[Any]]:
-    if name not in SCENARIOS:
-        if name in UNITS:
-            raise BadCall(f"{name} is a unit, not a scenario: {', '.join(SCENARIOS)}")
-        raise BadCall(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
-    return SCENARIOS[name]
-
-
-def _replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, Path]:
-    found: dict[str, Path] = {}
-    for text in given:
-        name, equals, file = text.partition("=")
-        if not equals or not file:
-            raise BadCall(f"--unit {text!r} is not of the form NAME=FILE")
-        if name not in experiment.units:
-            raise BadCall(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
-        if name in found:
-            raise BadCall(f"--unit: {name} is given twice")
-        found[name] = Path(file)
-    return found
-
-
-def _fmus(experiment: type[Experiment[Any]], others: Mapping[str, Path]) -> dict[str, Path]:
-    try:
-        return {name: others.get(name) or cached(unit, 3) for name, unit in experiment.units.items()}
-    except OSError as e:
-        raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e

@@ -20,6 +20,24 @@ def main(job_file: str, result_file: str) -> None:
     """Run a job."""
     job = json.loads(Path(job_file).read_text())
     log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_ssp_file(job["ssp"], job["step"]) if job["ssp"] else assembled(job)
+    numbers = [execution.slave_index_from_instance_name(unit["name"]) for unit in job["units"]]
+    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
+    check(execution.add_observer(observer))
+    check(execution.add_manipulator(manipulator))
+    rows: list[Any] = []
+    for k in range(job["steps"]):
+        for i, unit in zip(numbers, job["units"], strict=True):
+            for kind, values in unit["driven"][k].items():
+                references, numbers = zip(*values, strict=True)
+                check(getattr(manipulator, f"slave_{kind}_values")(i, list(references), list(numbers)))
+        check(execution.step())
+        rows.append([read(observer, i, unit["outputs"]) for i, unit in zip(numbers, job["units"], strict=True)])
+    Path(result_file).write_text(json.dumps(rows))
+
+
+def assembled(job: Any) -> CosimExecution:
+    """Return a system of a job's units, started and connected as it says."""
     execution = CosimExecution.from_step_size(job["step"])
     slaves = [CosimLocalSlave(unit["fmu"], unit["name"]) for unit in job["units"]]
     for slave in slaves:
@@ -32,18 +50,7 @@ def main(job_file: str, result_file: str) -> None:
                 check(getattr(execution, f"{kind}_initial_value")(i, reference, value))
     for kind, *ends in job["connections"]:
         check(getattr(execution, f"connect_{kind}_variables")(*ends) == 0)
-    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
-    check(execution.add_observer(observer))
-    check(execution.add_manipulator(manipulator))
-    rows: list[Any] = []
-    for k in range(job["steps"]):
-        for i, unit in enumerate(job["units"]):
-            for kind, values in unit["driven"][k].items():
-                references, numbers = zip(*values, strict=True)
-                check(getattr(manipulator, f"slave_{kind}_values")(i, list(references), list(numbers)))
-        check(execution.step())
-        rows.append([read(observer, i, unit["outputs"]) for i, unit in enumerate(job["units"])])
-    Path(result_file).write_text(json.dumps(rows))
+    return execution
 
 
 def read(observer: CosimObserver, slave: int, outputs: dict[str, list[int]]) -> dict[str, list[Any]]:

@@ -27,13 +27,17 @@ Row = dict[str, float]
 
 @dataclass
 class Job:
-    """Units by name, how they are connected, how far to go, and by unit the values that are set before each step."""
+    """Units by name, how they are connected, how far to go, and by unit the values that are set before each step.
+
+    With an SSP, which has the units inside, start values and connections are those in it.
+    """
 
     units: Mapping[str, Placed]
     step: Fraction
     steps: int
     connections: Connections = ()
     driven: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict[str, Any])
+    ssp: Path | None = None
 
     def run(self, folder: Path) -> dict[str, list[Row]]:
         """Run in a process of its own; return each unit's scalar outputs at every step's end.
@@ -65,6 +69,7 @@ class Job:
         return {
             "step": round(self.step * 10**9),
             "steps": self.steps,
+            "ssp": str(self.ssp) if self.ssp else "",
             "units": [self._unit(name, placed) for name, placed in self.units.items()],
             "connections": connections,
         }

@@ -24,7 +24,7 @@ from cosim.master import Master
 from cosim.ports import Floats
 from cosim.signals import Signals
 from cosim.system import System
-from fmus.archive import write_archive
+from cosim.zip_writing import write_archive
 from fmus.build import build_block, cached
 from scenarios import vsl_train_command
 from scenarios.vsl_train_command import vsl_train

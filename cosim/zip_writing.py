@@ -1,4 +1,4 @@
-"""Writes an FMU's zip file."""
+"""Writes the zip files of FMUs and SSPs."""
 
 import os
 import tempfile

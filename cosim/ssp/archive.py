@@ -1,0 +1,86 @@
+"""An SSP's zip archive, looked through before anything is taken out of it."""
+
+import posixpath
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ClassVar
+from urllib.parse import unquote, urlsplit
+
+from cosim.exceptions import InvalidFmu, InvalidSsp, nearest
+from cosim.fmu_archive import FmuArchive
+from cosim.ssp.namespaces import STRUCTURE
+
+
+class _Packed(FmuArchive):
+    kind: ClassVar[str] = "SSP"
+    description_name: ClassVar[str] = STRUCTURE
+
+
+class SspArchive:
+    """A zip archive with SystemStructure.ssd at its top, and what is referred to there by relative URIs.
+
+    Raises:
+        InvalidSsp: no such file, not a zip archive, or with members that are not to be unpacked.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if path.is_dir():
+            raise InvalidSsp(path, [f"a folder, not a file; zip what is in it, with {STRUCTURE} at the top"])
+        with _told_of_the_ssp(path):
+            self._packed = _Packed(path)
+
+    def structure(self) -> bytes:
+        """Return SystemStructure.ssd.
+
+        Raises:
+            InvalidSsp: it is missing or damaged.
+        """
+        with _told_of_the_ssp(self.path):
+            return self._packed.description()
+
+    def read(self, member: str) -> bytes:
+        """Return a text member's content.
+
+        Raises:
+            InvalidSsp: it is damaged.
+        """
+        with _told_of_the_ssp(self.path):
+            return self._packed.read(member)
+
+    def unpack(self, folder: Path) -> None:
+        """Unpack everything into a folder, after all of it has been verified.
+
+        Raises:
+            InvalidSsp: a member is damaged, or the folder does not take it.
+        """
+        with _told_of_the_ssp(self.path):
+            self._packed.unpack(folder)
+
+    def member(self, uri: str) -> str:
+        """Return the member that a URI refers to from SystemStructure.ssd.
+
+        Raises:
+            ValueError: it is no relative URI, leads out of the archive, or there is no such member.
+        """
+        parts = urlsplit(uri)
+        if parts.scheme or parts.netloc or parts.path.startswith("/"):
+            raise ValueError(f"{uri!r} lies outside of the SSP; a relative URI, such as 'resources/unit.fmu', is right")
+        if parts.fragment or parts.query or not parts.path:
+            raise ValueError(f"{uri!r} names no file of the SSP; 'resources/unit.fmu' is of the right form")
+        member = posixpath.normpath(unquote(parts.path))
+        if member.split("/")[0] == "..":
+            raise ValueError(f"{uri!r} leads out of the SSP")
+        files = [n for n in self._packed.names if not n.endswith("/")]
+        if member not in files:
+            raise ValueError(f"there is no {member!r} in the SSP; {nearest(member, files)}")
+        return member
+
+
+@contextmanager
+def _told_of_the_ssp(path: Path) -> Generator[None, None, None]:
+    try:
+        yield
+    except InvalidFmu as e:
+        raise InvalidSsp(path, [e.fault]) from e

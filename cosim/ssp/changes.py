@@ -1,0 +1,31 @@
+"""Linear changes of values one after another, and those that units need."""
+
+from cosim.linear import Linear
+from cosim.unit_conversion import conversion
+from cosim.units import UNKNOWN, Unit
+
+
+def applied(change: Linear, number: float) -> float:
+    """Return a number after a change."""
+    return change.factor * number + change.offset
+
+
+def chained(first: Linear, following: Linear) -> Linear:
+    """Return the change that makes two, one after the other."""
+    return Linear(following.factor * first.factor, following.factor * first.offset + following.offset)
+
+
+def converted(source: Unit, target: Unit) -> Linear | None:
+    """Return what makes numbers in one unit numbers in another, None where they are alike or one is not told.
+
+    Raises:
+        ValueError: they differ in dimension, or one of two that differ in name is not defined.
+    """
+    if UNKNOWN in (source, target) or (source.symbol == target.symbol and not (source.defined and target.defined)):
+        return None
+    if not (source.defined and target.defined):
+        raise ValueError(f"the unit {(target if source.defined else source).symbol!r} is not defined")
+    if source.base != target.base:
+        raise ValueError(f"{source.symbol!r} cannot be converted to {target.symbol!r}: they differ in dimension")
+    change = conversion(source, target)
+    return None if change.is_identity else change

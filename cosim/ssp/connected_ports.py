@@ -1,0 +1,73 @@
+"""Finds the variables that an SSP's connectors name in FMUs, entries of arrays among them."""
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+from cosim.fmu_description import FmuDescription, FmuPort, indices_of
+
+_SUBSCRIPT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
+
+Entry = tuple[FmuPort, int | None]
+"""A port, or with a number one of its entries, counted from 0 in row-major order."""
+
+
+def ports_of(d: FmuDescription) -> dict[str, FmuPort]:
+    """Return all parameters, inputs and outputs by name."""
+    return {**d.parameters, **d.inputs, **d.outputs}
+
+
+def find_entry(ports: Mapping[str, FmuPort], name: str) -> Entry | None:
+    """Return the port of a name, or the port and entry that a name such as `p[1]` means in an array of scalars."""
+    if name in ports:
+        return ports[name], None
+    match = _SUBSCRIPT.match(name)
+    port = ports.get(match["base"]) if match else None
+    if match is None or port is None or len(port.references) == 1:
+        return None
+    indices = tuple(map(int, match["indices"].split(",")))
+    everywhere = indices_of(port.shape)
+    return (port, everywhere.index(indices)) if indices in everywhere else None
+
+
+def entry_names(port: FmuPort) -> list[str]:
+    """Return the names of a port's variables in its FMU: its own, or one for each entry."""
+    if len(port.references) == 1:
+        return [port.name]
+    return [f"{port.name}[{','.join(map(str, index))}]" for index in indices_of(port.shape)]
+
+
+def variable_names(d: FmuDescription) -> list[str]:
+    """Return the names that connectors of an FMU can have."""
+    return [name for port in ports_of(d).values() for name in entry_names(port)]
+
+
+def taken_apart(d: FmuDescription, names: Collection[str]) -> FmuDescription:
+    """Return a description in which the named arrays of scalars are scalars, as they are in the FMU itself."""
+    if not names:
+        return d
+    apart = {n: entry_names(p) if n in names else [n] for n, p in ports_of(d).items()}
+
+    def ports(given: Mapping[str, FmuPort]) -> dict[str, FmuPort]:
+        return {e.name: e for p in given.values() for e in (_entries(p) if p.name in names else [p])}
+
+    def feedthrough(given: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        return {e: tuple(i for u in us for i in apart[u]) for y, us in given.items() for e in apart[y]}
+
+    return replace(
+        d,
+        parameters=ports(d.parameters),
+        inputs=ports(d.inputs),
+        outputs=ports(d.outputs),
+        feedthrough=feedthrough(d.feedthrough),
+        presumed_feedthrough=feedthrough(d.presumed_feedthrough),
+    )
+
+
+def _entries(port: FmuPort) -> list[FmuPort]:
+    names = entry_names(port)
+    starts = [None] * len(names) if port.start is None else port.start.split()
+    return [
+        replace(port, name=name, shape=(), references=(reference,), start=start)
+        for name, reference, start in zip(names, port.references, starts, strict=True)
+    ]

@@ -1,0 +1,233 @@
+"""Takes nested systems apart: which variable of which FMU feeds which, and with which values all start."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from cosim.exceptions import nearest
+from cosim.fmu_description import FmuDescription
+from cosim.linear import Linear
+from cosim.ssp.changes import chained, converted
+from cosim.ssp.connected_ports import find_entry, ports_of, variable_names
+from cosim.ssp.given_values import Given
+from cosim.ssp.parameter_set import SspValue
+from cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
+from cosim.units import UNKNOWN, Unit
+
+_log = logging.getLogger(__name__)
+
+_GIVES = {"output", "calculatedParameter"}
+_TAKES = {"input", "parameter"}
+
+Node = tuple[str, str]
+"""A connector: the path of its element, empty for the outermost system, and its name."""
+
+
+@dataclass(frozen=True)
+class Fed:
+    """Who feeds a connector, by which connection."""
+
+    source: Node
+    by: SspConnection
+
+
+@dataclass(frozen=True)
+class FlatConnection:
+    """A variable that feeds another. `linear` is in place of a conversion of units; None leaves that to the master."""
+
+    source: Node
+    target: Node
+    linear: Linear | None
+    where: str
+
+
+@dataclass
+class FlatSystem:
+    """Components by path, connections between their variables, and values for variables by component and name."""
+
+    components: Mapping[str, SspComponent]
+    connections: list[FlatConnection] = field(default_factory=list[FlatConnection])
+    given: dict[str, dict[str, Given]] = field(default_factory=dict[str, dict[str, Given]])
+    faults: list[str] = field(default_factory=list[str])
+
+
+def components_of(system: SspNestedSystem, path: str = "") -> Iterator[tuple[str, SspComponent]]:
+    """Yield the components of a system and of the systems in it, each with its path, such as `arm.joint`."""
+    for element in system.elements.values():
+        here = _join(path, element.name)
+        if isinstance(element, SspComponent):
+            yield here, element
+        else:
+            yield from components_of(element, here)
+
+
+def flatten(system: SspNestedSystem, descriptions: Mapping[str, FmuDescription]) -> FlatSystem:
+    """Return a system's components with what connects them; what is wrong is in `faults`, all of it."""
+    return _Flattening(system, descriptions).flat
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+class _Flattening:
+    def __init__(self, system: SspNestedSystem, descriptions: Mapping[str, FmuDescription]) -> None:
+        self._descriptions = descriptions
+        self._connectors: dict[Node, SspConnector] = {}
+        self._fed: dict[Node, Fed] = {}
+        self._values: dict[Node, SspValue] = {}
+        self.flat = FlatSystem(dict(components_of(system)))
+        self._enter(system, "")
+        for target in list(self._fed):
+            if target[0] in descriptions:
+                self._follow(target)
+        for (path, name), value in self._values.items():
+            if path in descriptions:
+                self.flat.given.setdefault(path, {}).setdefault(name, Given(value))
+
+    def _enter(self, system: SspNestedSystem, path: str) -> None:
+        self._connectors |= {(path, c.name): c for c in system.connectors.values()}
+        for element in system.elements.values():
+            here = _join(path, element.name)
+            if isinstance(element, SspNestedSystem):
+                self._enter(element, here)
+            else:
+                self._connectors |= {(here, c.name): c for c in element.connectors.values()}
+                self._check_connectors(element, here)
+                self._bind(element, here)
+        self._bind(system, path)
+        for connection in system.connections:
+            self._connect(system, path, connection)
+
+    def _bind(self, element: SspElement, path: str) -> None:
+        """Apply an element's bindings; what is bound further out, and later, takes the place of what was before."""
+        for binding in element.bindings:
+            for name, value in binding.items():
+                if not self._assign(element, path, name, value):
+                    _log.warning("%sno variable is called %r; its value is left out", value.where, name)
+
+    def _assign(self, element: SspElement, path: str, name: str, value: SspValue) -> bool:
+        if isinstance(element, SspComponent):
+            d = self._descriptions[path]
+            found = find_entry({**d.parameters, **d.inputs}, name) is not None
+        else:
+            found = name in element.connectors
+        if found:
+            self._values[path, name] = value
+        for child in element.elements.values() if isinstance(element, SspNestedSystem) else ():
+            if name.startswith(f"{child.name}."):
+                rest = name.removeprefix(f"{child.name}.")
+                found = self._assign(child, _join(path, child.name), rest, value) or found
+        return found
+
+    def _check_connectors(self, component: SspComponent, path: str) -> None:
+        d = self._descriptions[path]
+        for c in component.connectors.values():
+            if c.kind not in _TAKES | _GIVES:
+                continue
+            found = find_entry(ports_of(d), c.name)
+            if found is None:
+                if c.kind != "calculatedParameter":
+                    near = nearest(c.name, variable_names(d))
+                    self.flat.faults.append(f"{c.where}the FMU of {path!r} has no variable {c.name!r}; {near}")
+                continue
+            port = found[0]
+            if port.causality.value != c.kind:
+                told = f"{path}.{c.name} is an {c.kind} here and an {port.causality.value} in its FMU"
+                self.flat.faults.append(f"{c.where}{told}")
+            if _differ(c.unit, port.unit):
+                told = f"{path}.{c.name} is in {c.unit.symbol} here and in {port.unit.symbol} in its FMU"
+                self.flat.faults.append(f"{c.where}{told}")
+
+    def _connect(self, system: SspNestedSystem, path: str, connection: SspConnection) -> None:
+        ends = [(end, self._end(system, path, end, connection)) for end in (connection.start, connection.end)]
+        nodes = [node for _, node in ends if node is not None]
+        if len(nodes) < 2:
+            return
+        gives = [self._gives(end, node) for (end, _), node in zip(ends, nodes, strict=True)]
+        told = f"{connection.where}{connection.start} - {connection.end}: "
+        if None in gives:
+            kind = self._connectors[nodes[gives.index(None)]].kind
+            self.flat.faults.append(f"{told}connectors of kind {kind!r} cannot be connected; inputs and outputs can")
+        elif gives[0] == gives[1]:
+            self.flat.faults.append(f"{told}both ends {'give' if gives[0] else 'take'} a value; one of each is right")
+        else:
+            source, target = nodes if gives[0] else reversed(nodes)
+            if target in self._fed:
+                self.flat.faults.append(f"{told}{_join(*target)} is fed twice")
+            self._fed[target] = Fed(source, connection)
+
+    def _end(self, system: SspNestedSystem, path: str, end: SspEnd, connection: SspConnection) -> Node | None:
+        owner: SspElement = system
+        if end.element is not None:
+            if end.element not in system.elements:
+                near = nearest(end.element, system.elements)
+                self.flat.faults.append(f"{connection.where}there is no element {end.element!r}; {near}")
+                return None
+            owner = system.elements[end.element]
+        if end.connector not in owner.connectors:
+            near = nearest(end.connector, owner.connectors)
+            self.flat.faults.append(f"{connection.where}{owner.name!r} has no connector {end.connector!r}; {near}")
+            return None
+        return (path if end.element is None else _join(path, owner.name)), end.connector
+
+    def _gives(self, end: SspEnd, node: Node) -> bool | None:
+        """Tell whether an end is a source within its system; None where it is neither that nor a sink."""
+        kind = self._connectors[node].kind
+        if kind not in _GIVES | _TAKES:
+            return None
+        return kind in (_TAKES if end.element is None else _GIVES)
+
+    def _follow(self, target: Node) -> None:
+        """Find what feeds a component's variable through the systems between."""
+        hops: list[tuple[SspConnection, Node]] = []
+        node, seen = target, set[Node]()
+        while node in self._fed and (node not in seen):
+            seen.add(node)
+            hops.append((self._fed[node].by, node))
+            node = self._fed[node].source
+        where = hops[0][0].where
+        if node in seen:
+            self.flat.faults.append(f"{where}{_join(*target)} is fed by itself")
+            return
+        try:
+            linear = self._composed(node, hops[::-1])
+        except ValueError as e:
+            self.flat.faults.append(f"{where}{_join(*node)} -> {_join(*target)}: {e}")
+            return
+        if node[0] in self._descriptions:
+            self.flat.connections.append(FlatConnection(node, target, linear, where))
+        elif node in self._values:
+            self.flat.given.setdefault(target[0], {})[target[1]] = Given(self._values[node], self._unit(node), linear)
+
+    def _composed(self, source: Node, hops: list[tuple[SspConnection, Node]]) -> Linear | None:
+        """Return what a value goes through from its source; None where it is what a master does by itself."""
+        total, unit = Linear(), self._unit(source)
+        for connection, node in hops:
+            following = self._unit(node)
+            change = None if connection.keeps_units else converted(unit, following)
+            total = total if change is None else chained(total, change)
+            total = total if connection.linear is None else chained(total, connection.linear)
+            unit = unit if following == UNKNOWN else following
+        try:
+            by_itself = converted(self._own_unit(source), self._own_unit(hops[-1][1])) or Linear()
+        except ValueError:  # a conversion is forbidden that could not be done
+            return total
+        return None if total == by_itself else total
+
+    def _own_unit(self, node: Node) -> Unit:
+        """Return the unit that a variable has in its FMU."""
+        d = self._descriptions.get(node[0])
+        found = None if d is None else find_entry(ports_of(d), node[1])
+        return UNKNOWN if found is None else found[0].unit
+
+    def _unit(self, node: Node) -> Unit:
+        own = self._own_unit(node)
+        return self._connectors[node].unit if own == UNKNOWN else own
+
+
+def _differ(a: Unit, b: Unit) -> bool:
+    try:
+        return converted(a, b) is not None
+    except ValueError:
+        return a.defined and b.defined

@@ -1,0 +1,113 @@
+"""Turns values as an SSP writes them into start values of a unit's ports."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cosim.fmu_description import FmuPort
+from cosim.linear import Linear
+from cosim.ssp.changes import applied, converted
+from cosim.ssp.connected_ports import Entry, entry_names
+from cosim.ssp.parameter_set import SspValue
+from cosim.units import UNKNOWN, Unit
+from cosim.variable import Kind
+
+_TRUTHS = {"true": True, "1": True, "false": False, "0": False}
+
+
+@dataclass(frozen=True)
+class Given:
+    """A value for a variable. `unit` is that of whatever it was given to, and `then` leads from there to the variable.
+
+    Most are given to the variable itself; others to a connector of a system that feeds it.
+    """
+
+    value: SspValue
+    unit: Unit = UNKNOWN
+    then: Linear | None = None
+
+
+def start_values(given: Mapping[str, tuple[Entry, Given]]) -> tuple[dict[str, Any], set[str], list[str]]:
+    """Return a unit's start values by port, the arrays of which only some entries are given, and what is wrong.
+
+    Entries of those arrays have values of their own, by names such as `p[1]`.
+    """
+    values: dict[str, Any] = {}
+    entries: dict[str, dict[int, Any]] = {}
+    ports: dict[str, FmuPort] = {}
+    faults: list[str] = []
+    for name, ((port, index), one) in given.items():
+        try:
+            value = _value(port, index, one)
+        except ValueError as e:
+            faults.append(f"{one.value.where}{name}: {e}")
+            continue
+        if index is None:
+            values[port.name] = value
+        else:
+            entries.setdefault(port.name, {})[index] = value
+            ports[port.name] = port
+    partly = {n for n, found in entries.items() if len(found) < ports[n].size}
+    for name, found in entries.items():
+        if name in partly:
+            names = entry_names(ports[name])
+            values |= {names[k]: value for k, value in found.items()}
+        else:
+            values[name] = np.array([found[k] for k in range(len(found))]).reshape(ports[name].shape)
+    return values, partly, faults
+
+
+def _value(port: FmuPort, index: int | None, given: Given) -> Any:
+    value, shape = given.value, port.shape if index is None else ()
+    size = port.size if index is None else 1
+    if len(value.texts) != size:
+        raise ValueError(f"{len(value.texts)} values where {size} {'is' if size == 1 else 'are'} right")
+    if port.kind is not Kind.REAL:
+        if (given.then or value.linear) is not None:
+            raise ValueError(f"a linear transformation of {port.kind.value} values; only reals can be transformed")
+        return _shaped([_plain(port, value.type_name, text) for text in value.texts], shape)
+    if value.type_name in ("Boolean", "String", "Enumeration", "Binary"):
+        raise ValueError(f"it is real, and the value given is of type {value.type_name}")
+    numbers = [_float(text) for text in value.texts]
+    target = port.unit if given.unit == UNKNOWN else given.unit
+    unit_change = None if value.keeps_units else converted(value.unit, target)
+    for change in (unit_change, value.linear, given.then):
+        numbers = numbers if change is None else [applied(change, x) for x in numbers]
+    return _shaped(numbers, shape)
+
+
+def _plain(port: FmuPort, type_name: str, text: str) -> Any:
+    whole = type_name == "Integer" or "Int" in type_name
+    if port.kind is Kind.INTEGER and whole:
+        return _int(text)
+    if port.kind is Kind.ENUMERATION and (type_name == "Enumeration" or whole):
+        return _int(text) if whole else text
+    if port.kind is Kind.BOOLEAN and type_name == "Boolean":
+        if text not in _TRUTHS:
+            raise ValueError(f"{text[:80]!r} is neither true nor false")
+        return _TRUTHS[text]
+    if port.kind is Kind.STRING and type_name == "String":
+        return text
+    if port.kind is Kind.BINARY and type_name == "Binary":
+        return bytes.fromhex(text)
+    raise ValueError(f"it is {port.type_name}, and the value given is of type {type_name}")
+
+
+def _shaped(values: Sequence[Any], shape: tuple[int, ...]) -> Any:
+    return np.array(values).reshape(shape) if shape else values[0]
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{text[:80]!r} is not a number") from None
+
+
+def _int(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"{text[:80]!r} is not a whole number") from None

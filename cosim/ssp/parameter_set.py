@@ -1,0 +1,138 @@
+"""Parameter sets (SSV) and mappings of their names (SSM), in files of their own or inside the system's description."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cosim.fmu_xml import XmlElement
+from cosim.linear import Linear
+from cosim.ssp.namespaces import local, told
+from cosim.ssp.part import SspPart
+from cosim.units import UNKNOWN, BaseExponents, Unit
+
+_LISTS = ("String", "Enumeration", "Binary")
+"""Types whose values are not numbers between blanks."""
+
+_TYPES = (
+    *("Real", "Float64", "Float32", "Integer", "Boolean", *_LISTS),
+    *(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")),
+)
+
+
+@dataclass(frozen=True)
+class SspValue:
+    """A parameter's value as it is written, one text for each entry, in a unit that may be UNKNOWN.
+
+    `linear` is applied after a conversion to the target's unit, or where `keeps_units` instead of one.
+    """
+
+    type_name: str
+    texts: tuple[str, ...]
+    unit: Unit
+    where: str
+    linear: Linear | None = None
+    keeps_units: bool = False
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Where a mapping sends a parameter."""
+
+    target: str
+    linear: Linear | None
+    keeps_units: bool
+
+
+def read_units(part: SspPart, parent: XmlElement, prefix: str) -> dict[str, Unit]:
+    """Return the units that a description or a parameter set defines."""
+    units: dict[str, Unit] = {}
+    for element in part.children(parent, f"{prefix}:Units", "ssc:Unit"):
+        name = part.text(element, "name")
+        for base in part.children(element, "ssc:BaseUnit"):
+            exponents = {n: int(part.number(base, n, 0)) for n in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")}
+            factor = part.number(base, "factor", 1.0)
+            if factor == 0:
+                raise part.fault(base, f"the factor of unit {name!r} is 0")
+            units[name] = Unit(name, BaseExponents(**exponents), factor, part.number(base, "offset", 0.0))
+    return units
+
+
+def unit_named(element: XmlElement, units: Mapping[str, Unit]) -> Unit:
+    """Return the unit that a type names: UNKNOWN if none, one that is not defined if there is none of that name."""
+    symbol = element.get("unit")
+    return units.get(symbol, Unit(symbol, defined=False)) if symbol else UNKNOWN
+
+
+def read_parameter_set(part: SspPart, root: XmlElement, units: Mapping[str, Unit]) -> dict[str, SspValue]:
+    """Return the values of a parameter set by name; `units` are those of the description around it.
+
+    Raises:
+        InvalidSsp: a value is missing, of no type that is known, or there twice.
+    """
+    known = {**units, **read_units(part, root, "ssv")}
+    values: dict[str, SspValue] = {}
+    for parameter in part.children(root, "ssv:Parameters", "ssv:Parameter"):
+        name = part.text(parameter, "name")
+        if name in values:
+            raise part.fault(parameter, f"parameter {name!r} is there twice")
+        values[name] = _value(part, parameter, known)
+    return values
+
+
+def _value(part: SspPart, parameter: XmlElement, units: Mapping[str, Unit]) -> SspValue:
+    types = [c for c in parameter.children if local(c.tag) in _TYPES]
+    if len(types) != 1:
+        wanted = f"one of {', '.join(_TYPES)} is right"
+        raise part.fault(parameter, f"parameter {part.text(parameter, 'name')!r} has {len(types)} types; {wanted}")
+    (element,) = types
+    type_name = local(element.tag)
+    entries = list(part.children(element, "ssv:Value"))
+    if entries:
+        texts = [part.text(e, "value") for e in entries]
+    elif type_name in _LISTS:
+        texts = [part.text(element, "value")]
+    else:
+        texts = part.text(element, "value").split()
+    return SspValue(type_name, tuple(texts), unit_named(element, units), part.where(parameter, ""))
+
+
+def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:
+    """Return where a mapping sends parameters, by their names in the parameter set.
+
+    Raises:
+        InvalidSsp: two are sent to one name, or by a transformation that is not linear.
+    """
+    mapping: dict[str, list[Mapped]] = {}
+    targets: set[str] = set()
+    for entry in part.children(root, "ssm:MappingEntry"):
+        source, target = part.text(entry, "source"), part.text(entry, "target")
+        if target in targets:
+            raise part.fault(entry, f"two parameters are mapped to {target!r}")
+        targets.add(target)
+        mapped = Mapped(target, read_linear(part, entry), part.flag(entry, "suppressUnitConversion"))
+        mapping.setdefault(source, []).append(mapped)
+    return mapping
+
+
+def read_linear(part: SspPart, owner: XmlElement) -> Linear | None:
+    """Return the transformation of a mapping entry or a connection, None if it has none.
+
+    Raises:
+        InvalidSsp: it is not linear.
+    """
+    for child in owner.children:
+        name = local(child.tag)
+        if name == "LinearTransformation":
+            return Linear(part.number(child, "factor", 1.0), part.number(child, "offset", 0.0))
+        if name.endswith("Transformation"):
+            raise part.fault(child, f"<{told(child.tag)}> is not supported; <ssc:LinearTransformation> is")
+    return None
+
+
+def mapped_values(values: Mapping[str, SspValue], mapping: Mapping[str, Sequence[Mapped]]) -> dict[str, SspValue]:
+    """Return the values under the names that they are mapped to; others are left out, as the standard has it."""
+    return {
+        m.target: replace(values[source], linear=m.linear, keeps_units=m.keeps_units)
+        for source, entries in mapping.items()
+        for m in entries
+        if source in values
+    }

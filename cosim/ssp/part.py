@@ -1,0 +1,123 @@
+"""An XML file of an SSP, and what is wrong where in it."""
+
+import functools
+import importlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from cosim.exceptions import InvalidSsp
+from cosim.fmu_xml import UnsafeXml, XmlElement, parse_xml
+from cosim.ssp.namespaces import tag, told
+
+_etree: Any = importlib.import_module("lxml.etree")  # has no types, nor have its classes
+
+_SCHEMAS = {
+    "ssd:SystemStructureDescription": "SystemStructureDescription.xsd",
+    "ssv:ParameterSet": "SystemStructureParameterValues.xsd",
+    "ssm:ParameterMapping": "SystemStructureParameterMapping.xsd",
+}
+_MOST_TOLD = 3
+VERSIONS = ("1.0", "2.0")
+
+
+class SspPart:
+    """An XML file of an SSP. One of version 1.0 keeps to the standard's schema; of 2.0 no schema is at hand.
+
+    Args:
+        path: the SSP.
+        member: the file in it.
+        content: the file's content.
+        wanted: name of its root, such as `ssv:ParameterSet`.
+
+    Raises:
+        InvalidSsp: it is malformed, not to be read, of another version, or not what it should be.
+    """
+
+    def __init__(self, path: Path, member: str, content: bytes, wanted: str) -> None:
+        self.path, self.member = path, member
+        try:
+            self.root = parse_xml(content)
+        except UnsafeXml as e:
+            raise InvalidSsp(path, [f"{member} cannot be read: {e}"]) from e
+        self.check_root(self.root, wanted)
+        if self.root.get("version") == "1.0":
+            faults = _schema_faults(content, wanted)
+            if faults:
+                raise InvalidSsp(path, [f"{member}, {fault}" for fault in faults])
+
+    def check_root(self, root: XmlElement, wanted: str) -> None:
+        """Check the name and the version of a file's root, or of what stands for one inside another file.
+
+        Raises:
+            InvalidSsp: it is another one.
+        """
+        if root.tag != tag(wanted):
+            raise self.fault(root, f"<{told(root.tag)[:80]}> where <{wanted}> is right")
+        if root.get("version") not in VERSIONS:
+            version = root.get("version")[:80] or "none"
+            raise self.fault(root, f"the version of <{wanted}> is {version}; {' and '.join(VERSIONS)} can be read")
+
+    def fault(self, element: XmlElement, fault: str) -> InvalidSsp:
+        """Return the exception that tells of a fault at an element."""
+        return InvalidSsp(self.path, [self.where(element, fault)])
+
+    def where(self, element: XmlElement, fault: str) -> str:
+        """Return a fault with the file and line of its element before it."""
+        return f"{self.member}, line {element.line}: {fault}"
+
+    def children(self, parent: XmlElement, *names: str) -> Iterator[XmlElement]:
+        """Yield the elements that are reached by a path of names such as `ssd:Elements`."""
+        return parent.named(*map(tag, names))
+
+    def text(self, element: XmlElement, name: str) -> str:
+        """Return an attribute that must be there.
+
+        Raises:
+            InvalidSsp: it is not.
+        """
+        if name not in element.attributes:
+            raise self.fault(element, f"<{told(element.tag)}> has no attribute {name!r}")
+        return element.attributes[name]
+
+    def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
+        """Return an attribute that is a finite number; it must be there if there is no default.
+
+        Raises:
+            InvalidSsp: it is none.
+        """
+        if default is not None and name not in element.attributes:
+            return default
+        given = self.text(element, name)
+        try:
+            number = float(given)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            raise self.fault(element, f"{name}={given[:80]!r} is not a finite number")
+        return number
+
+    def flag(self, element: XmlElement, name: str) -> bool:
+        """Return an attribute that is true or false, false if it is not there.
+
+        Raises:
+            InvalidSsp: it is neither.
+        """
+        given = element.get(name, "false")
+        if given not in ("true", "false", "1", "0"):
+            raise self.fault(element, f"{name}={given[:80]!r} is neither true nor false")
+        return given in ("true", "1")
+
+
+@functools.cache
+def _schema(wanted: str) -> Any:
+    return _etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp" / "schema" / _SCHEMAS[wanted]))
+
+
+def _schema_faults(content: bytes, wanted: str) -> list[str]:
+    schema = _schema(wanted)
+    schema.validate(_etree.fromstring(content, _etree.XMLParser(resolve_entities=False, no_network=True)))
+    return [f"line {entry.line}: {entry.message}" for entry in schema.error_log][:_MOST_TOLD]

@@ -1,0 +1,79 @@
+"""What a SystemStructure.ssd says: nested systems of components, their connectors, connections and parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from cosim.linear import Linear
+from cosim.ssp.parameter_set import SspValue
+from cosim.units import Unit
+
+
+@dataclass(frozen=True)
+class SspConnector:
+    """A connector of a component or a system; `unit` is UNKNOWN where it names none."""
+
+    name: str
+    kind: str
+    type_name: str
+    unit: Unit
+    where: str
+
+
+@dataclass(frozen=True)
+class SspEnd:
+    """One end of a connection: a connector of an element, or of the enclosing system where there is no element."""
+
+    element: str | None
+    connector: str
+
+    def __str__(self) -> str:
+        return self.connector if self.element is None else f"{self.element}.{self.connector}"
+
+
+@dataclass(frozen=True)
+class SspConnection:
+    """Two ends; which one gives follows from the kinds of their connectors. `keeps_units` forbids conversions."""
+
+    start: SspEnd
+    end: SspEnd
+    linear: Linear | None
+    keeps_units: bool
+    where: str
+
+
+@dataclass(frozen=True)
+class SspElement:
+    """What components and systems have in common; of two bindings of one name the later one counts."""
+
+    name: str
+    connectors: Mapping[str, SspConnector]
+    bindings: tuple[Mapping[str, SspValue], ...]
+    where: str
+
+
+@dataclass(frozen=True)
+class SspComponent(SspElement):
+    """An FMU of the SSP: a member of its archive, and where it is annotated its communication step."""
+
+    member: str
+    period: Fraction | None
+    sampled: bool | None
+
+
+@dataclass(frozen=True)
+class SspNestedSystem(SspElement):
+    """A system: its elements by name, and connections between their connectors and its own."""
+
+    elements: Mapping[str, "SspComponent | SspNestedSystem"]
+    connections: tuple[SspConnection, ...]
+
+
+@dataclass(frozen=True)
+class SspStructure:
+    """The whole: its name, its outermost system, and the stop time of its default experiment, s."""
+
+    name: str
+    version: str
+    system: SspNestedSystem
+    stop: float | None

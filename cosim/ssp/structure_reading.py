@@ -1,0 +1,175 @@
+"""Reads SystemStructure.ssd and the parameter files that it refers to."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from cosim.fmu_xml import XmlElement
+from cosim.ssp.archive import SspArchive
+from cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE, local, told
+from cosim.ssp.parameter_set import (
+    SspValue,
+    mapped_values,
+    read_linear,
+    read_mapping,
+    read_parameter_set,
+    read_units,
+    unit_named,
+)
+from cosim.ssp.part import SspPart
+from cosim.ssp.structure import (
+    SspComponent,
+    SspConnection,
+    SspConnector,
+    SspEnd,
+    SspNestedSystem,
+    SspStructure,
+)
+from cosim.units import UNKNOWN, Unit
+
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+SET_TYPE = "application/x-ssp-parameter-set"
+MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+
+_NO_TYPES = ("ConnectorGeometry", "Annotations", "Dimension", "MetaData", "Signature")
+"""What a connector has besides its type."""
+
+
+def read_structure(archive: SspArchive) -> SspStructure:
+    """Read what an SSP says of its system.
+
+    Raises:
+        InvalidSsp: it is malformed, or refers to what is not there or not supported.
+    """
+    part = SspPart(archive.path, STRUCTURE, archive.structure(), "ssd:SystemStructureDescription")
+    systems = list(part.children(part.root, "ssd:System"))
+    if len(systems) != 1:
+        raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")
+    reader = _Reader(archive, part, read_units(part, part.root, "ssd"))
+    system = reader.system(systems[0])
+    return SspStructure(part.text(part.root, "name"), part.root.get("version"), system, _stop(part))
+
+
+def _stop(part: SspPart) -> float | None:
+    for experiment in part.children(part.root, "ssd:DefaultExperiment"):
+        start = part.number(experiment, "startTime", 0.0)
+        if start != 0:
+            raise part.fault(experiment, f"the default experiment starts at {start:g} s; only 0 s can be run")
+        if "stopTime" in experiment.attributes:
+            stop = part.number(experiment, "stopTime")
+            if stop <= 0:
+                raise part.fault(experiment, f"the default experiment ends at {stop:g} s; above 0 s is right")
+            return stop
+    return None
+
+
+class _Reader:
+    def __init__(self, archive: SspArchive, part: SspPart, units: Mapping[str, Unit]) -> None:
+        self._archive, self._part, self._units = archive, part, units
+
+    def system(self, e: XmlElement) -> SspNestedSystem:
+        part = self._part
+        elements: dict[str, SspComponent | SspNestedSystem] = {}
+        for holder in part.children(e, "ssd:Elements"):
+            for child in holder.children:
+                made = self._element(child)
+                if made.name in elements:
+                    raise part.fault(child, f"two elements are called {made.name!r}")
+                elements[made.name] = made
+        connections = tuple(map(self._connection, part.children(e, "ssd:Connections", "ssd:Connection")))
+        return SspNestedSystem(
+            part.text(e, "name"), self._connectors(e), self._bindings(e), part.where(e, ""), elements, connections
+        )
+
+    def _element(self, e: XmlElement) -> SspComponent | SspNestedSystem:
+        name = local(e.tag)
+        if name == "System":
+            return self.system(e)
+        if name == "Component":
+            return self._component(e)
+        raise self._part.fault(e, f"<{told(e.tag)}> is not supported; <ssd:Component> and <ssd:System> are")
+
+    def _component(self, e: XmlElement) -> SspComponent:
+        part = self._part
+        type_name, form = e.get("type", FMU_TYPE), e.get("implementation", "any")
+        if type_name != FMU_TYPE:
+            raise part.fault(e, f"a component of type {type_name[:80]!r}; only FMUs ({FMU_TYPE}) are supported")
+        if form not in ("any", "CoSimulation"):
+            raise part.fault(e, f"a component for {form[:80]}; only co-simulation is supported")
+        name, member = part.text(e, "name"), self._member(e, part.text(e, "source"))
+        period, sampled = self._annotated(e)
+        return SspComponent(name, self._connectors(e), self._bindings(e), part.where(e, ""), member, period, sampled)
+
+    def _member(self, e: XmlElement, uri: str) -> str:
+        try:
+            return self._archive.member(uri)
+        except ValueError as fault:
+            raise self._part.fault(e, str(fault)) from fault
+
+    def _annotated(self, e: XmlElement) -> tuple[Fraction | None, bool | None]:
+        for annotation in self._part.children(e, "ssd:Annotations", "ssc:Annotation"):
+            if annotation.get("type") != STEP_ANNOTATION:
+                continue
+            for c in annotation.children:
+                try:
+                    period = Fraction(c.get("period"))
+                except (ValueError, ZeroDivisionError):
+                    period = Fraction(0)
+                if period <= 0:
+                    raise self._part.fault(c, f"period={c.get('period')[:80]!r} is not a positive number of seconds")
+                return period, self._part.flag(c, "sampled")
+        return None, None
+
+    def _connectors(self, e: XmlElement) -> dict[str, SspConnector]:
+        part = self._part
+        made: dict[str, SspConnector] = {}
+        for c in part.children(e, "ssd:Connectors", "ssd:Connector"):
+            name = part.text(c, "name")
+            if name in made:
+                raise part.fault(c, f"two connectors are called {name!r}")
+            types = [t for t in c.children if local(t.tag) not in _NO_TYPES]
+            unit = unit_named(types[0], self._units) if types else UNKNOWN
+            type_name = local(types[0].tag) if types else ""
+            made[name] = SspConnector(name, part.text(c, "kind"), type_name, unit, part.where(c, ""))
+        return made
+
+    def _connection(self, e: XmlElement) -> SspConnection:
+        part = self._part
+        for indices in ("startIndices", "endIndices"):
+            if indices in e.attributes:
+                raise part.fault(e, f"{indices} is not supported; whole connectors can be connected")
+        return SspConnection(
+            SspEnd(e.attributes.get("startElement"), part.text(e, "startConnector")),
+            SspEnd(e.attributes.get("endElement"), part.text(e, "endConnector")),
+            read_linear(part, e),
+            part.flag(e, "suppressUnitConversion"),
+            part.where(e, ""),
+        )
+
+    def _bindings(self, e: XmlElement) -> tuple[Mapping[str, SspValue], ...]:
+        return tuple(map(self._binding, self._part.children(e, "ssd:ParameterBindings", "ssd:ParameterBinding")))
+
+    def _binding(self, e: XmlElement) -> Mapping[str, SspValue]:
+        part, root = self._content(e, "ssv:ParameterSet", SET_TYPE, "ssd:ParameterValues")
+        prefix = e.get("prefix")
+        values = {prefix + name: v for name, v in read_parameter_set(part, root, self._units).items()}
+        for mapping in self._part.children(e, "ssd:ParameterMapping"):
+            values = mapped_values(values, read_mapping(*self._content(mapping, "ssm:ParameterMapping", MAPPING_TYPE)))
+        return values
+
+    def _content(self, e: XmlElement, wanted: str, type_name: str, *holder: str) -> tuple[SspPart, XmlElement]:
+        """Return what a binding or a mapping refers to, or else has inside, with the file that it is in."""
+        part = self._part
+        if e.get("type", type_name) != type_name:
+            raise part.fault(e, f"type {e.get('type')[:80]!r} is not supported; {type_name} is")
+        if e.get("sourceBase", "SSD") != "SSD":
+            raise part.fault(e, f"sourceBase={e.get('sourceBase')[:80]!r} is not supported; SSD is")
+        inside = [c for h in part.children(e, *holder) for c in h.children]
+        inside = [c for c in inside if local(c.tag) not in ("MetaData", "Signature")]
+        if "source" in e.attributes:
+            member = self._member(e, e.attributes["source"])
+            other = SspPart(self._archive.path, member, self._archive.read(member), wanted)
+            return other, other.root
+        if len(inside) != 1:
+            raise part.fault(e, f"neither a source nor one <{wanted}> inside")
+        part.check_root(inside[0], wanted)
+        return part, inside[0]

@@ -1,0 +1,149 @@
+"""Writes a system as an SSP that other tools load."""
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+from cosim.exceptions import NotExportable
+from cosim.fmu_description import FmuPort
+from cosim.linear import Linear
+from cosim.ssp.changes import converted
+from cosim.ssp.connected_ports import entry_names
+from cosim.ssp.described_types import DescribedTypes, add_dimensions
+from cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
+from cosim.ssp.parameter_writing import bound_values, parameter_set
+from cosim.ssp.xml_writing import document, root_element
+from cosim.system import Connection, PlacedUnit, System, proposed_step
+from cosim.variable import Kind
+from cosim.zip_writing import write_archive
+
+
+def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = None) -> Path:
+    """Write a system with its FMUs and start values as an SSP; it appears complete or not at all.
+
+    It is of version 1.0 if all units are of FMI 2, else of 2.0. A communication step that is not the one that an FMU
+    proposes is told in an annotation, which other tools need not know. A conversion of units is written out, as not
+    every tool converts.
+
+    Args:
+        system: the system.
+        path: the file.
+        name: the system's name.
+        stop: the stop time of its default experiment, s.
+
+    Raises:
+        WiringError: the system has faults.
+        NotExportable: an array that is one variable is connected to one whose entries are variables.
+        OSError: the file cannot be written.
+    """
+    system.check()
+    files = _file_names(system)
+    version = "1.0" if all(u.description.fmi == 2 for u in system.units.values()) else "2.0"
+    contents = {f"resources/{file}": fmu.read_bytes() for fmu, file in files.items()}
+    bound = {n: u for n, u in system.units.items() if bound_values(u)}
+    sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
+    contents |= {sets[n]: parameter_set(u, version) for n, u in bound.items()}
+    contents[STRUCTURE] = _Structure(system, version, files, sets).described(name, stop)
+    return write_archive(path, contents)
+
+
+def _file_names(system: System) -> dict[Path, str]:
+    names: dict[Path, str] = {}
+    for unit in system.units.values():
+        file = unit.description.path
+        if file not in names:
+            plain = f"{_plain(file.stem)}.fmu"
+            names[file] = plain if plain not in names.values() else f"{_plain(file.stem)}-{len(names) + 1}.fmu"
+    return names
+
+
+def _plain(name: str) -> str:
+    """Return a name that is the same in a URI and on every disk."""
+    return re.sub(r"[^A-Za-z0-9._-]", "_", name)
+
+
+class _Structure:
+    def __init__(self, system: System, version: str, files: Mapping[Path, str], sets: Mapping[str, str]) -> None:
+        self._system, self._version, self._files, self._sets = system, version, files, sets
+        self._connected = {end for c in system.connections for end in (c.source, c.target)}
+        self._types = DescribedTypes(p for u in system.units.values() for p in self._shown(u))
+
+    def described(self, name: str, stop: Fraction | None) -> bytes:
+        """Return SystemStructure.ssd."""
+        root = root_element("ssd:SystemStructureDescription", self._version, name)
+        system = ET.SubElement(root, "ssd:System", name=name)
+        elements = ET.SubElement(system, "ssd:Elements")
+        for unit in self._system.units.values():
+            self._add_component(elements, unit)
+        self._add_connections(system)
+        self._types.add_enumerations(root, "ssd")
+        self._types.add_units(root, "ssd")
+        if stop is not None:
+            ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(stop)))
+        return document(root)
+
+    def _shown(self, unit: PlacedUnit) -> list[FmuPort]:
+        """Return a unit's inputs and outputs, of the enumerations only what is connected: see `bound_values`."""
+        ports = [*unit.description.inputs.values(), *unit.description.outputs.values()]
+        ends = {end.port for end in self._connected if end.unit == unit.name}
+        return [p for p in ports if p.kind is not Kind.ENUMERATION or p.name in ends]
+
+    def _add_component(self, elements: ET.Element, unit: PlacedUnit) -> None:
+        d = unit.description
+        component = ET.SubElement(
+            elements,
+            "ssd:Component",
+            name=unit.name,
+            type="application/x-fmu-sharedlibrary",
+            source=f"resources/{self._files[d.path]}",
+        )
+        shown = self._shown(unit)
+        connectors = ET.SubElement(component, "ssd:Connectors") if shown else component
+        for port in shown:
+            for name in entry_names(port):
+                connector = ET.SubElement(connectors, "ssd:Connector", name=name, kind=port.causality.value)
+                self._types.add_type(connector, "ssc", port)
+                add_dimensions(connector, port.shape if len(port.references) == 1 else ())
+        if unit.name in self._sets:
+            bindings = ET.SubElement(component, "ssd:ParameterBindings")
+            ET.SubElement(bindings, "ssd:ParameterBinding", source=self._sets[unit.name])
+        if (unit.period, unit.sampled) != (proposed_step(d.step), d.sampled):
+            annotations = ET.SubElement(component, "ssd:Annotations")
+            annotation = ET.SubElement(annotations, "ssc:Annotation", type=STEP_ANNOTATION)
+            told = {"xmlns": "urn:handover:communication", "period": str(unit.period)}
+            ET.SubElement(annotation, "Step", {**told, "sampled": str(unit.sampled).lower()})
+
+    def _add_connections(self, system: ET.Element) -> None:
+        connections = self._system.connections
+        parent = ET.SubElement(system, "ssd:Connections") if connections else system
+        faults: list[str] = []
+        for c in connections:
+            a, b = self._ports(c)
+            from_, to = entry_names(a), entry_names(b)
+            if len(from_) != len(to):
+                one, other = (c.source, c.target) if len(from_) < len(to) else (c.target, c.source)
+                faults.append(f"{one} is one array variable and each entry of {other} one; FMUs of one form are right")
+                continue
+            change = c.transformation or converted(a.unit, b.unit)
+            for y, u in zip(from_, to, strict=True):
+                ends = {"startElement": c.source.unit, "startConnector": y}
+                ends |= {"endElement": c.target.unit, "endConnector": u}
+                _add_connection(parent, ends, change)
+        if faults:
+            raise NotExportable(faults)
+
+    def _ports(self, c: Connection) -> tuple[FmuPort, FmuPort]:
+        units = self._system.units
+        a, b = units[c.source.unit].description, units[c.target.unit].description
+        return a.outputs[c.source.port], b.inputs[c.target.port]
+
+
+def _add_connection(parent: ET.Element, ends: dict[str, str], change: Linear | None) -> None:
+    if change is None:
+        ET.SubElement(parent, "ssd:Connection", ends)
+        return
+    element = ET.SubElement(parent, "ssd:Connection", {**ends, "suppressUnitConversion": "true"})
+    numbers = {"factor": repr(change.factor), "offset": repr(change.offset)}
+    ET.SubElement(element, "ssc:LinearTransformation", numbers)

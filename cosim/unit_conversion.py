@@ -1,0 +1,40 @@
+"""What converts a value from one unit into another of the same dimension."""
+
+from fractions import Fraction
+
+from cosim.linear import Linear
+from cosim.units import Unit
+
+_PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
+_LONG = 10**13
+"""A decimal fraction of more digits than this has was cut off or rounded somewhere."""
+_LARGEST_DIVISOR = 1000
+_ROUNDING = Fraction(1, 10**14)
+"""Tools write factors with 15 digits or more."""
+
+
+def conversion(source: Unit, target: Unit) -> Linear:
+    """Return what converts a value from a unit into another, each of its two numbers rounded once.
+
+    From SI = f_s v + o_s = f_t w + o_t follows w = (f_s / f_t) v + (o_s - o_t) / f_t. The units' own numbers are taken
+    as they are meant, not as they are rounded: see `meant_by`. So degrees in radians are multiplied by the double
+    nearest to pi/180, and radians in degrees by that nearest to 180/pi.
+    """
+    f_s, o_s, f_t, o_t = (meant_by(x) for x in (source.factor, source.offset, target.factor, target.offset))
+    return Linear(float(f_s / f_t), float((o_s - o_t) / f_t))
+
+
+def meant_by(number: float) -> Fraction:
+    """Return the exact number behind a rounded one, to 60 digits where it is a multiple of pi.
+
+    A number of few digits is that decimal fraction (0.001). One of many digits that lies within rounding of p/q or
+    pi p/q, with q up to 1000, is that: 0.277777777777778 is 5/18, 0.0174532925199433 is pi/180.
+    """
+    decimal = Fraction(repr(number))
+    if max(abs(decimal.numerator), decimal.denominator) < _LONG:
+        return decimal
+    for scale in (Fraction(1), _PI):
+        near = (decimal / scale).limit_denominator(_LARGEST_DIVISOR) * scale
+        if abs(near - decimal) <= _ROUNDING * abs(decimal):
+            return near
+    return decimal

@@ -1,0 +1,57 @@
+"""The command `handover export`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from cosim.ssp.writing import write_ssp
+from fmus.build import cached
+from fmus.fmi2_description import NoFmi2Form
+from scenarios.bad_call import BadCall, told_in_one_line
+from scenarios.chosen import fmus_of, replacements, scenario_named
+from scenarios.interruption import Interruption
+from scenarios.parameters import parse_parameters
+from scenarios.run_folder import check_place
+
+_HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
+
+Its units are FMUs of FMI 2, and of FMI 3 only where there is no other form (pictures). The SSP is of version 1.0, or of
+2.0 if a unit is of FMI 3. Parameters are bound in files of their own (SSV), one for each unit.
+"""
+
+
+@click.command("export", help=_HELP, context_settings={"show_default": True})
+@click.argument("scenario")
+@click.option("--ssp", "file", required=True, type=click.Path(path_type=Path), metavar="FILE", help="File to write.")
+@click.option(
+    "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
+@click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Let another FMU take a unit's place.")
+def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: int, replaced: Sequence[str]) -> None:
+    """Write a SCENARIO as an SSP."""
+    experiment = scenario_named(scenario)
+    with Interruption(), told_in_one_line():
+        values = parse_parameters(experiment, parameters)
+        if file.suffix.lower() != ".ssp":
+            raise BadCall(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
+        if file.is_dir():
+            raise BadCall(f"--ssp {file}: there is a folder of that name")
+        check_place(file.parent)
+        fmus = fmus_of(experiment, replacements(experiment, replaced), exchangeable)
+        chosen = experiment()
+        system = chosen.build(values, seed, lambda unit: fmus[unit])
+        try:
+            write_ssp(system, file, experiment.name, chosen.stop_time(values))
+        except OSError as e:
+            raise BadCall(f"--ssp {file}: it cannot be written: {e.strerror}") from e
+    click.echo(file)
+
+
+def exchangeable(unit: str) -> Path:
+    """Return the form of a catalog's unit that most tools load: FMI 2, or FMI 3 without arrays."""
+    try:
+        return cached(unit, 2)
+    except NoFmi2Form:
+        return cached(unit, 3, scalar=True)

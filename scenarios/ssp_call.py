@@ -1,0 +1,67 @@
+"""What a call of `handover run` says of an SSP: until when, and at which step."""
+
+import contextlib
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from cosim.ssp.ssp_file import SspFile
+from scenarios.bad_call import BadCall
+from scenarios.experiment import Experiment
+from scenarios.ssp_run import UntilStop, experiment_of
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+    """A positive number of seconds, such as 0.01 or 1/30, taken exactly."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
+        """Return the number."""
+        try:
+            seconds = Fraction(value)
+        except (ValueError, ZeroDivisionError):
+            seconds = Fraction(0)
+        if not sys.float_info.min <= seconds <= sys.float_info.max:
+            self.fail(f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30", param, ctx)
+        return seconds
+
+
+def ssp_options(command: Command) -> Command:
+    """Add the options that are for SSPs."""
+    stop = "Of FILE.ssp: when the run ends  [default: the file's own stop time]"
+    step = "Of FILE.ssp: communication step of all units  [default: what each FMU proposes]"
+    with_step = click.option("--step", type=Seconds(), metavar="SECONDS", help=step)(command)
+    return click.option("--stop", type=Seconds(), metavar="SECONDS", help=stop)(with_step)
+
+
+def refuse_for_ssp(**given: Any) -> None:
+    """Refuse options that are for scenarios.
+
+    Raises:
+        BadCall: one of them is given.
+    """
+    used = [name for name, value in given.items() if value]
+    if used:
+        raise BadCall(f"{', '.join(used)}: for scenarios; an SSP has its parameters and units inside")
+
+
+def open_experiment(
+    path: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
+) -> Experiment[UntilStop]:
+    """Open an SSP as an experiment; `opened` closes it.
+
+    Raises:
+        InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
+    """
+    ssp = opened.enter_context(SspFile(path, step))
+    until = stop or ssp.stop
+    if until is None:
+        raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
+    return experiment_of(ssp, until)

@@ -1,0 +1,99 @@
+"""An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+from cosim.signals import Signals
+from cosim.ssp.ssp_file import SspFile
+from cosim.system import System
+from cosim.variable import Kind
+from scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
+from scenarios.plotting import COLOURS, figure
+from scenarios.record import Record
+
+_MOST_SIGNALS = 6
+"""Signals in one figure."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoParameters:
+    """An SSP's parameters are bound in it."""
+
+
+class UntilStop(Watch):
+    """Lets a run go on to its stop time; reaching that is its success."""
+
+    def __init__(self, stop: Fraction) -> None:
+        self._stop, self._t = float(stop), 0.0
+
+    def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
+        """Note the time."""
+        self._t = t
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended: never before its stop time."""
+        return False
+
+    def outcome(self) -> Outcome:
+        """Return whether the stop time was reached."""
+        reached = self._t >= self._stop
+        return Outcome(success=reached, reason=f"ran to {self._t:g} s" + ("" if reached else f" of {self._stop:g} s"))
+
+
+def is_ssp(name: str) -> bool:
+    """Tell an SSP's file from a scenario's name."""
+    return Path(name).suffix.lower() == ".ssp"
+
+
+def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
+    """Return an SSP as an experiment that ends at a time, s."""
+
+    class SspExperiment(Experiment[UntilStop]):
+        """Runs the system as it is."""
+
+        name: ClassVar[str] = ssp.path.name
+        title: ClassVar[str] = f"{ssp.name}, a system from {ssp.path.name}"
+        parameters_type: ClassVar[type[Any]] = NoParameters
+        units: ClassVar[Mapping[str, str]] = {}
+        headline: ClassVar[tuple[str, ...]] = ()
+
+        def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:  # noqa: ARG002
+            return ssp.system
+
+        def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
+            return stop
+
+        def watch(self, parameters: Any) -> UntilStop:  # noqa: ARG002
+            return UntilStop(stop)
+
+        def cycle(self) -> tuple[str, ...]:
+            return ()
+
+        def draw(self, parameters: Any, watch: UntilStop, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
+            return _drawn(ssp.system, record, folder)
+
+    return SspExperiment()
+
+
+def _drawn(system: System, record: Record, folder: Path) -> list[Figure]:
+    """Draw the first real outputs of each unit over time, an axis for each."""
+    figures: list[Figure] = []
+    for name, unit in system.units.items():
+        ports = [p for p in unit.description.outputs.values() if p.kind is Kind.REAL][:_MOST_SIGNALS]
+        if not ports:
+            continue
+        file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
+        with figure(folder / file, len(ports), size=(8.0, 1.6 * len(ports) + 0.4)) as axes:
+            for ax, port in zip(axes, ports, strict=True):
+                values = record[f"{name}.{port.name}"].reshape(len(record.time), -1)
+                for k, colour in enumerate(COLOURS[: values.shape[1]]):
+                    ax.plot(record.time, values[:, k], color=colour, lw=1.0)
+                ax.set_ylabel(f"{port.name}\n{port.unit.symbol}")
+            axes[-1].set_xlabel("time, s")
+        figures.append(Figure(file, f"Outputs of {name} over time."))
+    return figures
