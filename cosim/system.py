@@ -149,7 +149,7 @@ class System:
     def sources_of(self, unit: str) -> dict[str, PortName]:
         """Return, by input's name, the outputs that feed a unit; its clocks are not among them."""
         sources = self._sources.get(unit, {})
-        clocks = self.units[unit].description.clocks if unit in self.units else {}
+        clocks = self.units[unit].description.clocks if unit in self.units else ()
         return {port: source for port, source in sources.items() if port not in clocks}
 
     def clock_connections(self) -> list[Connection]:
