@@ -53,7 +53,7 @@ def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
 
 def test_a_unit_that_cannot_go_back_is_told():
     s = system(2, canGetAndSetFMUstate=False, canSerializeFMUstate=False)
-    with pytest.raises(StepDiscarded, match="it came to t = 0.04 s; short cannot save its state or vary its step"):
+    with pytest.raises(StepDiscarded, match=r"it came to t = 0.04 s; short cannot save its state or vary its step"):
         seen(s, Fraction(1, 2), "short.y", options=REPEATING)
 
 

@@ -51,7 +51,7 @@ def test_a_unit_may_end_the_simulation():
     s = System()
     s.add("quitter", native_fmu("quitter"))
     times: list[float] = []
-    with pytest.raises(EndRequested, match="quitter: fmi3DoStep at t = 0.3 s answered a request to end the simulation"):
+    with pytest.raises(EndRequested, match=r"quitter: fmi3DoStep at t = 0.3 s answered a request to end"):
         run_into(s, times)
     assert times == [0.0, 0.1, 0.2]
 
