@@ -2,19 +2,26 @@
 
 import array
 import contextlib
+import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 
 from cosim.exceptions import CosimError
 from cosim.fmpy_edge import unpack
 from cosim.instance import Instance, State
+from cosim.linear_inputs import LinearInputs
 from cosim.narrowing import Narrowing, narrows
+from cosim.saved_states import SavedStates
+from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
-from cosim.system import System
+from cosim.system import PortName, System
+
+_log = logging.getLogger(__name__)
 
 
 class Ensemble:
@@ -29,7 +36,10 @@ class Ensemble:
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.lines: LinearInputs | None = None
+        """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
+        self._scaled: dict[str, list[ScaledCopy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
         with contextlib.ExitStack() as cleanup:
             self._load(cleanup)
@@ -65,13 +75,19 @@ class Ensemble:
             self.publish(slot.unit)
             self._end_at_close(self.instances[slot.unit])
 
-    def feed(self, unit: str, t: float) -> None:
-        """Set a unit's inputs from their sources.
+    def extrapolate(self, tick: Fraction) -> None:
+        """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
+        self.lines = LinearInputs(self.system, self.instances, tick)
+
+    def feed(self, unit: str, t: float, dt: float | None = None) -> None:
+        """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
 
         Raises:
             UnitFailure: the unit does not take them.
         """
         self._copy(unit, t)
+        if self.lines is not None and dt is not None:
+            self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
 
     def step(self, unit: str, t: float, dt: float) -> None:
@@ -81,17 +97,24 @@ class Ensemble:
             UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
+        if self.lines is not None:
+            self.lines.step(unit)
 
     def publish(self, unit: str) -> None:
         """Fetch a unit's outputs, for observers and for the units that they feed."""
         self.instances[unit].get_outputs()
+        if self.lines is not None:
+            self.lines.publish(unit)
 
-    def save(self, units: Collection[str]) -> dict[str, State]:
+    def save(self, units: Collection[str]) -> SavedStates:
         """Save the states of units; `restore` goes back to them, `forget` frees them."""
-        return {name: self.instances[name].save_state() for name in units}
+        lines = self.lines.save(units) if self.lines is not None else {}
+        return SavedStates({name: self.instances[name].save_state() for name in units}, lines)
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
+        if self.lines is not None and isinstance(states, SavedStates):
+            self.lines.restore(states.lines)
         for name, state in states.items():
             self.instances[name].restore_state(state)
             self.publish(name)
@@ -119,6 +142,8 @@ class Ensemble:
             narrowing.check(t)
         for target, source in self._copies[unit]:
             target[...] = source
+        for scaled in self._scaled[unit]:
+            scaled()
 
     def _feed_known(self, unit: str, known: Collection[str]) -> None:
         """Set only inputs whose sources are known already; the others keep their start values."""
@@ -143,13 +168,20 @@ class Ensemble:
         return Instance(name, self.system.units[name].description, folder, self.system.sources_of(name))
 
     def _wire(self) -> None:
+        changes = {c.target: change for c in self.system.connections if (change := self.system.change_by(c))}
         for name, instance in self.instances.items():
             copies: list[Copy] = []
+            self._scaled[name] = []
             self._narrowings[name] = []
             for port, source in self.system.sources_of(name).items():
                 other, target = self.instances[source.unit], instance.description.inputs[port]
-                copies += zip(instance.u[port], other.y[source.port], strict=True)
-                if target.width and narrows(other.description.outputs[source.port], target):
+                output, change = other.description.outputs[source.port], changes.get(PortName(name, port))
+                if change is not None:
+                    self._scaled[name].append(ScaledCopy(instance.u[port][0], other.y[source.port][0], change))
+                    _log.info("%s (%s) -> %s.%s (%s): %s", source, output.unit, name, port, target.unit, change)
+                else:
+                    copies += zip(instance.u[port], other.y[source.port], strict=True)
+                if target.width and narrows(output, target):
                     values = other.y[source.port][0]
                     self._narrowings[name].append(Narrowing(str(source), name, port, target.width, values))
             self._copies[name] = joined(copies)

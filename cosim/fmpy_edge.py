@@ -27,6 +27,8 @@ class ModelVariable(Protocol):
     valueReference: int
     shape: tuple[int, ...] | None
     unit: str | None
+    relativeQuantity: bool | None
+    nominal: str | None
     start: str | None
     min: str | None
     max: str | None

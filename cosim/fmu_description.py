@@ -44,9 +44,13 @@ def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 @dataclass(frozen=True, kw_only=True)
 class FmuPort(Declared):
-    """A parameter, input or output of an FMU. `references` has one value reference in all, or one for each entry.
+    """A parameter, input or output of an FMU.
 
-    A `discrete` port changes at events only; one with `clocks` can be reached at ticks of one of them only.
+    Attributes:
+        references: one value reference in all, or one for each entry.
+        discrete: whether it changes at events only.
+        nominal: the magnitude that its values usually have, in its unit, where the FMU says.
+        clocks: those of whose ticks one must be for it to be reached; none where it can be reached always.
     """
 
     fmi_type: str
@@ -54,7 +58,13 @@ class FmuPort(Declared):
     start: str | None = None
     mime: str | None = None
     discrete: bool = False
+    nominal: float | None = None
     clocks: tuple[str, ...] = ()
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether its value is a real number that changes between instants."""
+        return self.kind is Kind.REAL and not self.discrete
 
     @property
     def signature(self) -> str:
@@ -156,6 +166,10 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)
+    relative = v.relativeQuantity
+    if relative is None:
+        relative = declared is not None and declared.relativeQuantity
+    nominal = v.nominal if v.nominal is not None or declared is None else declared.nominal
     items: list[Any] = declared.items if declared is not None and kind is Kind.ENUMERATION else []
     low = v.min if v.min is not None or declared is None else declared.min
     high = v.max if v.max is not None or declared is None else declared.max
@@ -166,17 +180,26 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         fmi_type=v.type,
         references=(v.valueReference,),
         shape=tuple(v.shape or ()),
-        unit=units.get(unit, Unit(unit, defined=False)) if unit else UNKNOWN,
+        unit=_unit_of(unit, units, relative),
         start=v.start,
         minimum=float(low) if low is not None else None,
         maximum=float(high) if high is not None else None,
         items=tuple((i.name, int(i.value)) for i in items),
         mime=mimes.get(v.name),
+        discrete=(v.variability or ("continuous" if kind is Kind.REAL else "discrete")) != "continuous",
+        nominal=float(nominal) if nominal is not None else None,
         width=_WIDTHS.get(v.type),
         description=v.description or "",
-        discrete=(v.variability or ("continuous" if kind is Kind.REAL else "discrete")) != "continuous",
         clocks=tuple(c.name for c in v.clocks or ()),
     )
+
+
+def _unit_of(name: str | None, units: Mapping[str, Unit], relative: bool) -> Unit:
+    """Return a variable's unit; that of a difference (5 degC of warming) has no offset."""
+    if not name:
+        return UNKNOWN
+    unit = units.get(name, Unit(name, defined=False))
+    return replace(unit, offset=0.0) if relative else unit
 
 
 def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:

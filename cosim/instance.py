@@ -10,6 +10,7 @@ from cosim.event_failures import EndRequested, StepDiscarded
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 from cosim.step_end import StepEnd
@@ -51,6 +52,10 @@ class Instance:
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
+        self.du: dict[str, Views] = {}
+        """Time derivatives of inputs that `interpolate` named."""
+        self.goes_back = False
+        """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
         self._do_step = self._function("DoStep")
 
@@ -75,7 +80,7 @@ class Instance:
         self._call("ExitInitializationMode")
 
     def set_inputs(self) -> None:
-        """Hand the contents of `u` to the unit."""
+        """Hand the contents of `u`, and of `du`, to the unit."""
         self._carry_out(self._setters)
 
     def set_some_inputs(self, names: Iterable[str]) -> None:
@@ -86,6 +91,13 @@ class Instance:
                 for mine, held in zip(views, self.u[name], strict=True):
                     mine[:] = held
         self._carry_out(setters)
+
+    def interpolate(self, names: Iterable[str]) -> None:
+        """Hand these inputs' time derivatives to the unit too, whenever inputs are set (FMI 2)."""
+        ports = [self.description.inputs[n] for n in names]
+        buffer = RateBuffer(self._function("SetRealInputDerivatives"), self._component, ports)
+        self._setters.append(buffer)
+        self.du = dict(buffer.views)
 
     def get_outputs(self) -> None:
         """Fetch the unit's outputs into `y`."""
@@ -98,7 +110,7 @@ class Instance:
             UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
         """
         self.time = t
-        status = self._do_step(self._component, t, dt, *self._step_arguments)
+        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
         if status > 1:
             reached = self._discarded_at(status)
             raise self.discarded(reached, "steps are not repeated unless the master is told to (repeat_discarded)")
@@ -113,7 +125,7 @@ class Instance:
             UnitFailure: the unit answered anything but OK, a warning or a discard, or ended the simulation.
         """
         self.time = t
-        status = self._do_step(self._component, t, dt, *self._step_arguments)
+        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
         if status > 1:
             return StepEnd(self._discarded_at(status), early=True, discarded=True)
         if self._fmi == 2:
@@ -228,11 +240,11 @@ class Instance:
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:
-            return (True,)
+            return ()
         self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._last_time = ctypes.c_double()
         flags = (self._event, self._terminate, self._early)
-        return (True, *(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
+        return (*(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
 
     def _buffers(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
         by_type: dict[str, list[FmuPort]] = collections.defaultdict(list)

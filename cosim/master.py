@@ -9,7 +9,8 @@ from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
 from cosim.event_ensemble import EventEnsemble
 from cosim.event_stepper import EventStepper
-from cosim.exceptions import UnitFailure, UnitRefused
+from cosim.exceptions import ScheduleError, UnitFailure, UnitRefused
+from cosim.extrapolation import Extrapolation
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
 from cosim.jacobi import Jacobi
@@ -20,6 +21,10 @@ from cosim.stepper import Stepper
 from cosim.system import System
 
 _PLAIN = MasterOptions()
+_OFF_GRID = (
+    "inputs can follow lines only where all steps lie on one grid, and steps may end off it {}: let inputs be held "
+    "(extrapolation)"
+)
 
 Observer = Callable[[float, Signals], None]
 """Called at every communication point with the time and the signals that hold at that time."""
@@ -36,7 +41,8 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`.
+        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`; or
+            inputs are to be extrapolated though steps may end anywhere.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -45,6 +51,9 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
+        if self.has_events and options.extrapolation is Extrapolation.LINEAR:
+            eventful = ", ".join(n for n, u in system.units.items() if u.uses_events)
+            raise ScheduleError(_OFF_GRID.format(f"at events ({eventful})" if eventful else "when one is discarded"))
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
 
@@ -52,6 +61,8 @@ class Master:
         ensemble = EventEnsemble(self.system) if self.has_events else Ensemble(self.system)
         try:
             ensemble.initialize(self.schedule.slots)
+            if self.options.extrapolation is Extrapolation.LINEAR:
+                ensemble.extrapolate(self.schedule.tick)
             self._stepper = self._make_stepper(ensemble)
         except UnitFailure as e:
             ensemble.close()
@@ -125,7 +136,7 @@ class Master:
         coupling = self._coupling(ensemble)
         if isinstance(ensemble, EventEnsemble):
             return EventStepper(self.schedule, ensemble, coupling)
-        return GridStepper(self.schedule, coupling)
+        return GridStepper(self.schedule, coupling, ensemble.lines)
 
     def _coupling(self, ensemble: Ensemble) -> Coupling:
         kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}

@@ -15,7 +15,7 @@ from cosim.file_lock import FileLocked, lock_file, unlock_file
 _MAGIC = b"HANDOVER"
 _HEAD = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
 _ALIGNMENT = 64
-_BYTES = 2**20
+_BYTES = 2**22
 _LEAST_ROWS, _MOST_ROWS = 16, 4096
 
 

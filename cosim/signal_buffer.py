@@ -45,7 +45,7 @@ class SignalBuffer:
         vrs = (ctypes.c_uint * len(references))(*references)
         self._arrays, arguments = _arrays(first, fmi, n)
         count = () if fmi == 2 else (n,)
-        self._arguments = (component, vrs, len(references), *arguments, *count)
+        self._arguments: tuple[Any, ...] = (component, vrs, len(references), *arguments, *count)
         self.views: dict[str, Views] = {}
         at = 0
         for p in ports:

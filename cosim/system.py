@@ -13,6 +13,7 @@ from cosim.fmu_clock import FmuClock
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from cosim.linear import Linear
 from cosim.start_values import fault_of
+from cosim.unit_conversion import conversion
 from cosim.units import UNKNOWN, Unit
 from cosim.variable import Kind
 
@@ -74,7 +75,10 @@ class PlacedUnit:
 
 @dataclass(frozen=True)
 class Connection:
-    """An output that feeds an input; with a transformation, what is fed is made by that from the output's value."""
+    """An output that feeds an input.
+
+    Real values are converted to the input's unit; a `transformation` replaces that.
+    """
 
     source: PortName
     target: PortName
@@ -117,7 +121,11 @@ class System:
         return unit
 
     def connect(self, source: PortName, target: PortName, transformation: Linear | None = None) -> None:
-        """Let an output feed an input, as it is or by a transformation, which then is in place of units' conversion."""
+        """Let an output feed an input.
+
+        Real values are converted to the input's unit where both have the same dimension. A `transformation` takes the
+        place of that, whatever the units; it is for real values only.
+        """
         self.connections.append(Connection(source, target, transformation))
         self._sources[target.unit][target.port] = source
 
@@ -160,6 +168,21 @@ class System:
         unit = self.units.get(end.unit)
         return unit.description.clocks.get(end.port) if unit else None
 
+    def change_by(self, c: Connection) -> Linear | None:
+        """Return how a connection, one without faults, changes values; None where it copies them, or joins clocks."""
+        change = c.transformation
+        if self._clock(c.target):
+            return None
+        if change is None:
+            a, b = (
+                self.units[c.source.unit].description.outputs[c.source.port],
+                self.units[c.target.unit].description.inputs[c.target.port],
+            )
+            if a.kind is not Kind.REAL or a.unit == b.unit or not (a.unit.defined and b.unit.defined):
+                return None
+            change = conversion(a.unit, b.unit)
+        return None if change.is_identity else change
+
     def _connection_faults(self, c: Connection) -> list[str]:
         clocks = self._clock(c.source), self._clock(c.target)
         if any(clocks) and all(end.unit in self.units for end in (c.source, c.target)):
@@ -169,7 +192,7 @@ class System:
         b, fault_b = self._find(c.target, "input")
         if a is None or b is None:
             return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
-        reason = _untransformable(a, b) if c.transformation else mismatch(a, b)
+        reason = mismatch(a, b, c.transformation)
         if reason is None:
             return []
         return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
@@ -201,12 +224,14 @@ def _value_faults(unit: PlacedUnit) -> list[str]:
     return faults
 
 
-def mismatch(a: FmuPort, b: FmuPort) -> str | None:
+def mismatch(a: FmuPort, b: FmuPort, transformation: Linear | None = None) -> str | None:
     """Return why an output cannot feed an input, or None."""
     if a.kind is not b.kind:
         return f"{a.kind.value} cannot feed {b.kind.value}"
     if a.shape != b.shape:
         return "their shapes differ"
+    if transformation is not None:
+        return transformation.fault if a.kind is Kind.REAL else f"{a.kind.value} takes no linear transformation"
     if a.kind is Kind.REAL and (fault := _unit_mismatch(a.unit, b.unit)):
         return fault
     if a.kind is Kind.ENUMERATION and a.items != b.items:
@@ -214,12 +239,6 @@ def mismatch(a: FmuPort, b: FmuPort) -> str | None:
     if a.kind is Kind.BINARY and a.mime != b.mime:
         return "their MIME types differ"
     return None
-
-
-def _untransformable(a: FmuPort, b: FmuPort) -> str | None:
-    if a.kind is not Kind.REAL or b.kind is not Kind.REAL:
-        return "only reals can be transformed"
-    return "their shapes differ" if a.shape != b.shape else None
 
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:
@@ -231,8 +250,9 @@ def _unit_mismatch(a: Unit, b: Unit) -> str | None:
         return f"the unit {undefined!r} is not defined in its FMU, so it cannot be compared"
     if a.base != b.base:
         return "their units differ in dimension"
-    if (a.factor, a.offset) != (b.factor, b.offset):
-        return "their units differ (same dimension: convert before connecting)"
+    wrong = next((u for u in (a, b) if not u.is_usable), None)
+    if wrong is not None and a != b:
+        return f"the unit {wrong.symbol!r} has the factor {wrong.factor!r} and the offset {wrong.offset!r}"
     return None
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, fields
 from typing import Annotated
 
+_SMALLEST, _LARGEST = 1e-100, 1e100
+
 
 @dataclass(frozen=True, kw_only=True)
 class BaseExponents:
@@ -34,6 +36,11 @@ class Unit:
     factor: float = 1.0
     offset: float = 0.0
     defined: bool = True
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether values can be converted from and to it: its factor is no zero, and no number is absurdly large."""
+        return _SMALLEST < abs(self.factor) < _LARGEST and abs(self.offset) < _LARGEST
 
     def __str__(self) -> str:
         return self.symbol

@@ -12,6 +12,7 @@ import click
 from cosim.ssp.ssp_file import SspFile
 from scenarios.bad_call import BadCall
 from scenarios.experiment import Experiment
+from scenarios.run_folder import sha256_of
 from scenarios.ssp_run import UntilStop, experiment_of
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -65,3 +66,9 @@ def open_experiment(
     if until is None:
         raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
     return experiment_of(ssp, until)
+
+
+def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
+    """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
+    told = {"stop": str(stop), "step": None if step is None else str(step)}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **told}

@@ -29,6 +29,13 @@ def told(full: str) -> str:
     return f"{_PREFIXES[uri]}:{local}" if uri in _PREFIXES else local
 
 
+def shortened(message: str) -> str:
+    """Return a message in which full names of elements are short ones."""
+    for uri, prefix in _PREFIXES.items():
+        message = message.replace(f"{{{uri}}}", f"{prefix}:")
+    return message
+
+
 def local(full: str) -> str:
     """Return an element's name without its namespace."""
     return full.rpartition("}")[2]

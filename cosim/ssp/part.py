@@ -11,7 +11,7 @@ import fmpy
 
 from cosim.exceptions import InvalidSsp
 from cosim.fmu_xml import UnsafeXml, XmlElement, parse_xml
-from cosim.ssp.namespaces import tag, told
+from cosim.ssp.namespaces import shortened, tag, told
 
 _etree: Any = importlib.import_module("lxml.etree")  # has no types, nor have its classes
 
@@ -120,4 +120,4 @@ def _schema(wanted: str) -> Any:
 def _schema_faults(content: bytes, wanted: str) -> list[str]:
     schema = _schema(wanted)
     schema.validate(_etree.fromstring(content, _etree.XMLParser(resolve_entities=False, no_network=True)))
-    return [f"line {entry.line}: {entry.message}" for entry in schema.error_log][:_MOST_TOLD]
+    return [f"line {entry.line}: {shortened(str(entry.message))}" for entry in schema.error_log][:_MOST_TOLD]

@@ -9,7 +9,6 @@ from pathlib import Path
 from cosim.exceptions import NotExportable
 from cosim.fmu_description import FmuPort
 from cosim.linear import Linear
-from cosim.ssp.changes import converted
 from cosim.ssp.connected_ports import entry_names
 from cosim.ssp.described_types import DescribedTypes, add_dimensions
 from cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
@@ -35,7 +34,8 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
 
     Raises:
         WiringError: the system has faults.
-        NotExportable: an array that is one variable is connected to one whose entries are variables.
+        NotExportable: an array that is one variable is connected to one whose entries are variables, or clocks are
+            connected.
         OSError: the file cannot be written.
     """
     system.check()
@@ -116,17 +116,22 @@ class _Structure:
             ET.SubElement(annotation, "Step", {**told, "sampled": str(unit.sampled).lower()})
 
     def _add_connections(self, system: ET.Element) -> None:
-        connections = self._system.connections
+        connections, clocks = self._system.connections, self._system.clock_connections()
         parent = ET.SubElement(system, "ssd:Connections") if connections else system
         faults: list[str] = []
         for c in connections:
+            if c in clocks:
+                faults.append(
+                    f"{c.source} -> {c.target} lets a clock tick; this package knows connectors of values only"
+                )
+                continue
             a, b = self._ports(c)
             from_, to = entry_names(a), entry_names(b)
             if len(from_) != len(to):
                 one, other = (c.source, c.target) if len(from_) < len(to) else (c.target, c.source)
                 faults.append(f"{one} is one array variable and each entry of {other} one; FMUs of one form are right")
                 continue
-            change = c.transformation or converted(a.unit, b.unit)
+            change = c.transformation or self._system.change_by(c)
             for y, u in zip(from_, to, strict=True):
                 ends = {"startElement": c.source.unit, "startConnector": y}
                 ends |= {"endElement": c.target.unit, "endConnector": u}

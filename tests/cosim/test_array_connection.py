@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from cosim.event_ensemble import EventEnsemble
+from cosim.event_instance import EventInstance
 from cosim.exceptions import WiringError
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
@@ -55,7 +55,8 @@ def test_bytes_come_at_an_event_and_only_when_they_change():
     s = chain("binary_passer", "bytes_keeper", u=DATA)
     with Master(s) as master:
         master.run(Fraction(1, 5))
-        (unit,) = master.ensemble.event_units.values() if isinstance(master.ensemble, EventEnsemble) else ()
+        unit = master.ensemble.instances["u1"]
+        assert isinstance(unit, EventInstance)
         assert not unit.wants_inputs()
         unit.u["u"][1][0] -= 1
         assert unit.wants_inputs()

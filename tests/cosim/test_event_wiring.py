@@ -1,18 +1,18 @@
 """What is refused before anything starts: clocks that cannot tick, and units of which there may be one."""
 
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from native_units import native_fmu
 
-from cosim.exceptions import InvalidFmu, WiringError
+from cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
+from cosim.extrapolation import Extrapolation
 from cosim.fmu_description import describe_fmu
 from cosim.master import Master
-from cosim.system import PlacedUnit, PortName, System
-
-Ends = tuple[PortName, PortName]
+from cosim.master_options import MasterOptions
+from cosim.ssp.writing import write_ssp
+from cosim.system import PortName, System
 
 
 def faults_of(s: System) -> tuple[str, ...]:
@@ -22,25 +22,20 @@ def faults_of(s: System) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(
-    ("ends", "fault"),
+    ("source", "target", "fault"),
     [
-        (lambda a, b: (a.y.count, b.u.tick), "a.count -> b.tick: a clock can be connected with a clock only"),
-        (lambda a, b: (a.y.carry, b.u.increment), "a.carry -> b.increment: a clock can be connected with a clock only"),
-        (
-            lambda a, b: (b.u.tick, a.y.carry),
-            "b.tick -> a.carry: an output clock lets an input clock tick, not the other way round",
-        ),
-        (
-            lambda a, b: (b.y.carry, a.u.tick),
-            "b.carry -> a.tick: it ticks at times of its own; a triggered input clock can be connected",
-        ),
+        ("a.count", "b.tick", "a clock can be connected with a clock only"),
+        ("a.carry", "b.increment", "a clock can be connected with a clock only"),
+        ("b.tick", "a.carry", "an output clock lets an input clock tick, not the other way round"),
+        ("b.carry", "a.tick", "it ticks at times of its own; a triggered input clock can be connected"),
     ],
 )
-def test_clocks_that_do_not_fit_are_told(ends: Callable[[PlacedUnit, PlacedUnit], Ends], fault: str):
+def test_clocks_that_do_not_fit_are_told(source: str, target: str, fault: str):
     s = System()
-    a, b = s.add("a", native_fmu("counter_tenths")), s.add("b", native_fmu("counter_triggered"))
-    s.connect(*ends(a, b))
-    assert faults_of(s) == (fault,)
+    s.add("a", native_fmu("counter_tenths"))
+    s.add("b", native_fmu("counter_triggered"))
+    s.connect(PortName(*source.split(".")), PortName(*target.split(".")))
+    assert faults_of(s) == (f"{source} -> {target}: {fault}",)
 
 
 def test_clocked_ports_need_event_mode():
@@ -89,3 +84,23 @@ def edited(file: Path, fmu: Path, old: str, new: str) -> Path:
                 content = content.replace(old.encode(), new.encode())
             target.writestr(name, content)
     return file
+
+
+def test_inputs_are_not_extrapolated_to_events():
+    s = System()
+    s.add("ball", native_fmu("ball"))
+    linear = Extrapolation.LINEAR
+    with pytest.raises(ScheduleError, match=r"steps may end off it at events \(ball\): let inputs be held"):
+        Master(s, MasterOptions(extrapolation=linear))
+    s = System()
+    s.add("short", native_fmu("discards"))
+    with pytest.raises(ScheduleError, match=r"steps may end off it when one is discarded: let inputs be held"):
+        Master(s, MasterOptions(extrapolation=linear, repeat_discarded=True))
+
+
+def test_clock_connections_are_not_exported_silently(tmp_path: Path):
+    s = System()
+    a, b = s.add("a", native_fmu("counter_tenths")), s.add("b", native_fmu("counter_triggered"))
+    s.connect(a.y.carry, b.u.tick)
+    with pytest.raises(NotExportable, match=r"a.carry -> b.tick lets a clock tick"):
+        write_ssp(s, tmp_path / "clocks.ssp", "clocks")

@@ -123,7 +123,8 @@ def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
         (Unit("m", M), UNKNOWN, None),
         (Unit("m", defined=False), Unit("m", M), None),
         (Unit("furlong", defined=False), Unit("m", M), "the unit 'furlong' is not defined in its FMU"),
-        (Unit("mm", M, 1e-3), Unit("m", M), "same dimension"),
+        (Unit("mm", M, 1e-3), Unit("m", M), None),
+        (Unit("mm", M, 0.0), Unit("m", M), "the unit 'mm' has the factor 0.0"),
         (Unit("m", M), Unit("N.m", NM), "differ in dimension"),
     ],
 )

@@ -21,7 +21,8 @@ def main(job_file: str, result_file: str) -> None:
     job = json.loads(Path(job_file).read_text())
     log_output_level(CosimLogLevel.ERROR)
     execution = CosimExecution.from_ssp_file(job["ssp"], job["step"]) if job["ssp"] else assembled(job)
-    numbers = [execution.slave_index_from_instance_name(unit["name"]) for unit in job["units"]]
+    slaves = {info.name.decode(): info.index for info in execution.slave_infos()}
+    numbers = [slaves[unit["name"]] for unit in job["units"]]
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     check(execution.add_observer(observer))
     check(execution.add_manipulator(manipulator))

@@ -4,6 +4,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 from libcosim_job import Job, known
 from own_master import Placed
@@ -17,6 +18,7 @@ from scenarios.command import main
 STEP, STEPS = Fraction(2, 125), 100
 
 
+@pytest.mark.slow
 def test_an_exported_scenario_in_libcosim_is_the_same_as_in_our_own_master(tmp_path: Path):
     file = tmp_path / "flyer.ssp"
     done = CliRunner().invoke(main, ["export", "flyer_impedance", "--ssp", str(file), "--seed", "3"])

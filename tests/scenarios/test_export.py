@@ -1,6 +1,7 @@
 from fractions import Fraction
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
@@ -15,7 +16,7 @@ from scenarios.command import main
 from scenarios.parameters import parse_parameters
 
 CHEAP = "ir_grasp"
-STOPS = {"ir_grasp": Fraction(1), "helix_handover": Fraction(3, 10)}
+STOPS = {"ir_grasp": Fraction(1, 2), "helix_handover": Fraction(3, 10)}
 """Shortened; long enough for every unit to step several times and for signals to change."""
 
 
@@ -23,7 +24,7 @@ def call(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
-def recorded(system: System, stop: Fraction, path: Path) -> "pq.Table":
+def recorded(system: System, stop: Fraction, path: Path) -> "pa.Table":
     with Master(system) as master, Recorder(path) as recorder:
         master.run(stop, [recorder])
     return pq.read_table(path)
@@ -47,3 +48,43 @@ def test_an_exported_scenario_gives_the_same_signals_as_the_scenario(name: str, 
     assert found.column_names == wanted.column_names
     for column in wanted.column_names:
         assert found[column].equals(wanted[column]), column
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("ir_gasp", "--ssp", "a.ssp"), "did you mean ir_grasp"),
+        (("IrReflex", "--ssp", "a.ssp"), "IrReflex is a unit, not a scenario"),
+        (("ir_grasp", "--ssp", "a.zip"), "--ssp a.zip: a name that ends with .ssp is right"),
+        (("ir_grasp",), "Missing option '--ssp'"),
+        (("ir_grasp", "--ssp", "a.ssp", "-p", "standof=1"), "did you mean standoff?"),
+        (("ir_grasp", "--ssp", "a.ssp", "--unit", "reflex=missing.fmu"), "missing.fmu: there is no such file"),
+        (("ir_grasp", "--ssp", "a.ssp", "--unit", "reflexes=a.fmu"), "did you mean reflex?"),
+        (("ir_grasp", "--ssp", "file/a.ssp"), "is a file, so no folder can be made in it"),
+        (("ir_grasp", "--ssp", "folder.ssp"), "there is a folder of that name"),
+    ],
+)
+def test_what_cannot_be_exported_is_told_and_nothing_is_written(
+    arguments: tuple[str, ...], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.ssp").mkdir()
+    result = call("export", *arguments)
+    assert result.exit_code == 2, result.output
+    assert told in " ".join(result.output.split())
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.ssp"]
+
+
+def test_parameters_and_other_units_are_exported(tmp_path: Path):
+    other = tmp_path / "Other.fmu"
+    other.write_bytes(cached("IrReflex", 3, scalar=True).read_bytes())
+    file = tmp_path / "new" / "a.ssp"
+    result = call("export", CHEAP, "--ssp", file, "-p", "strategy=forward", "--unit", f"reflex={other}")
+    assert result.exit_code == 0, result.output
+    assert result.output == f"{file}\n"
+    with SspFile(file) as ssp:
+        units = ssp.system.units
+        assert (units["scene"].description.fmi, units["reflex"].description.fmi) == (2, 3)
+        assert units["reflex"].description.path.name == "Other.fmu"
+        assert units["reflex"].start["strategy"] == "FORWARD"

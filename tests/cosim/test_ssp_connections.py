@@ -1,0 +1,189 @@
+"""What connections of an SSP become: whole arrays or entries, converted or transformed, through systems or not."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import decay
+import pytest
+from ssp_of import MM, component, connection, connectors, described, pack_ssp, system
+
+from cosim.exceptions import InvalidSsp
+from cosim.linear import Linear
+from cosim.ssp.ssp_file import SspFile
+
+VARIABLE = (
+    '<ScalarVariable name="{}" valueReference="{}" causality="{}" variability="continuous"><Real {}/></ScalarVariable>'
+)
+NAMES = {"p[1]": "input", "p[2]": "input", "p[3]": "input", "q[1]": "output", "q[2]": "output", "q[3]": "output"}
+ARRAYS = "".join(
+    VARIABLE.format(name, k + 10, kind, 'start="0"' if kind == "input" else "")
+    for k, (name, kind) in enumerate(NAMES.items())
+)
+PLAIN = connectors(u="input", y="output")
+ENTRIES = connectors(**NAMES)
+
+Open = Callable[..., SspFile]
+
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Open:
+    """Open an SSP of decay.c's FMU, which nothing of is loaded; `more` are further files."""
+    fmu = decay.pack(
+        tmp_path / "unit.fmu",
+        b"",
+        decay.edited(
+            ("<ModelVariables>", f"<ModelVariables>{ARRAYS}"),
+            ('index="3"', 'index="9"'),
+            ("</Outputs>", "".join(f'<Unknown index="{n}"/>' for n in (4, 5, 6)) + "</Outputs>"),
+        ),
+    )
+
+    def open_(elements: str, connections: str = "", more: str = "", before: str = "", version: str = "1.0") -> SspFile:
+        description = described(system(elements, connections, before=before), more, version)
+        with SspFile(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": fmu})) as ssp:
+            return ssp
+
+    return open_
+
+
+def wires(ssp: SspFile) -> Mapping[str, Linear | None]:
+    return {f"{c.source} -> {c.target}": c.transformation for c in ssp.system.connections}
+
+
+def refusal(open_: Callable[[], SspFile]) -> str:
+    with pytest.raises(InvalidSsp) as caught:
+        open_()
+    assert "\n" not in str(caught.value)
+    return "; ".join(caught.value.faults)
+
+
+@pytest.mark.parametrize(("start", "end"), [("a.y", "b.u"), ("b.u", "a.y")])
+def test_values_go_from_output_to_input_whichever_end_is_named_first(opened: Open, start: str, end: str):
+    found = wires(opened(component("a", PLAIN) + component("b", PLAIN), connection(start, end)))
+    assert found == {"a.y -> b.u": None}
+
+
+def test_a_linear_transformation_comes_after_the_conversion_of_units(opened: Open):
+    """As the schema has it: the source's value is converted before it is transformed."""
+    inside = '<ssc:LinearTransformation factor="3" offset="0.5"/>'
+    through = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output mm"))
+    elements, joined = through + component("b", PLAIN), connection("inner.x", "b.u", inside)
+    assert wires(opened(elements, joined, MM)) == {"inner.a.y -> b.u": Linear(3.0, 0.5)}
+    elements = component("a", PLAIN) + component("b", PLAIN)
+    assert wires(opened(elements, connection("a.y", "b.u", inside))) == {"a.y -> b.u": Linear(3.0, 0.5)}
+
+
+def test_a_conversion_can_be_suppressed_on_each_connection(opened: Open):
+    """Metres become millimetres on the way out; that these become metres again can be forbidden."""
+    inner = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output mm"))
+    elements, kept = inner + component("b", PLAIN), 'suppressUnitConversion="true"'
+    assert wires(opened(elements, connection("inner.x", "b.u"), MM)) == {"inner.a.y -> b.u": None}
+    assert wires(opened(elements, connection("inner.x", "b.u", more=kept), MM)) == {"inner.a.y -> b.u": Linear(1000.0)}
+
+
+def test_entries_that_make_up_a_whole_are_connected_as_a_whole(opened: Open):
+    elements = component("a", ENTRIES) + component("b", ENTRIES)
+    each = "".join(connection(f"a.q[{k}]", f"b.p[{k}]") for k in (3, 1, 2))
+    assert wires(opened(elements, each)) == {"a.q -> b.p": None}
+
+
+def test_entries_in_another_order_are_connected_one_by_one(opened: Open):
+    elements = component("a", ENTRIES) + component("b", ENTRIES)
+    each = "".join(connection(f"a.q[{k}]", f"b.p[{4 - k}]") for k in (1, 2, 3))
+    ssp = opened(elements, each)
+    assert wires(ssp) == {f"a.q[{k}] -> b.p[{4 - k}]": None for k in (1, 2, 3)}
+    assert [n for n in ssp.system.units["b"].description.inputs if n.startswith("p")] == ["p[1]", "p[2]", "p[3]"]
+    assert "q" in ssp.system.units["b"].description.outputs
+
+
+def test_an_array_that_is_taken_apart_for_one_is_so_for_all(opened: Open):
+    elements = component("a", ENTRIES) + component("b", ENTRIES) + component("c", ENTRIES)
+    whole = "".join(connection(f"a.q[{k}]", f"b.p[{k}]") for k in (1, 2, 3))
+    found = wires(opened(elements, whole + connection("a.q[2]", "c.p[1]")))
+    assert found == {**{f"a.q[{k}] -> b.p[{k}]": None for k in (1, 2, 3)}, "a.q[2] -> c.p[1]": None}
+
+
+def test_an_entry_and_a_scalar_can_be_connected(opened: Open):
+    elements = component("a", connectors(y="output")) + component("b", ENTRIES)
+    assert wires(opened(elements, connection("a.y", "b.p[2]"))) == {"a.y -> b.p[2]": None}
+
+
+def test_systems_within_systems_are_taken_apart(opened: Open):
+    inner = system(component("a", PLAIN), connection("u", "a.u") + connection("a.y", "y"), name="inner", before=PLAIN)
+    outer = system(inner, connection("y", "inner.y") + connection("u", "inner.u"), name="outer", before=PLAIN)
+    ssp = opened(outer + component("b", PLAIN), connection("b.y", "outer.u") + connection("outer.y", "b.u"))
+    assert list(ssp.system.units) == ["outer.inner.a", "b"]
+    assert wires(ssp) == {"b.y -> outer.inner.a.u": None, "outer.inner.a.y -> b.u": None}
+
+
+TWO = component("a", PLAIN) + component("b", PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("connections", "told"),
+    [
+        (connection("c.y", "b.u"), "there is no element 'c'"),
+        (connection("a.z", "b.u"), "'a' has no connector 'z'"),
+        (connection("z", "b.u"), "'whole' has no connector 'z'"),
+        (connection("a.u", "b.u"), "a.u - b.u: both ends take a value; one of each is right"),
+        (connection("a.y", "b.y"), "both ends give a value"),
+        (connection("a.y", "b.u") + connection("b.y", "b.u"), "b.u is fed twice"),
+        (connection("a.y", "b.u", '<ssc:LinearTransformation factor="x"/>'), "is not a valid value"),
+        (connection("a.y", "b.u", '<ssc:LinearTransformation factor="INF"/>'), "factor='INF' is not a finite number"),
+        (
+            connection("a.y", "b.u", '<ssc:BooleanMappingTransformation><ssc:MapEntry source="1" target="0"/>'
+                       "</ssc:BooleanMappingTransformation>"),
+            "<ssc:BooleanMappingTransformation> is not supported; <ssc:LinearTransformation> is",
+        ),
+    ],
+)  # fmt: skip
+def test_a_connection_to_nowhere_or_of_the_wrong_kind_is_refused(opened: Open, connections: str, told: str):
+    assert told in refusal(lambda: opened(TWO, connections))
+
+
+def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: Open):
+    told = refusal(lambda: opened(TWO, connection("c.y", "b.u") + "\n" + connection("a.u", "b.u")))
+    assert told.startswith("SystemStructure.ssd, line 3: there is no element 'c'")
+    assert "; SystemStructure.ssd, line 4: a.u - b.u: both ends take" in told
+
+
+@pytest.mark.parametrize(
+    ("inside", "told"),
+    [
+        (connectors(z="output"), "the FMU of 'a' has no variable 'z'; "),
+        (connectors(y="input"), "a.y is an input here and an output in its FMU"),
+        (connectors(y="output mm"), "a.y is in mm here and in m in its FMU"),
+        (connectors(u="input") * 2, "Element 'ssd:Connectors'"),
+    ],
+)
+def test_a_connector_is_what_its_fmu_says(opened: Open, inside: str, told: str):
+    assert told in refusal(lambda: opened(component("a", inside), more=MM))
+
+
+def test_units_that_do_not_fit_are_refused(opened: Open):
+    seconds = '<ssd:Units><ssc:Unit name="s"><ssc:BaseUnit s="1"/></ssc:Unit></ssd:Units>'
+    inner = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output s"))
+    told = refusal(lambda: opened(inner + component("b", PLAIN), connection("inner.x", "b.u"), seconds))
+    assert "inner.a.y -> b.u: 'm' cannot be converted to 's': they differ in dimension" in told
+
+
+def test_a_value_that_feeds_itself_is_refused(opened: Open):
+    inner = system(component("a", PLAIN), connection("u", "y") + connection("u", "a.u"), name="inner", before=PLAIN)
+    assert "inner.a.u is fed by itself" in refusal(lambda: opened(inner, connection("inner.y", "inner.u")))
+
+
+def test_indices_of_version_2_are_refused_by_name(opened: Open):
+    indexed = connection("a.y", "b.u", more='startIndices="1"')
+    assert "startIndices is not supported" in refusal(lambda: opened(TWO, indexed, version="2.0"))
+
+
+@pytest.mark.parametrize(("start", "stop", "wanted"), [("0", "2.5", "5/2"), ("0.0", "0.3333333333333333", "1/3")])
+def test_the_stop_time_is_the_default_experiment_s(opened: Open, start: str, stop: str, wanted: str):
+    more = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
+    assert str(opened(TWO, more=more).stop) == wanted
+
+
+@pytest.mark.parametrize(("start", "stop", "told"), [("1", "2", "only 0 s can be run"), ("0", "-1", "ends at -1 s")])
+def test_an_experiment_that_cannot_be_run_is_refused(opened: Open, start: str, stop: str, told: str):
+    more = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
+    assert told in refusal(lambda: opened(TWO, more=more))

@@ -1,0 +1,210 @@
+"""Which values the parameter bindings of an SSP give to which variables."""
+
+import logging
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import decay
+import numpy as np
+import pytest
+from ssp_of import (
+    MM,
+    NAMESPACES,
+    bindings,
+    component,
+    connection,
+    connectors,
+    described,
+    pack_ssp,
+    parameters,
+    system,
+)
+
+from cosim.exceptions import InvalidSsp
+from cosim.ssp.ssp_file import SspFile
+
+MORE = """
+    <ScalarVariable name="p[1]" valueReference="20" causality="parameter" variability="fixed"><Real start="1" unit="m"/>
+    </ScalarVariable>
+    <ScalarVariable name="p[2]" valueReference="21" causality="parameter" variability="fixed"><Real start="2" unit="m"/>
+    </ScalarVariable>
+    <ScalarVariable name="on" valueReference="22" causality="parameter" variability="fixed"><Boolean start="false"/>
+    </ScalarVariable>
+    <ScalarVariable name="called" valueReference="23" causality="parameter" variability="fixed"><String start=""/>
+    </ScalarVariable>
+    <ScalarVariable name="light" valueReference="24" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Light" start="1"/></ScalarVariable>
+"""
+TYPES = """<TypeDefinitions><SimpleType name="Light"><Enumeration>
+<Item name="RED" value="1"/><Item name="GREEN" value="2"/>
+</Enumeration></SimpleType></TypeDefinitions>"""
+SET_MM = MM.replace("ssd:", "ssv:")
+
+Starts = Mapping[str, Mapping[str, Any]]
+Open = Callable[..., Starts]
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Open:
+    """Open an SSP of decay.c's FMU with more parameters; return its units' start values."""
+    edits = (("</ModelVariables>", MORE + "</ModelVariables>"), ("</UnitDefinitions>", "</UnitDefinitions>" + TYPES))
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited(*edits))
+
+    def start(inside: str, more: str = "", files: Mapping[str, str] | None = None) -> Starts:
+        file = pack_ssp(tmp_path / "a.ssp", described(inside, more), {"resources/unit.fmu": fmu, **(files or {})})
+        with SspFile(file) as ssp:
+            return {name: unit.start for name, unit in ssp.system.units.items()}
+
+    return start
+
+
+def one(*values: str, more: str = "", set_more: str = "") -> str:
+    return system(component("a", bindings(parameters(*values, more=set_more), more=more)))
+
+
+def refusal(open_: Callable[[], Starts]) -> str:
+    with pytest.raises(InvalidSsp) as caught:
+        open_()
+    assert "\n" not in str(caught.value)
+    return "; ".join(caught.value.faults)
+
+
+def test_values_of_all_types_are_bound(started: Open):
+    given = ("u|Real|1.5", "mode|Integer|3", "on|Boolean|true", "called|String|a b", "light|Enumeration|GREEN")
+    assert started(one(*given)) == {
+        "a": {"u": 1.5, "mode": 3, "on": True, "called": "a b", "light": "GREEN"},
+    }
+
+
+def test_entries_make_up_an_array(started: Open):
+    start = started(one("p[2]|Real|20", "p[1]|Real|10"))["a"]
+    assert list(start) == ["p"]
+    np.testing.assert_array_equal(start["p"], [10.0, 20.0])
+
+
+def test_of_an_array_single_entries_can_be_bound(started: Open):
+    assert started(one("p[2]|Real|20")) == {"a": {"p[2]": 20.0}}
+
+
+def test_a_value_is_converted_to_the_variable_s_unit(started: Open):
+    assert started(one("u|Real|1500|mm", set_more=SET_MM)) == {"a": {"u": 1.5}}
+    assert started(one("u|Real|1500|mm"), MM) == {"a": {"u": 1.5}}
+
+
+def test_sets_and_mappings_can_be_files_of_their_own(started: Open):
+    mapping = (
+        f'<ssm:ParameterMapping {NAMESPACES} version="1.0">'
+        '<ssm:MappingEntry source="x" target="u"><ssc:LinearTransformation factor="2" offset="1"/></ssm:MappingEntry>'
+        '<ssm:MappingEntry source="x" target="p[1]" suppressUnitConversion="true"/>'
+        '<ssm:MappingEntry source="nowhere" target="on"/></ssm:ParameterMapping>'
+    )
+    binding = (
+        '<ssd:ParameterBinding source="sets/a%20b.ssv"><ssd:ParameterMapping source="m.ssm"/></ssd:ParameterBinding>'
+    )
+    inside = system(component("a", f"<ssd:ParameterBindings>{binding}</ssd:ParameterBindings>"))
+    files = {"sets/a b.ssv": parameters("x|Real|1500|mm", "mode|Integer|3", more=SET_MM), "m.ssm": mapping}
+    assert started(inside, files=files) == {"a": {"u": 2 * 1.5 + 1, "p[1]": 1500.0}}
+
+
+def test_a_mapping_can_stand_inside(started: Open):
+    entry = '<ssm:MappingEntry source="x" target="mode"/>'
+    mapping = f'<ssm:ParameterMapping {NAMESPACES} version="1.0">{entry}</ssm:ParameterMapping>'
+    inside = bindings(parameters("x|Integer|4")).replace(
+        "</ssd:ParameterBinding>", f"<ssd:ParameterMapping>{mapping}</ssd:ParameterMapping></ssd:ParameterBinding>"
+    )
+    assert started(system(component("a", inside))) == {"a": {"mode": 4}}
+
+
+def test_later_bindings_and_those_further_out_come_first(started: Open):
+    inner = bindings(parameters("u|Real|1", "mode|Integer|1", "on|Boolean|1"), parameters("u|Real|2"))
+    middle = system(component("a", inner), name="m", before=bindings(parameters("a.mode|Integer|2", "a.u|Real|3")))
+    outer = system(middle, before=bindings(parameters("m.a.u|Real|4")))
+    assert started(outer) == {"m.a": {"u": 4.0, "mode": 2, "on": True}}
+
+
+def test_a_prefix_stands_before_all_names_of_a_set(started: Open):
+    before = bindings(parameters("u|Real|4", "mode|Integer|5"), more='prefix="b."')
+    assert started(system(component("a") + component("b"), before=before)) == {"a": {}, "b": {"u": 4.0, "mode": 5}}
+
+
+def test_a_connector_of_the_system_gives_its_value_to_what_it_feeds(started: Open):
+    """On its way it is converted and transformed as any other."""
+    inside = '<ssc:LinearTransformation factor="2" offset="1"/>'
+    whole = system(
+        component("a", connectors(u="input")) + component("b", connectors(u="input")),
+        connection("x", "a.u") + connection("x", "b.u", inside),
+        before=connectors(x="input mm") + bindings(parameters("x|Real|1.5|m", "a.mode|Integer|2", more=SET_MM.replace(
+            "</ssv:Units>", '<ssc:Unit name="m"><ssc:BaseUnit m="1"/></ssc:Unit></ssv:Units>'))),
+    )  # fmt: skip
+    assert started(whole, MM) == {"a": {"u": 1.5, "mode": 2}, "b": {"u": 4.0}}
+
+
+def test_a_parameter_of_the_system_gives_its_value_to_those_of_units(started: Open):
+    mode = '<ssd:Connectors><ssd:Connector name="mode" kind="parameter"><ssc:Integer/></ssd:Connector></ssd:Connectors>'
+    whole = system(
+        component("a", mode), connection("mode", "a.mode"), before=mode + bindings(parameters("mode|Integer|7"))
+    )
+    assert started(whole) == {"a": {"mode": 7}}
+
+
+def test_a_name_that_nothing_has_is_left_out_and_told(started: Open, caplog: pytest.LogCaptureFixture):
+    with caplog.at_level(logging.WARNING):
+        assert started(one("y|Real|1", "nothing|Real|1", "mode|Integer|2")) == {"a": {"mode": 2}}
+    told = caplog.text
+    assert "SystemStructure.ssd, line 3: no variable is called 'nothing'" in told
+    assert "'y'" in told
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ("u|Integer|x", "u: 'x' is not a number"),
+        ("u|String|1.5", "u: it is real, and the value given is of type String"),
+        ("mode|Real|3", "mode: it is integer"),
+        ("on|Integer|1", "on: it is boolean, and the value given is of type Integer"),
+        ("light|Enumeration|BLUE", "a.light: 'BLUE' is none of red, green"),
+        ("mode|Integer|12", "a.mode: 12 is out of range: from 0 to 11"),
+        ("u|Real|NaN", "a.u: nan is not finite"),
+        ("u|Real|1|s", "u: the unit 's' is not defined"),
+    ],
+)
+def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: str, told: str):
+    assert told in refusal(lambda: started(one(given)))
+
+
+def bound(inside: str, more: str = "") -> str:
+    binding = f"<ssd:ParameterBinding {more}>{inside}</ssd:ParameterBinding>"
+    return system(component("a", f"<ssd:ParameterBindings>{binding}</ssd:ParameterBindings>"))
+
+
+@pytest.mark.parametrize(
+    ("inside", "told"),
+    [
+        (bound("", 'source="gone.ssv"'), "there is no 'gone.ssv' in the SSP; "),
+        (bound("", 'source="bad.ssv"'), "bad.ssv cannot be read: it is not well-formed"),
+        (bound("", 'source="dtd.ssv"'), "dtd.ssv cannot be read: it has a document type"),
+        (bound("", 'source="twice.ssv"'), "parameter 'u' is there twice"),
+        (bound("", 'source="SystemStructure.ssd"'), "where <ssv:ParameterSet> is right"),
+        (bound("", 'source="../a.ssv"'), "leads out of the SSP"),
+        (bound("", 'type="text/csv" source="bad.ssv"'), "type 'text/csv' is not supported"),
+        (bound("", 'sourceBase="component" source="bad.ssv"'), "sourceBase='component' is not supported"),
+        (bound(""), "neither a source nor one <ssv:ParameterSet> inside"),
+        (bound("<ssd:ParameterValues><a/></ssd:ParameterValues>"), "<a> where <ssv:ParameterSet> is right"),
+        (one("u|Thing|1"), "parameter 'u' has 0 types; one of Real, "),
+        (one("u|Real|1 2"), "u: 2 values where 1 is right"),
+    ],
+)  # fmt: skip
+def test_a_bad_binding_is_refused(started: Open, inside: str, told: str):
+    twice = parameters("u|Real|1", "u|Real|2")
+    files = {"bad.ssv": "<a>", "dtd.ssv": "<!DOCTYPE a><a/>", "twice.ssv": twice}
+    assert told in refusal(lambda: started(inside, files=files))
+
+
+def test_a_mapping_of_two_to_one_name_is_refused(started: Open):
+    entries = '<ssm:MappingEntry source="x" target="u"/><ssm:MappingEntry source="y" target="u"/>'
+    mapping = f'<ssm:ParameterMapping {NAMESPACES} version="1.0">{entries}</ssm:ParameterMapping>'
+    inside = '<ssd:ParameterMapping source="m.ssm"/>'
+    whole = bound(inside, 'source="s.ssv"')
+    files = {"m.ssm": mapping, "s.ssv": parameters("x|Real|1")}
+    assert "m.ssm, line 1: two parameters are mapped to 'u'" in refusal(lambda: started(whole, files=files))

@@ -1,0 +1,134 @@
+"""A system that is written as an SSP is the same system when it is read."""
+
+import re
+import zipfile
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import decay
+import numpy as np
+import pytest
+from fmu_of import FmuOf
+from ssp_schemas import expect_valid
+
+from cosim.exceptions import NotExportable, WiringError
+from cosim.linear import Linear
+from cosim.master import Master
+from cosim.signals import Signals
+from cosim.ssp.ssp_file import SspFile
+from cosim.ssp.writing import write_ssp
+from cosim.system import PortName, System
+from fmus.build import build_block
+
+KINDS = ("n", "odd", "light", "pair")
+STEP = Fraction(1, 10)
+
+
+def echoing(fmu: Callable[[str], Path], *names: str) -> System:
+    s = System()
+    counter = s.add("counter", fmu("Counter"), fails_at=100)
+    echo = s.add("echo", fmu("Echo"), pair=np.array([0.1, -1e-300]), light="GREEN", odd=True, n=-3)
+    for name in names:
+        s.connect(getattr(counter.y, name), getattr(echo.u, name))
+    return s
+
+
+def rows(system: System) -> list[dict[str, float]]:
+    seen: list[dict[str, float]] = []
+
+    def observe(t: float, signals: Signals) -> None:
+        seen.append({"time": t, **{c.name: float(c.values[c.index]) for c in signals.columns()}})
+
+    with Master(system) as master:
+        master.run(Fraction(1), [observe])
+    return seen
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_signals_are_the_same(fmu: FmuOf, tmp_path: Path, fmi: int):
+    names = (*KINDS, "picture") if fmi == 3 else KINDS
+
+    def built(block: str) -> Path:
+        return fmu(block, fmi)
+
+    if fmi == 2:  # which knows no pictures
+        s = System()
+        mass, spring = s.add("mass", built("Mass"), x_0=1 / 3, m=0.7), s.add("spring", built("Spring"), k=2.5)
+        s.connect(mass.y.x, spring.u.x, Linear(1.5, -0.1))
+        s.connect(spring.y.f, mass.u.f)
+    else:
+        s = echoing(built, *names)
+    file = write_ssp(s, tmp_path / "a.ssp", "a system", Fraction(5, 3))
+    assert len(expect_valid(file, "1.0" if fmi == 2 else "2.0")) == 3
+    with SspFile(file) as ssp:
+        assert (ssp.name, ssp.stop) == ("a system", Fraction(5, 3))
+        assert {n: set(u.start) for n, u in ssp.system.units.items()} == {n: set(u.start) for n, u in s.units.items()}
+        found = rows(ssp.system)
+    wanted = rows(s)
+    assert found == wanted
+    assert wanted[0] != wanted[-1]
+
+
+def test_the_same_system_gives_the_same_bytes(fmu: FmuOf, tmp_path: Path):
+    files = [write_ssp(echoing(fmu), tmp_path / f"{k}.ssp", "a") for k in range(2)]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_start_values_of_unconnected_inputs_are_bound(fmu: FmuOf, tmp_path: Path):
+    with SspFile(write_ssp(echoing(fmu), tmp_path / "a.ssp", "a")) as ssp:
+        start = ssp.system.units["echo"].start
+    assert (start["n"], start["odd"], start["light"]) == (-3, True, "GREEN")
+    np.testing.assert_array_equal(start["pair"], [0.1, -1e-300])
+
+
+def test_a_step_that_is_not_the_fmu_s_own_is_kept_in_an_annotation(fmu: FmuOf, tmp_path: Path):
+    s = System()
+    s.add("slow", fmu("Counter"), period=Fraction(1, 3), sampled=True)
+    s.add("own", fmu("Counter"))
+    file = write_ssp(s, tmp_path / "a.ssp", "a")
+    expect_valid(file, "2.0")
+    with SspFile(file) as ssp:
+        assert {n: (u.period, u.sampled) for n, u in ssp.system.units.items()} == {
+            "slow": (Fraction(1, 3), True),
+            "own": (STEP, False),
+        }
+    with zipfile.ZipFile(file) as archive:
+        assert archive.read("SystemStructure.ssd").count(b"ssc:Annotation ") == 1
+    with SspFile(file, Fraction(1, 5)) as ssp:
+        assert {u.period for u in ssp.system.units.values()} == {Fraction(1, 5)}
+
+
+def test_transformations_and_conversions_are_written_out(tmp_path: Path):
+    """Not every tool converts units; every one that knows transformations gets the same numbers."""
+    metres = decay.pack(tmp_path / "m.fmu", b"")
+    edits = (('"m"><BaseUnit m="1"', '"mm"><BaseUnit m="1" factor="0.001"'), ('unit="m"', 'unit="mm"'))
+    millimetres = decay.pack(tmp_path / "mm.fmu", b"", decay.edited(*edits))
+    s = System()
+    a, b, c = s.add("a", metres), s.add("b", millimetres), s.add("c", metres)
+    s.connect(a.y.y, b.u.u)
+    s.connect(b.y.y, c.u.u, Linear(0.25, -2.0))
+    s.connect(c.y.y, a.u.u)
+    file = write_ssp(s, tmp_path / "a.ssp", "a")
+    expect_valid(file, "1.0")
+    with zipfile.ZipFile(file) as archive:
+        assert len([n for n in archive.namelist() if n.endswith(".fmu")]) == 2
+        written = archive.read("SystemStructure.ssd").decode()
+    assert re.findall(r'factor="(.*)" offset="(.*)"', written) == [("1000.0", "0.0"), ("0.25", "-2.0")]
+    assert written.count('suppressUnitConversion="true"') == 2
+    with SspFile(file) as ssp:
+        changes = {str(w.target): w.transformation for w in ssp.system.connections}
+    assert changes == {"b.u": None, "c.u": Linear(0.25, -2.0), "a.u": None}
+
+
+def test_what_stands_in_the_way_is_told_and_nothing_is_written(fmu: FmuOf, tmp_path: Path):
+    s = System()
+    scalar = build_block("master_blocks:Echo", 3, tmp_path, step=STEP, scalar=True)
+    one, many = s.add("one", fmu("Counter")), s.add("many", scalar)
+    s.connect(one.y.pair, many.u.pair)
+    with pytest.raises(NotExportable, match=r"one.pair is one array variable and each entry of many.pair one"):
+        write_ssp(s, tmp_path / "a.ssp", "a")
+    s.connect(one.y.n, PortName("many", "m"))
+    with pytest.raises(WiringError):
+        write_ssp(s, tmp_path / "a.ssp", "a")
+    assert not (tmp_path / "a.ssp").exists()

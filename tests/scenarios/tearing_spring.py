@@ -1,0 +1,47 @@
+"""A spring that can tear, to see what a run makes of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+from cosim.ports import output, parameter
+from cosim.units import Metre, Second
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    tears: Second = parameter(100.0, "when it tears")
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    pass
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    x: Metre = output("stretch")
+
+
+class TearingSpring:
+    """Stretches by x = t^2 until it tears."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: Params) -> None:
+        self.tears = params.tears
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        return Outputs(x=t * t)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        if t > self.tears:
+            raise RuntimeError("the spring tore")
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None: ...

@@ -1,0 +1,127 @@
+"""`handover run FILE.ssp`: what it leaves, and how it answers what it cannot run."""
+
+import json
+import sys
+import zipfile
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from cosim.ssp.writing import write_ssp
+from cosim.system import System
+from fmus.build import build_block
+from scenarios.command import main
+from scenarios.record import Record
+
+sys.path.insert(0, str(Path(__file__).parent))  # tearing_spring
+
+
+def run(file: Path, *arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["run", str(file), *(str(a) for a in arguments)])
+
+
+@pytest.fixture(scope="module")
+def spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("spring")
+    return build_block("tearing_spring:TearingSpring", 2, folder, step=Fraction(1, 10))
+
+
+def packed(spring: Path, folder: Path, stop: Fraction | None = None, **start: Any) -> Path:
+    system = System()
+    system.add("left", spring, **start)
+    system.add("right", spring)
+    return write_ssp(system, folder / "springs.ssp", "two springs", stop)
+
+
+def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    result = run(packed(spring, tmp_path, Fraction(2)), "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "springs.ssp succeeded: ran to 2 s" in result.output
+    record = Record(out / "signals.parquet")
+    assert record.time[-1] == 2.0
+    assert record["left.x"][-1] == 4.0
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["success"], summary["simulated_seconds"]) == (True, 2.0)
+    units = json.loads((out / "run.json").read_text())["units"]
+    assert {u: told["fmu"] for u, told in units.items()} == dict.fromkeys(("left", "right"), "TearingSpring.fmi2.fmu")
+    page = (out / "report.html").read_text()
+    assert "two springs" in page
+    assert page.count("data:image/png;base64,") == 2
+
+
+def test_stop_and_step_of_the_call_come_first(spring: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    result = run(packed(spring, tmp_path, Fraction(2)), "--stop", "1/2", "--step", "1/4", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.25, 0.5]
+
+
+def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(spring: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    result = run(packed(spring, tmp_path, Fraction(2), tears=0.45), "--out", out)
+    assert result.exit_code == 3, result.output
+    assert "the spring tore" in result.output
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["reason"].startswith("a unit failed: left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore")
+    assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
+
+
+def test_without_a_stop_time_one_is_asked_for(spring: Path, tmp_path: Path):
+    result = run(packed(spring, tmp_path), "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "no stop time; --stop 10 lets it run for 10 s" in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_for_scenarios_is_refused(spring: Path, tmp_path: Path):
+    result = run(packed(spring, tmp_path, Fraction(2)), "-p", "a=1", "--seed", "3", "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "-p, --seed: for scenarios" in result.output
+    result = CliRunner().invoke(main, ["run", "ir_grasp", "--stop", "1", "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2, result.output
+    assert "--stop and --step are for an SSP" in result.output
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--stop", "0"), ("--stop", "soon"), ("--step", "-1"), ("--step", "1/0")]
+)
+def test_a_time_is_a_positive_number(spring: Path, tmp_path: Path, option: str, value: str):
+    result = run(packed(spring, tmp_path), option, value)
+    assert result.exit_code == 2, result.output
+    assert f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30" in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (b'name="left"', b'name="right"', "two elements are called 'right'"),
+        (b"TearingSpring", b"Spring", "there is no 'resources/Spring.fmi2.fmu' in the SSP; did you mean "),
+        (b'<ssd:Connector name="x"', b'<ssd:Connector name="y"', "has no variable 'y'"),
+        (b"</ssd:System>", b"", "SystemStructure.ssd cannot be read"),
+    ],
+)
+def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
+    spring: Path, tmp_path: Path, old: bytes, new: bytes, told: str
+):
+    file, out = tmp_path / "bad.ssp", tmp_path / "out"
+    with zipfile.ZipFile(packed(spring, tmp_path, Fraction(2))) as good, zipfile.ZipFile(file, "w") as bad:
+        for name in good.namelist():
+            content = good.read(name)
+            bad.writestr(name, content.replace(old, new) if name.endswith(".ssd") else content)
+    result = run(file, "--out", out)
+    assert result.exit_code == 2, result.output
+    (line,) = result.output.splitlines()
+    assert line.startswith(f"Error: {file}: ")
+    assert told in line
+    assert not out.exists()
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path: Path):
+    result = run(tmp_path / "missing.ssp")
+    assert result.exit_code == 2, result.output
+    assert result.output == f"Error: {tmp_path / 'missing.ssp'}: there is no such file\n"
