@@ -2,14 +2,17 @@
 
 import contextlib
 import logging
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from cosim.endings import Endings
 from cosim.ensemble import Ensemble
 from cosim.event_instance import EventInstance
 from cosim.exceptions import CosimError
+from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance, State
+from cosim.schedule import Slot
 from cosim.step_end import StepEnd
 from cosim.system import PlacedUnit, System
 
@@ -26,19 +29,17 @@ class EventEnsemble(Ensemble):
         ends: how the last step of each unit ended.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
         self.ends: dict[str, StepEnd] = {}
         self._begun: dict[str, tuple[float, State]] = {}
-        super().__init__(system)
+        super().__init__(system, heartbeat, endings)
         self._staying = [u.name for u in system.units.values() if not u.sampled and not can_go_back(u)]
         self._told: set[str] = set()
 
-    def close(self) -> None:
-        """Free saved states, then terminate and free all units."""
-        for unit in list(self._begun):
-            with contextlib.suppress(CosimError):  # freeing goes on whether or not the unit agrees
-                self._forget_begin(unit)
-        super().close()
+    def initialize(self, slots: Sequence[Slot]) -> None:
+        """Take all units through initialisation mode; those with events are in event mode after that."""
+        super().initialize(slots)
+        self._endings.add(self._forget_begins)
 
     @property
     def event_units(self) -> dict[str, EventInstance]:
@@ -136,6 +137,12 @@ class EventEnsemble(Ensemble):
         self._forget_begin(unit)
         self._begun[unit] = (t, self.instances[unit].save_state())
 
+    def _forget_begins(self) -> None:
+        for unit in list(self._begun):
+            with contextlib.suppress(CosimError):  # ending goes on whether or not the unit agrees
+                if not self.is_corrupt(self.instances[unit]):
+                    self._forget_begin(unit)
+
     def _forget_begin(self, unit: str) -> None:
         if unit in self._begun:
             _, state = self._begun.pop(unit)
@@ -144,7 +151,7 @@ class EventEnsemble(Ensemble):
     def _make(self, name: str, folder: Path) -> Instance:
         unit = self.system.units[name]
         make = EventInstance if unit.uses_events else Instance
-        return make(name, unit.description, folder, self.system.sources_of(name))
+        return make(name, unit.description, folder, self.system.sources_of(name), self.heartbeat)
 
 
 def can_go_back(unit: PlacedUnit) -> bool:

@@ -1,35 +1,45 @@
 """What ends a run at an event, or at a step that a unit does not take."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from cosim.exceptions import UnitFailure
+from cosim.failures import UnitDiscarded
 
 
-class EndRequested(UnitFailure):
-    """A unit asked for the end of the simulation; what observers saw before is complete."""
+class StepDiscarded(UnitDiscarded):
+    """A unit did not carry out a step, and the step is not repeated shorter.
 
-    def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = ()) -> None:
-        super().__init__(unit, call, t, "a request to end the simulation", log)
-
-
-class StepDiscarded(UnitFailure):
-    """A unit did not carry out a step, and the step cannot be repeated shorter, for the reason given."""
+    Attributes:
+        reached: the time in seconds until which its step was successful; in FMI 3 the step's begin.
+        reason: why it is not repeated.
+    """
 
     def __init__(self, unit: str, call: str, t: float, reached: float, reason: str, log: Sequence[str] = ()) -> None:
-        status = f"Discard: it came to t = {reached:.9g} s; {reason}"
-        super().__init__(unit, call, t, status, log)
-        self.reached, self.reason = reached, reason
+        self.reason = reason
+        super().__init__(unit, call, t, log, reached)
+
+    @property
+    def what(self) -> str:
+        """What happened, with the time that was reached and the reason."""
+        return f"{super().what}; {self.reason}"
 
     @property
     def told(self) -> str:
-        """What was answered, which says more than the unit's log of the same."""
-        return self.status
+        """What the unit logged last, and the reason."""
+        return f"{super().told} ({self.reason})"
 
 
 class UnsettledEvents(UnitFailure):
     """Units in event mode that keep changing each other's inputs, or asking for one more iteration."""
 
+    kind = "unsettled"
+
     def __init__(self, units: Iterable[str], t: float, iterations: int, call: str = "fmi3UpdateDiscreteStates") -> None:
         self.units = tuple(units)
         status = f"no end of events after {iterations} iterations; these do not settle: {', '.join(self.units)}"
         super().__init__(self.units[0], call, t, status)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as JSON can hold it."""
+        return {**super().as_data(), "units": list(self.units)}

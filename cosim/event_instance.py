@@ -8,10 +8,11 @@ from typing import Any
 
 from cosim.clock_calls import ClockCalls
 from cosim.clock_timer import ClockTimer
-from cosim.event_failures import EndRequested
 from cosim.exceptions import UnitFailure
+from cosim.failures import UnitEnded
 from cosim.fmpy_loading import load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance
 from cosim.signal_buffer import SignalBuffer
 from cosim.signal_content import content_of
@@ -30,9 +31,12 @@ class EventInstance(Instance):
         next_event: when it will have an event that it knows beforehand, s.
     """
 
-    def __init__(self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str]) -> None:
+    def __init__(
+        self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
+        heartbeat: Heartbeat | None = None,
+    ) -> None:  # fmt: skip
         fed = list(inputs)
-        super().__init__(name, description, folder, fed)
+        super().__init__(name, description, folder, fed, heartbeat)
         self.in_event_mode = False
         self.active: set[str] = set()
         self.timers: list[ClockTimer] = []
@@ -104,13 +108,13 @@ class EventInstance(Instance):
         """End an iteration in event mode at t; return whether the unit wants another one.
 
         Raises:
-            EndRequested: it wants the simulation to end. UnitFailure: its call failed.
+            UnitEnded: it wants the simulation to end. UnitFailure: its call failed.
         """
         self.time = t
         again, terminate, _, _, known = self._flags
         self._call("UpdateDiscreteStates", *(ctypes.byref(f) for f in self._flags), ctypes.byref(self._next))
         if terminate.value:
-            raise EndRequested(self.name, "fmi3UpdateDiscreteStates", t, tuple(self.log))
+            raise UnitEnded(self.name, "fmi3UpdateDiscreteStates", t, tuple(self.log))
         self.next_event = self._next.value if known.value else None
         for timer in self.timers:
             if timer.clock.name in self.active:
@@ -138,7 +142,9 @@ class EventInstance(Instance):
 
     def _load(self, folder: Path) -> Any:
         d = self.description
-        return load_fmi3(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, events=True)
+        return load_fmi3(
+            d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins, events=True
+        )
 
     def _is_reachable(self, port: FmuPort) -> bool:
         return not port.clocks or not self._initialized or not self.active.isdisjoint(port.clocks)

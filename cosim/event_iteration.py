@@ -35,7 +35,7 @@ class EventIteration:
             The units that were in event mode; all are in step mode again.
 
         Raises:
-            UnsettledEvents: there is no end. EndRequested: a unit wants the simulation to end.
+            UnsettledEvents: there is no end. UnitEnded: a unit wants the simulation to end.
             UnitFailure: a call failed, or a unit would have to tick that is not at t.
         """
         inside = {n for n in self._units if self._units[n].in_event_mode}

@@ -4,6 +4,7 @@ import difflib
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any, ClassVar
 
 _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
@@ -87,12 +88,33 @@ class ScheduleError(CosimError):
 
 
 class UnitFailure(CosimError):
-    """A unit's call failed while running; `log` holds the unit's last lines."""
+    """A unit's call failed; `failures` has a type for each way in which it can.
+
+    Attributes:
+        kind: which way, as one word for programs that read a run's summary.
+        unit: the instance.
+        call: the FMI call, or what else was done with the unit.
+        t: simulated time in seconds.
+        status: what the call answered, or what happened instead.
+        log: the unit's last log lines.
+    """
+
+    kind: ClassVar[str] = "failure"
 
     def __init__(self, unit: str, call: str, t: float, status: str, log: Sequence[str] = ()) -> None:
-        told = "".join(f"\n  {line}" for line in log)
-        super().__init__(f"{unit}: {call} at t = {t:.6g} s answered {status}{told}")
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)
+        told = "".join(f"\n  {line}" for line in log)
+        super().__init__(self.headline + told)
+
+    @property
+    def headline(self) -> str:
+        """One line: unit, call, time, and what happened."""
+        return f"{self.unit}: {self.call} at t = {self.t:.6g} s {self.what}"
+
+    @property
+    def what(self) -> str:
+        """What happened, to be read after the call."""
+        return f"answered {self.status}"
 
     @property
     def told(self) -> str:
@@ -103,6 +125,17 @@ class UnitFailure(CosimError):
     def cause(self) -> str:
         """One line: unit, call, time, and the last thing that the unit logged."""
         return f"{self.unit}: {self.call} at t = {self.t:.6g} s: {self.told}"
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as JSON can hold it."""
+        return {
+            "kind": self.kind,
+            "instance": self.unit,
+            "call": self.call,
+            "time": self.t,
+            "status": self.status,
+            "log": log_lines(self.log),
+        }
 
 
 class UnitRefused(CosimError):

@@ -19,11 +19,24 @@ from cosim.exceptions import InvalidFmu, one_line
 Logger = Callable[[int, str], None]
 """Takes an FMI status and a message."""
 
+Begins = Callable[[str], None]
+"""Told what begins to be done with a unit."""
+
+LOADING = "loading of its library"
+
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
 def load_fmi3(
-    path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger, *, events: bool = False
+    path: Path,
+    folder: Path,
+    identifier: str,
+    token: str,
+    instance: str,
+    log: Logger,
+    begins: Begins,
+    *,
+    events: bool = False,
 ) -> Any:
     """Load and instantiate an FMI 3 co-simulation FMU, with event mode and early return or without.
 
@@ -38,15 +51,17 @@ def load_fmi3(
         log(status, message.decode("utf-8", "replace"))
 
     with _loading(path):
+        begins(LOADING)
         fmu = fmpy.fmi3.FMU3Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
         with _unloading(fmu):
+            begins("fmi3InstantiateCoSimulation")
             fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
         return fmu
 
 
-def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger) -> Any:
+def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger, begins: Begins) -> Any:
     """Load and instantiate an FMI 2 co-simulation FMU; return FMPy's `FMU2Slave`.
 
     Raises:
@@ -60,12 +75,14 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
     callbacks.componentEnvironment = place
     fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
     with _loading(path):
+        begins(LOADING)
         fmu = fmpy.fmi2.FMU2Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
         )
         _loggers[place] = log
         weakref.finalize(fmu, _loggers.pop, place, None)
         with _unloading(fmu):
+            begins("fmi2Instantiate")
             fmu.instantiate(callbacks=callbacks, loggingOn=True)
         return fmu
 

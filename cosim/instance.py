@@ -3,49 +3,69 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.event_failures import EndRequested, StepDiscarded
+from cosim.event_failures import StepDiscarded
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
+from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 from cosim.step_end import StepEnd
+from cosim.step_status import discarded_step
 from cosim.variable import Kind
 
 State = ctypes.c_void_p
 """A saved state of one instance, which alone knows what it points to."""
 
 _LOG_LINES = 30
-_DISCARD = 2
-_FATAL = 4
-_PENDING = 5
-_LAST_SUCCESSFUL_TIME, _TERMINATED = ctypes.c_int(2), ctypes.c_int(3)  # of fmi2StatusKind
+_DISCARD, _FATAL, _PENDING = 2, 4, 5
+
+
+@dataclass(frozen=True)
+class NativeStep:
+    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
+
+    fmi: int
+    function: int
+    component: int
+    flags: tuple[int, ...]
 
 
 class Instance:
     """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
 
+    Each call is told to `heartbeat`. If a call returns after the unit was given up, `Abandoned` is raised.
+
     Raises:
         InvalidFmu: the library does not load or does not instantiate.
     """
 
-    def __init__(self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str]) -> None:
+    def __init__(
+        self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
+        heartbeat: Heartbeat | None = None,
+    ) -> None:  # fmt: skip
         self.name = name
         self.description = description
         self.time = 0.0
         self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
         self._fmi = description.fmi
         self._prefix = f"fmi{self._fmi}"
+        self._heartbeat = heartbeat or Heartbeat()
+        self._codes: dict[str, int] = {}
         self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
         d = description
         try:
             self._fmu = self._load(folder)
         except InvalidFmu as e:
             raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
+        finally:
+            self._returned()
         self._component = self._fmu.component
         self._failed: int | None = None
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])
@@ -57,7 +77,7 @@ class Instance:
         self.goes_back = False
         """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
-        self._do_step = self._function("DoStep")
+        self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
 
     def set_start(self, values: Mapping[str, Any]) -> None:
         """Set parameters or start values of inputs, before initialisation."""
@@ -110,12 +130,10 @@ class Instance:
             UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
         """
         self.time = t
+        self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
-        if status > 1:
-            reached = self._discarded_at(status)
-            raise self.discarded(reached, "steps are not repeated unless the master is told to (repeat_discarded)")
-        if self._fmi == 3 and self._terminate.value:
-            raise EndRequested(self.name, "fmi3DoStep", t, tuple(self.log))
+        self._returned()
+        self.judge_step(status)
         self.time = t + dt
 
     def try_step(self, t: float, dt: float) -> StepEnd:
@@ -125,24 +143,63 @@ class Instance:
             UnitFailure: the unit answered anything but OK, a warning or a discard, or ended the simulation.
         """
         self.time = t
+        self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
-        if status > 1:
-            return StepEnd(self._discarded_at(status), early=True, discarded=True)
-        if self._fmi == 2:
-            self.time = t + dt
-            return StepEnd(self.time)
-        if self._terminate.value:
-            raise EndRequested(self.name, "fmi3DoStep", self._last_time.value, tuple(self.log))
-        early = self._early.value and self._last_time.value < t + dt
+        self._returned()
+        if status == _DISCARD:
+            return StepEnd(self._reached(), early=True, discarded=True)
+        self.judge_step(status)
+        early = self._fmi == 3 and self._early.value and self._last_time.value < t + dt
         self.time = self._last_time.value if early else t + dt
         if not self.time >= t:
             told = f"a return at t = {self.time:.9g} s, which is before the step's begin"
-            raise UnitFailure(self.name, "fmi3DoStep", t, told, tuple(self.log))
-        return StepEnd(self.time, early, self._event.value)
+            raise UnitFailure(self.name, self._step_call, t, told, tuple(self.log))
+        return StepEnd(self.time, early, self._fmi == 3 and self._event.value)
 
     def discarded(self, reached: float, reason: str) -> StepDiscarded:
         """Return the failure of a step that the unit discarded and that is not repeated, for a reason."""
-        return StepDiscarded(self.name, f"{self._prefix}DoStep", self.time, reached, reason, tuple(self.log))
+        self._failed = _DISCARD
+        return StepDiscarded(self.name, self._step_call, self.time, reached, reason, tuple(self.log))
+
+    def judge_step(self, status: int) -> None:
+        """Look at what a step that was taken at `time` answered.
+
+        Raises:
+            UnitFailure: anything but OK or a warning, or the wish to end the simulation.
+        """
+        if status == _DISCARD:
+            raise self.discarded(self._reached(), "steps are repeated shorter only if the master is told to")
+        if status == _PENDING:  # the standard knows steps that go on by themselves; nothing here would go on meanwhile
+            self._function("CancelStep")(self._component)
+        self.judge(self._step_call, status)
+        if self._fmi == 3 and self._terminate.value:
+            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
+
+    def judge(self, call: str, status: int) -> None:
+        """Look at what a call answered at `time`.
+
+        Raises:
+            UnitFailure: anything but OK or a warning.
+        """
+        if status > 1:
+            self._fail(call, status)
+
+    @property
+    def setters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `set_inputs` sets."""
+        return self._setters
+
+    @property
+    def getters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `get_outputs` fetches."""
+        return self._getters
+
+    @property
+    def native_step(self) -> NativeStep:
+        """The call that `step` makes, for a program in C."""
+        function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
+        flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
+        return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -207,36 +264,54 @@ class Instance:
             buffer.refill(content)
 
     def end(self) -> None:
-        """Terminate the unit, unless a call failed: the standards forbid it then."""
-        if self._failed is None:
+        """Terminate the unit, unless a call failed: the standards forbid it then, but for Discard."""
+        if self._failed in (None, _DISCARD) and not self._abandoned:
             self._call("Terminate")
 
     def free(self) -> None:
-        """Free the unit and its library; after a fatal error the standards forbid any call, and it is left."""
-        if self._component is not None and self._failed != _FATAL:
+        """Free the unit and its library; it is left after a fatal error, as the standards ask, or if a call hangs."""
+        if self._component is not None and not self.fatal and not self._abandoned:
             self._component = None
+            self._begins(f"{self._prefix}FreeInstance")
             self._fmu.freeInstance()
+            self._returned()
+
+    @property
+    def fatal(self) -> bool:
+        """Whether a call was answered with Fatal."""
+        return self._failed == _FATAL
+
+    @property
+    def _abandoned(self) -> bool:
+        return self.name in self._heartbeat.abandoned
+
+    def _begins(self, call: str) -> None:
+        code = self._codes.get(call)
+        if code is None:
+            code = self._codes[call] = self._heartbeat.code(self.name, call)
+        self._heartbeat.begin(code, self.time)
+
+    def _returned(self) -> None:
+        self._heartbeat.end()
+        if self._heartbeat.abandoned and self._abandoned:
+            raise Abandoned
 
     def _load(self, folder: Path) -> Any:
         load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
-        return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line)
+        return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
 
-    def _discarded_at(self, status: int) -> float:
-        """Return how far a step came that was not carried out; raise if it was not discarded."""
-        if status == _PENDING:
-            # the standard knows asynchronous steps; nothing is won by waiting here for what could have been waited for
-            self._function("CancelStep")(self._component)
-        if status != _DISCARD:
-            self._fail(f"{self._prefix}DoStep", status)
+    def _reached(self) -> float:
+        """Return how far a step came that was discarded: FMI 2 tells, in FMI 3 the unit stays where it was.
+
+        Raises:
+            UnitEnded: it was because the unit wants to end the simulation.
+        """
         if self._fmi == 3:
             return self.time
-        reached, ended = ctypes.c_double(self.time), ctypes.c_int()
-        if self._function("GetRealStatus")(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) > 1:
-            reached.value = self.time
-        told = self._function("GetBooleanStatus")(self._component, _TERMINATED, ctypes.byref(ended))
-        if told <= 1 and ended.value:
-            raise EndRequested(self.name, "fmi2DoStep", reached.value, tuple(self.log))
-        return reached.value
+        reached, ended = discarded_step(self._function, self._component, self.time)
+        if ended:
+            raise UnitEnded(self.name, self._step_call, reached, tuple(self.log))
+        return reached
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:
@@ -266,7 +341,9 @@ class Instance:
 
     def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:
+            self._begins(buffer.name)
             status = buffer()
+            self._returned()
             if status > 1:
                 self._fail(buffer.name, status)
 
@@ -276,14 +353,14 @@ class Instance:
         if port.kind is Kind.STRING:
             kept = ctypes.create_string_buffer(str(value).encode())
             views[0][0] = ctypes.addressof(kept)
-            status = buffer()
         elif port.kind is Kind.BINARY:
-            data = ctypes.create_string_buffer(bytes(value), len(value))
-            views[0][0], views[1][0] = ctypes.addressof(data), len(value)
-            status = buffer()
+            kept = ctypes.create_string_buffer(bytes(value), len(value))
+            views[0][0], views[1][0] = ctypes.addressof(kept), len(value)
         else:
             views[0][:] = numbers_of(port, value)
-            status = buffer()
+        self._begins(buffer.name)
+        status = buffer()
+        self._returned()
         if status > 1:
             self._fail(f"setting {port.name}", status)
 
@@ -291,16 +368,19 @@ class Instance:
         return getattr(self._fmu.dll, self._prefix + name)
 
     def _call(self, name: str, *arguments: Any) -> None:
+        self._begins(self._prefix + name)
         status = self._function(name)(self._component, *arguments)
+        self._returned()
         if status > 1:
             self._fail(self._prefix + name, status)
 
     def _fail(self, call: str, status: int) -> None:
         self._failed = status
-        told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        raise UnitFailure(self.name, call, self.time, told, tuple(self.log))
+        raise failure_of(self.name, call, self.time, status, tuple(self.log))
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
             told = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
-            self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {told}")
+            line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
+            self.log.append(line)
+            self._heartbeat.log(self.name, line)

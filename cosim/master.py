@@ -4,21 +4,31 @@ import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
+from typing import TypeVar
 
 from cosim.coupling import Coupling
+from cosim.endings import Endings
 from cosim.ensemble import Ensemble
 from cosim.event_ensemble import EventEnsemble
 from cosim.event_stepper import EventStepper
 from cosim.exceptions import ScheduleError, UnitFailure, UnitRefused
 from cosim.extrapolation import Extrapolation
+from cosim.failures import UnitHung
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
+from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.jacobi import Jacobi
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.pacing import Pacer
+from cosim.plan.choice import plan_stepper
+from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.stepper import Stepper
 from cosim.system import System
+from cosim.watchdog import Watchdog
+
+T = TypeVar("T")
 
 _PLAIN = MasterOptions()
 _OFF_GRID = (
@@ -46,7 +56,7 @@ class Master:
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
-    def __init__(self, system: System, options: MasterOptions = _PLAIN) -> None:
+    def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
         system.check()
         self.system = system
         self.options = options
@@ -54,29 +64,34 @@ class Master:
         if self.has_events and options.extrapolation is Extrapolation.LINEAR:
             eventful = ", ".join(n for n, u in system.units.items() if u.uses_events)
             raise ScheduleError(_OFF_GRID.format(f"at events ({eventful})" if eventful else "when one is discarded"))
+        self.heartbeat = heartbeat or Heartbeat()
+        self.pacer = Pacer(options.pace) if options.pace is not None else None
+        """What keeps the run in step with the wall clock, if it is to."""
+        self._watchdog = Watchdog(self.heartbeat, options.call_limit)
+        self._endings = Endings()
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
 
     def __enter__(self) -> "Master":
-        ensemble = EventEnsemble(self.system) if self.has_events else Ensemble(self.system)
         try:
-            ensemble.initialize(self.schedule.slots)
-            if self.options.extrapolation is Extrapolation.LINEAR:
-                ensemble.extrapolate(self.schedule.tick)
-            self._stepper = self._make_stepper(ensemble)
+            self._watchdog.carry_out(self._start)
+        except UnitHung:
+            self._end()
+            raise
         except UnitFailure as e:
-            ensemble.close()
+            self._end()
             raise UnitRefused(e) from e
         except BaseException:
-            ensemble.close()
+            self._end()
             raise
-        self._ensemble = ensemble
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.ensemble.close()
+        hung = self._end()
+        if hung is not None and error is None:
+            raise hung
 
     @property
     def has_events(self) -> bool:
@@ -104,7 +119,10 @@ class Master:
 
     @property
     def cpu(self) -> "dict[str, array.array[float]]":
-        """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        """CPU seconds of every step, by unit, if the options ask for it.
+
+        With Gauss-Seidel, setting inputs and getting outputs are included.
+        """
         return self.ensemble.cpu
 
     @property
@@ -119,24 +137,79 @@ class Master:
         signals at t, then the other units go on from t. Jacobi: a step's results count from the time where it ends, for
         sampled units too. A second call goes on where the first one ended.
 
+        With `MasterOptions.call_limit` everything, observers included, is called from a thread of the master's own.
+
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
         """
+        self.carry_out(lambda: self._run(stop, observers, until))
+
+    def carry_out(self, job: Callable[[], T]) -> T:
+        """Do something else with the units in the thread that they are called from, with the same time limit.
+
+        Raises:
+            UnitHung: a unit does not return. Besides, whatever the job raises.
+        """
+        return self._watchdog.carry_out(job)
+
+    def _start(self) -> None:
+        load = EventEnsemble if self.has_events else Ensemble
+        ensemble = load(self.system, self.heartbeat, self._endings)
+        ensemble.initialize(self.schedule.slots)
+        if self.options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick)
+        ensemble.measures_cpu = self.options.cpu_times
+        self._stepper = self._make_stepper(ensemble)
+        self._ensemble = ensemble
+
+    def _end(self) -> UnitHung | None:
+        """Terminate and free all units but those that do not return; return the first of these as a failure."""
+        first: UnitHung | None = None
+        while True:
+            try:
+                self._watchdog.carry_out(self._endings.carry_out)
+            except UnitHung as e:
+                first = first or e
+            else:
+                break
+        self._watchdog.close()
+        return first
+
+    def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
+        if self.pacer is not None:
+            self.pacer.start(self.time)
         last = self.schedule.ticks(stop)
+        if isinstance(self.stepper, PlanStepper):
+            pause = None if self.pacer is None else self._pause(until)
+            self.stepper.run(last, signals, observers, None if until is never else until, pause)
+            return
         while True:
             ended = self.stepper.arrive(last)
+            if self.heartbeat.stopped:
+                raise Abandoned
+            if self.pacer is not None:
+                self._pause(until)()
             for observe in observers:
                 observe(self.stepper.time, signals)
             if ended or until():
                 break
             self.stepper.depart()
 
+    def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
+        """Return what waits until the wall clock is where the simulated time is."""
+
+        def pause() -> None:
+            if self.pacer is not None:
+                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
+
+        return pause
+
     def _make_stepper(self, ensemble: Ensemble) -> Stepper:
-        coupling = self._coupling(ensemble)
         if isinstance(ensemble, EventEnsemble):
-            return EventStepper(self.schedule, ensemble, coupling)
-        return GridStepper(self.schedule, coupling, ensemble.lines)
+            return EventStepper(self.schedule, ensemble, self._coupling(ensemble))
+        plan = plan_stepper(self.schedule, ensemble, self.options)
+        return plan or GridStepper(self.schedule, self._coupling(ensemble), ensemble.lines)
 
     def _coupling(self, ensemble: Ensemble) -> Coupling:
         kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}

@@ -81,6 +81,11 @@ class Recorder:
         self._block, self._columns = block, columns
 
     @property
+    def is_open(self) -> bool:
+        """Whether `open` was called, or the first row has done it."""
+        return self._block is not None
+
+    @property
     def block(self) -> RecordBlock:
         """The rows that are not in the stream yet, and where more of them go. It stays the same while recording."""
         if self._block is None:

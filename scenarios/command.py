@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from cosim.exceptions import nearest
+from cosim.master_options import MasterOptions
 from cosim.record_formats import RECORD_FORMATS
 from fmus.build import cached
 from fmus.catalog import UNITS
@@ -21,6 +22,7 @@ from scenarios.chosen import fmus_of, replacements, scenario_named
 from scenarios.ending import end_with
 from scenarios.export_command import export_command
 from scenarios.interruption import Interruption
+from scenarios.limit_arguments import limit_options, limits
 from scenarios.listing import print_catalog, print_scenario, print_unit
 from scenarios.parameters import parse_parameters
 from scenarios.progress import progress_bar
@@ -112,6 +114,7 @@ main.add_command(vsl_train)
     metavar="SECONDS",
     help="Write a checkpoint every so many simulated seconds, for `handover resume`.",
 )
+@limit_options
 @click.option("--out", type=_PATH, help="Folder for the results [default: a new one in runs/].")
 def run_(
     scenario: str,
@@ -122,6 +125,8 @@ def run_(
     step: Fraction | None,
     formats: Sequence[str],
     every: Fraction | None,
+    call_limit: float,
+    pace: float | None,
     out: Path | None,
 ) -> None:
     """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
@@ -153,6 +158,7 @@ def run_(
             formats=formats,
             every=every,
             source=source,
+            options=MasterOptions(**limits(call_limit, pace)),
         )
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption)

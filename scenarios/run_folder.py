@@ -101,6 +101,14 @@ class RunFolder:
         told = {"platform": platform.platform(), **versions()}
         _write_json(self.path / "run.json", {**configuration, "units": units, "versions": told})
 
+    def add_to_run(self, **told: Any) -> None:
+        """Add facts to `run.json`.
+
+        Raises:
+            BadRunFolder: there is none.
+        """
+        _write_json(self.path / "run.json", {**self.read_run(), **told})
+
     def read_run(self) -> dict[str, Any]:
         """Return what `write_run` wrote.
 

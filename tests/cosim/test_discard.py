@@ -45,15 +45,16 @@ def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
     with pytest.raises(StepDiscarded) as failure:
         seen(system(fmi), Fraction(1, 2), "short.y")
     assert failure.value.reached == pytest.approx(float(came))
-    assert failure.value.cause == (
-        f"short: fmi{fmi}DoStep at t = 0 s: Discard: it came to t = {came} s; steps are not repeated unless the master "
-        "is told to (repeat_discarded)"
+    assert failure.value.headline == (
+        f"short: fmi{fmi}DoStep at t = 0 s answered Discard, having reached t = {came} s; "
+        "steps are repeated shorter only if the master is told to"
     )
+    assert failure.value.told.startswith("[Discard] a step of 0.1 s is longer than 0.04 s (steps are repeated")
 
 
 def test_a_unit_that_cannot_go_back_is_told():
     s = system(2, canGetAndSetFMUstate=False, canSerializeFMUstate=False)
-    with pytest.raises(StepDiscarded, match=r"it came to t = 0.04 s; short cannot save its state or vary its step"):
+    with pytest.raises(StepDiscarded, match=r"having reached t = 0.04 s; short cannot save its state or vary its step"):
         seen(s, Fraction(1, 2), "short.y", options=REPEATING)
 
 

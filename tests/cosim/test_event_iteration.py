@@ -6,8 +6,9 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.event_failures import EndRequested, UnsettledEvents
+from cosim.event_failures import UnsettledEvents
 from cosim.event_iteration import MOST_ITERATIONS
+from cosim.failures import UnitEnded
 from cosim.master import Master
 from cosim.system import System
 
@@ -51,7 +52,7 @@ def test_a_unit_may_end_the_simulation():
     s = System()
     s.add("quitter", native_fmu("quitter"))
     times: list[float] = []
-    with pytest.raises(EndRequested, match=r"quitter: fmi3DoStep at t = 0.3 s answered a request to end"):
+    with pytest.raises(UnitEnded, match=r"quitter: fmi3DoStep at t = 0.2 s answered a request to end"):
         run_into(s, times)
     assert times == [0.0, 0.1, 0.2]
 
