@@ -8,7 +8,8 @@ from typing import Any
 
 from cosim.coupling import Coupling
 from cosim.event_ensemble import EventEnsemble
-from cosim.event_iteration import EventIteration
+from cosim.event_failures import UnsettledEvents
+from cosim.event_iteration import MOST_ITERATIONS, EventIteration
 from cosim.schedule import Schedule, Slot
 
 
@@ -32,6 +33,7 @@ class EventStepper:
       steps, which the log says once. Sampled units hold between their instants anyway.
     - At such an instant the event iteration settles what changes, then sampled units act on that, and what they change
       in turn is settled; observers see the instant once, after all of it.
+    - A unit that returns at once, without getting on, has its event settled by itself, after observers saw the instant.
     - A step that is discarded and repeated shorter is like an early return without an event.
 
     Times are exact: whole periods and clocks' intervals are fractions that are added up, events are the units' floats.
@@ -70,14 +72,29 @@ class EventStepper:
         return self.time == float(stop)
 
     def depart(self) -> None:
-        """Step what is due."""
-        sampled, continuous, targets = self._sampled(), list[Slot](), dict[str, Fraction]()
-        for slot in self._continuous():
-            targets[slot.unit] = target = self._target(slot.unit)
-            continuous.append(Slot(slot.unit, slot.every, float(target - self._now)))
-        self._coupling.depart(self.time, sampled, continuous)
+        """Step what is due.
+
+        Raises:
+            UnsettledEvents: units return early again and again without getting on. UnitFailure: a call failed.
+        """
+        sampled = self._sampled()
+        self._step(sampled, self._continuous())
         for slot in sampled:
             self._due[slot.unit] += self._periods[slot.unit]
+        units: list[str] = []
+        for _ in range(MOST_ITERATIONS):
+            stalled = self._continuous()
+            if not stalled:
+                return
+            units = [slot.unit for slot in stalled]
+            self._iteration.settle(self.time, self._flagged(), units)
+            self._step([], stalled)
+        raise UnsettledEvents(units, self.time, MOST_ITERATIONS, "fmi3DoStep")
+
+    def _step(self, sampled: Sequence[Slot], due: Sequence[Slot]) -> None:
+        targets = {slot.unit: self._target(slot.unit) for slot in due}
+        slots = [Slot(slot.unit, slot.every, float(targets[slot.unit] - self._now)) for slot in due]
+        self._coupling.depart(self.time, sampled, slots)
         for unit, target in targets.items():
             end, course = self._ensemble.ends[unit], self._courses[unit]
             course.begun, course.event = self._now, end.event

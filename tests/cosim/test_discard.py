@@ -7,6 +7,7 @@ from native_units import native_fmu
 from seen import grid, seen
 
 from cosim.event_failures import StepDiscarded
+from cosim.exceptions import UnitFailure
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.system import System
@@ -90,3 +91,10 @@ def test_units_are_told_apart_that_have_events():
     s = System()
     s.add("ball", native_fmu("ball"))
     assert Master(s).has_events
+
+
+def test_a_step_that_goes_on_by_itself_is_not_waited_for():
+    s = System()
+    s.add("pending", native_fmu("pending", 2))
+    with pytest.raises(UnitFailure, match=r"pending: fmi2DoStep at t = 0.2 s answered Pending"):
+        seen(s, Fraction(1, 2), "pending.count")

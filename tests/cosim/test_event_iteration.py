@@ -48,11 +48,29 @@ def test_a_unit_that_wants_ever_more_iterations_is_named():
     assert failure.value.units == ("asker",)
 
 
-def test_a_unit_may_end_the_simulation():
+@pytest.mark.parametrize(("stalls", "points"), [(0, 6), (3, 6)])
+def test_a_unit_may_return_at_once_some_times(stalls: int, points: int):
     s = System()
-    s.add("quitter", native_fmu("quitter"))
+    s.add("staller", native_fmu("staller"), most=stalls)
+    s.add("other", native_fmu("integrator"), u=1.0)
+    rows = seen(s, Fraction(1, 2), "staller.count", "other.x")
+    assert list(rows) == grid(10)[:points]
+    assert rows[0.5] == (stalls, pytest.approx(0.5))
+
+
+def test_a_unit_that_does_not_get_on_is_named():
+    s = System()
+    s.add("staller", native_fmu("staller"), most=10**6)
+    with pytest.raises(UnsettledEvents, match=r"staller: fmi3DoStep at t = 0.2 s answered no end of events after"):
+        seen(s, Fraction(1, 2), "staller.count")
+
+
+@pytest.mark.parametrize(("fmi", "at"), [(2, 0.3), (3, 0.2)])
+def test_a_unit_may_end_the_simulation(fmi: int, at: float):
+    s = System()
+    s.add("quitter", native_fmu("quitter", fmi))
     times: list[float] = []
-    with pytest.raises(UnitEnded, match=r"quitter: fmi3DoStep at t = 0.2 s answered a request to end"):
+    with pytest.raises(UnitEnded, match=rf"quitter: fmi{fmi}DoStep at t = {at} s answered a request to end"):
         run_into(s, times)
     assert times == [0.0, 0.1, 0.2]
 

@@ -1,7 +1,8 @@
 /* Units that answer discrete inputs in Event Mode.
  *
  * follower: count = count_in + 1, at most `most`, in the iteration after the one in which count_in came. watch: tells
- * when its input changed last. asker: asks for one more iteration for ever. quitter: ends the simulation at an event. */
+ * when its input changed last. asker: asks for one more iteration for ever. quitter: ends the simulation in a step. staller: from 0.2 s on returns at once,
+ * without getting on, as often as `most` says. pending: goes on by itself, as FMI 2 allows. */
 #include "frame/unit.h"
 
 typedef struct {
@@ -47,6 +48,22 @@ static enum status quit(Unit *unit, double t, double h, StepEnd *end) {
     return OK;
 }
 
+static enum status stall(Unit *unit, double t, double h, StepEnd *end) {
+    SELF(Follower);
+    if (t < 0.2 - 1e-9 || self->count >= self->most)
+        return OK;
+    end->early = end->event_needed = true;
+    end->last_time = t;
+    return OK;
+}
+static void count_stall(Unit *unit, Update *update) {
+    SELF(Follower);
+    self->count += unit->kept->time > 0;
+}
+static enum status postpone(Unit *unit, double t, double h, StepEnd *end) {
+    return t < 0.15 ? OK : (enum status)5;
+}
+
 static const Model follower = {
     "follower", of_follower, COUNT(of_follower), 0.1, EVENTS, sizeof(Follower), .update = follow,
 };
@@ -55,7 +72,14 @@ static const Model asker = {
     "asker", of_watch, COUNT(of_watch), 0.1, EVENTS, sizeof(Watch), .step = ask_at_end, .update = ask,
 };
 static const Model quitter = {"quitter", of_watch, COUNT(of_watch), 0.1, EVENTS, sizeof(Watch), .step = quit};
+static const Model staller = {
+    "staller", of_follower, COUNT(of_follower), 0.1, EVENTS | EARLY_RETURN, sizeof(Follower),
+    .step = stall, .update = count_stall,
+};
+static const Model pending = {"pending", of_watch, COUNT(of_watch), 0.1, 0, sizeof(Watch), .step = postpone};
 UNIT(follower)
 UNIT(watch)
 UNIT(asker)
 UNIT(quitter)
+UNIT(staller)
+UNIT(pending)

@@ -136,6 +136,7 @@ enum status do_step(Unit *unit, double t, double h, StepEnd *end) {
         memcpy(kept->data + model->size, kept->data, model->size);
     enum status status = model->step ? model->step(unit, t, h, end) : OK;
     kept->last_time = end->last_time;
+    kept->terminated = end->terminate;
     if (status <= DISCARD) {
         kept->time = end->last_time;
         kept->last_step = end->last_time - t;

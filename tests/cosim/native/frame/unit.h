@@ -70,7 +70,7 @@ typedef struct {
 /* All of it that a saved state holds lies in one block, `kept`. */
 typedef struct {
     double time, last_time, last_step;
-    int32_t mode, stale; /* stale: inputs were set since outputs were computed */
+    int32_t mode, terminated, stale; /* stale: inputs were set since outputs were computed */
     double rates[MAX_VARIABLES][MAX_ORDER];
     _Alignas(16) unsigned char data[]; /* the unit's struct, and again as it was before the last step */
 } Kept;
