@@ -129,10 +129,12 @@ def test_units_that_cannot_be_rolled_back_or_vary_their_step_are_all_named():
     s.add("good", native_fmu("mass"))
     s.add("forgetful", native_fmu("mass", canGetAndSetFMUState=False))
     s.add("rigid", native_fmu("fixed_step"))
+    s.add("ball", native_fmu("ball"))
     with pytest.raises(ScheduleError) as caught:
         Master(s, following(1e-3))
     told = str(caught.value)
-    assert told == "the step cannot follow the error: forgetful cannot save its state; rigid takes fixed steps only"
+    faults = ("forgetful cannot save its state", "ball has events, at which steps end", "rigid takes fixed steps only")
+    assert told == f"the step cannot follow the error: {'; '.join(faults)}"
 
 
 def test_nothing_to_control_is_refused():
