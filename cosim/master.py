@@ -72,11 +72,11 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
+        if options.adaptive is not None:
+            check_control(system)
         if self.has_events and options.extrapolation is Extrapolation.LINEAR:
             eventful = ", ".join(n for n, u in system.units.items() if u.uses_events)
             raise ScheduleError(_OFF_GRID.format(f"at events ({eventful})" if eventful else "when one is discarded"))
-        if options.adaptive is not None:
-            check_control(system)
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
