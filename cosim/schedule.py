@@ -99,7 +99,9 @@ class Schedule:
             _log.warning("%s does not declare what acts at once; it gets the former values of %s", names, others)
 
         def told_declared(group: int, waits: set[int]) -> None:
-            self.initial_passes += 1
+            late = {n for i in waits for n in groups[i].units}
+            ports = [(n, port) for n in groups[group].units for port in _acting_ports(system.units[n])]
+            self.initial_passes += sum(sources[n].get(port) in late for n, port in ports)
             names, others = ", ".join(groups[group].units), units_of(waits, declared, group)
             _log.warning(
                 "%s steps first where units wait for each other; it gets the former values of %s", names, others
@@ -129,6 +131,10 @@ def _sources(system: System) -> dict[str, dict[str, str]]:
     for c in system.connections:
         sources[c.target.unit][c.target.port] = c.source.unit
     return sources
+
+
+def _acting_ports(unit: PlacedUnit) -> set[str]:
+    return {u for us in unit.description.feedthrough.values() for u in us}
 
 
 def _acting(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:
