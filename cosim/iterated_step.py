@@ -72,8 +72,9 @@ class IteratedStep:
             solution = self.solver.solve(g, self._interface.read(t))
         except Unsolved as e:
             raise not_converged(list(spent), t, e, self._interface, self.solver.magnitudes, self._loop) from e
-        for unit, seconds in spent.items():
-            self._ensemble.cpu[unit].append(seconds)
+        if self._ensemble.measures_cpu:
+            for unit, seconds in spent.items():
+                self._ensemble.cpu[unit].append(seconds)
         self._count.add(solution.iterations, rollbacks)
 
     def _step_one(self, t: float, slot: Slot, x: Floats) -> None:
