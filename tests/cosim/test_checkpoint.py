@@ -76,7 +76,7 @@ def test_a_checkpoint_that_cannot_be_written_is_told_and_the_run_goes_on(
 
 @pytest.mark.parametrize("algorithm", Algorithm)
 def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, algorithm: Algorithm):
-    options = MasterOptions(algorithm=algorithm)
+    options = MasterOptions(algorithm=algorithm, cpu_times=True)
     points: list[Checkpoint] = []
     with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "whole.parquet") as recorder:
         master.run(Fraction(1, 5), [recorder, lambda _t, _s: points.append(take_checkpoint(master, recorder.rows))])
