@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
 from cosim.endings import Endings
 from cosim.exceptions import CosimError
@@ -29,6 +30,14 @@ from cosim.system import PortName, System
 _log = logging.getLogger(__name__)
 
 
+class Feeding(NamedTuple):
+    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
+
+    narrowings: Sequence[Narrowing]
+    copies: Sequence[Copy]
+    scaled: Sequence[ScaledCopy]
+
+
 class Ensemble:
     """Loads a system's units and carries out what an algorithm wants of them, one unit at a time.
 
@@ -43,6 +52,8 @@ class Ensemble:
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.measures_cpu = False
+        """Whether CPU time is taken of steps."""
         self.lines: LinearInputs | None = None
         """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
@@ -68,8 +79,12 @@ class Ensemble:
         ports = {n: u.description.outputs for n, u in self.system.units.items()}
         return Signals({n: i.y for n, i in self.instances.items()}, ports, self)
 
-    def initialize(self, slots: Sequence[Slot]) -> None:
-        """Take all units through initialisation mode, in the order given.
+    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
+        """Take all units through initialisation mode.
+
+        Args:
+            slots: in the order in which they leave it.
+            work_out: is called in between, to set inputs and get outputs in whatever order.
 
         Raises:
             UnitFailure: a unit does not accept its start values or does not initialise.
@@ -77,11 +92,7 @@ class Ensemble:
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
-        known: set[str] = set()
-        for slot in slots:
-            self._feed_known(slot.unit, known)
-            self.publish(slot.unit)
-            known.add(slot.unit)
+        work_out()
         for slot in slots:
             self.feed(slot.unit, 0.0)
             self.instances[slot.unit].exit_initialization()
@@ -98,10 +109,45 @@ class Ensemble:
         Raises:
             UnitFailure: the unit does not take them.
         """
-        self._copy(unit, t)
+        self.gather(unit, t)
         if self.lines is not None and dt is not None:
             self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
+
+    def feeding(self, unit: str) -> Feeding:
+        """Return what `feed` does before it sets a unit's inputs, where none are extrapolated."""
+        return Feeding(self._narrowings[unit], self._copies[unit], self._scaled[unit])
+
+    def feed_known(self, unit: str, known: Collection[str]) -> None:
+        """Set only the inputs whose sources are units that are known; the others keep what they have.
+
+        Raises:
+            UnitFailure: the unit does not take them.
+        """
+        self.gather(unit, 0.0)
+        self.set_known(unit, known)
+
+    def set_known(self, unit: str, known: Collection[str]) -> None:
+        """Hand over, of the inputs that were gathered, only those whose sources are units that are known.
+
+        Raises:
+            UnitFailure: the unit does not take them.
+        """
+        sources = self.system.sources_of(unit)
+        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
+
+    def gather(self, unit: str, t: float) -> None:
+        """Copy to a unit's buffers what its sources give; it is told by `set_inputs`.
+
+        Raises:
+            UnitFailure: a number does not fit its input.
+        """
+        for narrowing in self._narrowings[unit]:
+            narrowing.check(t)
+        for target, source in self._copies[unit]:
+            target[...] = source
+        for scaled in self._scaled[unit]:
+            scaled()
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt.
@@ -143,32 +189,23 @@ class Ensemble:
         for name, state in states.items():
             self.instances[name].free_state(state)
 
+    def finite_check(self, unit: str) -> FiniteCheck:
+        """Return the check that `publish` makes of a unit's outputs."""
+        return self._finite[unit]
+
     @contextlib.contextmanager
     def stopwatch(self) -> Generator[Callable[[str], None], None, None]:
         """Give a function that charges the CPU time since it was last called, or since the start, to a unit."""
-        began = time.process_time()
+        began = time.process_time() if self.measures_cpu else 0.0
 
         def charge(unit: str) -> None:
             nonlocal began
-            ended = time.process_time()
-            self.cpu[unit].append(ended - began)
-            began = ended
+            if self.measures_cpu:
+                ended = time.process_time()
+                self.cpu[unit].append(ended - began)
+                began = ended
 
         yield charge
-
-    def _copy(self, unit: str, t: float) -> None:
-        for narrowing in self._narrowings[unit]:
-            narrowing.check(t)
-        for target, source in self._copies[unit]:
-            target[...] = source
-        for scaled in self._scaled[unit]:
-            scaled()
-
-    def _feed_known(self, unit: str, known: Collection[str]) -> None:
-        """Set only inputs whose sources are known already; the others keep their start values."""
-        self._copy(unit, 0.0)
-        sources = self.system.sources_of(unit)
-        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
 
     def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)

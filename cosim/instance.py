@@ -3,14 +3,18 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from cosim.exceptions import InvalidFmu, last_line
 from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
+from cosim.magnitudes import Floats
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
@@ -21,6 +25,16 @@ State = ctypes.c_void_p
 
 _LOG_LINES = 30
 _DISCARD, _FATAL = 2, 4
+
+
+@dataclass(frozen=True)
+class NativeStep:
+    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
+
+    fmi: int
+    function: int
+    component: int
+    flags: tuple[int, ...]
 
 
 class Instance:
@@ -120,11 +134,68 @@ class Instance:
         self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
         self._returned()
-        if status > 1:
-            self._fail(f"{self._prefix}DoStep", status)
-        if self._fmi == 3 and self._terminate.value:
-            raise UnitEnded(self.name, "fmi3DoStep", t, tuple(self.log))
+        self.judge_step(status)
         self.time = t + dt
+
+    def judge_step(self, status: int) -> None:
+        """Look at what a step that was taken at `time` answered.
+
+        Raises:
+            UnitFailure: anything but OK or a warning, or the wish to end the simulation.
+        """
+        self.judge(f"{self._prefix}DoStep", status)
+        if self._fmi == 3 and self._terminate.value:
+            raise UnitEnded(self.name, "fmi3DoStep", self.time, tuple(self.log))
+
+    def judge(self, call: str, status: int) -> None:
+        """Look at what a call answered at `time`.
+
+        Raises:
+            UnitFailure: anything but OK or a warning.
+        """
+        if status > 1:
+            self._fail(call, status)
+
+    @property
+    def setters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `set_inputs` sets."""
+        return self._setters
+
+    @property
+    def getters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `get_outputs` fetches."""
+        return self._getters
+
+    @property
+    def native_step(self) -> NativeStep:
+        """The call that `step` makes, for a program in C."""
+        function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
+        flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
+        return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
+
+    def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return how outputs change with inputs at this instant, the unit's state being as it is.
+
+        Args:
+            outputs: names of real outputs.
+            inputs: a direction: how fast each of some real inputs changes, all its entries in row-major order.
+
+        Returns:
+            How fast the outputs change then, by name.
+
+        Raises:
+            UnitFailure: it does not tell.
+        """
+        d = self.description
+        unknowns, knowns = [d.outputs[y] for y in outputs], [d.inputs[u] for u in inputs]
+        seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
+        found = np.zeros(sum(p.size for p in unknowns))
+        references = (_references(unknowns), _references(knowns))
+        lengths = ((), ()) if self._fmi == 2 else ((len(seed),), (len(found),))
+        vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
+        self._call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
+        ends = np.cumsum([p.size for p in unknowns])[:-1]
+        return dict(zip(outputs, np.split(found, ends), strict=True))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -292,3 +363,12 @@ class Instance:
             line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
             self.log.append(line)
             self._heartbeat.log(self.name, line)
+
+
+def _references(ports: Sequence[FmuPort]) -> Any:
+    references = [r for p in ports for r in p.references]
+    return (ctypes.c_uint * len(references))(*references)
+
+
+def _doubles(values: Floats) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
