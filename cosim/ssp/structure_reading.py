@@ -1,5 +1,6 @@
 """Reads SystemStructure.ssd and the parameter files that it refers to."""
 
+import re
 from collections.abc import Mapping
 from fractions import Fraction
 
@@ -29,6 +30,9 @@ from cosim.units import UNKNOWN, Unit
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+
+_PERIOD = re.compile(r"[1-9]\d{0,11}(/[1-9]\d{0,11})?")
+"""Seconds as `write_ssp` writes them; what is longer could take long to reckon with."""
 
 _NO_TYPES = ("ConnectorGeometry", "Annotations", "Dimension", "MetaData", "Signature")
 """What a connector has besides its type."""
@@ -110,13 +114,10 @@ class _Reader:
             if annotation.get("type") != STEP_ANNOTATION:
                 continue
             for c in annotation.children:
-                try:
-                    period = Fraction(c.get("period"))
-                except (ValueError, ZeroDivisionError):
-                    period = Fraction(0)
-                if period <= 0:
-                    raise self._part.fault(c, f"period={c.get('period')[:80]!r} is not a positive number of seconds")
-                return period, self._part.flag(c, "sampled")
+                given = c.get("period")
+                if not _PERIOD.fullmatch(given):
+                    raise self._part.fault(c, f"period={given[:80]!r} is not a number of seconds such as 1/30")
+                return Fraction(given), self._part.flag(c, "sampled")
         return None, None
 
     def _connectors(self, e: XmlElement) -> dict[str, SspConnector]:
