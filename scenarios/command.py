@@ -25,7 +25,7 @@ from scenarios.progress import progress_bar
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Task, carry_out
 from scenarios.ssp_call import open_experiment, refuse_for_ssp, ssp_options
-from scenarios.ssp_run import NoParameters, is_ssp
+from scenarios.ssp_run import is_ssp
 from scenarios.vsl_train_command import vsl_train
 
 _PATH = click.Path(path_type=Path)
@@ -117,7 +117,7 @@ def run_(
         raise BadCall("--stop and --step are for an SSP; a scenario has its own")
     with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
         if is_ssp(scenario):
-            experiment, values = open_experiment(Path(scenario), stop, step, opened), NoParameters()
+            experiment, values = open_experiment(Path(scenario), stop, step, opened)
         else:
             experiment = scenario_named(scenario)()
             values = parse_parameters(type(experiment), parameters)

@@ -13,7 +13,7 @@ import click
 from cosim.ssp.ssp_file import SspFile
 from scenarios.bad_call import BadCall
 from scenarios.experiment import Experiment
-from scenarios.ssp_run import UntilStop, experiment_of
+from scenarios.ssp_run import SspParameters, UntilStop, experiment_of, parameters_of
 
 _SECONDS = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
 """Larger exponents would take long to reckon with."""
@@ -58,8 +58,8 @@ def refuse_for_ssp(**given: Any) -> None:
 
 def open_experiment(
     path: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
-) -> Experiment[UntilStop]:
-    """Open an SSP as an experiment; `opened` closes it.
+) -> tuple[Experiment[UntilStop], SspParameters]:
+    """Open an SSP as an experiment with its parameters; `opened` closes it.
 
     Raises:
         InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
@@ -68,4 +68,4 @@ def open_experiment(
     until = stop or ssp.stop
     if until is None:
         raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
-    return experiment_of(ssp, until)
+    return experiment_of(ssp, until), parameters_of(ssp, until)
