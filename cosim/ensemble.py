@@ -6,12 +6,15 @@ import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 
 from cosim.exceptions import CosimError
 from cosim.fmpy_edge import unpack
 from cosim.instance import Instance, State
+from cosim.linear_inputs import LinearInputs
 from cosim.narrowing import Narrowing, narrows
+from cosim.saved_states import SavedStates
 from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
@@ -33,6 +36,8 @@ class Ensemble:
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.lines: LinearInputs | None = None
+        """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
         self._scaled: dict[str, list[ScaledCopy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
@@ -70,13 +75,19 @@ class Ensemble:
             self.publish(slot.unit)
             self._end_at_close(self.instances[slot.unit])
 
-    def feed(self, unit: str, t: float) -> None:
-        """Set a unit's inputs from their sources.
+    def extrapolate(self, tick: Fraction) -> None:
+        """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
+        self.lines = LinearInputs(self.system, self.instances, tick)
+
+    def feed(self, unit: str, t: float, dt: float | None = None) -> None:
+        """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
 
         Raises:
             UnitFailure: the unit does not take them.
         """
         self._copy(unit, t)
+        if self.lines is not None and dt is not None:
+            self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
 
     def step(self, unit: str, t: float, dt: float) -> None:
@@ -86,17 +97,24 @@ class Ensemble:
             UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
+        if self.lines is not None:
+            self.lines.step(unit)
 
     def publish(self, unit: str) -> None:
         """Fetch a unit's outputs, for observers and for the units that they feed."""
         self.instances[unit].get_outputs()
+        if self.lines is not None:
+            self.lines.publish(unit)
 
-    def save(self, units: Collection[str]) -> dict[str, State]:
+    def save(self, units: Collection[str]) -> SavedStates:
         """Save the states of units; `restore` goes back to them, `forget` frees them."""
-        return {name: self.instances[name].save_state() for name in units}
+        lines = self.lines.save(units) if self.lines is not None else {}
+        return SavedStates({name: self.instances[name].save_state() for name in units}, lines)
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
+        if self.lines is not None and isinstance(states, SavedStates):
+            self.lines.restore(states.lines)
         for name, state in states.items():
             self.instances[name].restore_state(state)
             self.publish(name)

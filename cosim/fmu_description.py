@@ -45,7 +45,7 @@ class FmuPort(Declared):
 
     Attributes:
         references: one value reference in all, or one for each entry.
-        variability: as the standards call it.
+        discrete: whether it changes at events only.
         nominal: the magnitude that its values usually have, in its unit, where the FMU says.
     """
 
@@ -53,13 +53,13 @@ class FmuPort(Declared):
     references: tuple[int, ...]
     start: str | None = None
     mime: str | None = None
-    variability: str = "continuous"
+    discrete: bool = False
     nominal: float | None = None
 
     @property
     def is_continuous(self) -> bool:
         """Whether its value is a real number that changes between instants."""
-        return self.kind is Kind.REAL and self.variability == "continuous"
+        return self.kind is Kind.REAL and not self.discrete
 
     @property
     def signature(self) -> str:
@@ -165,7 +165,7 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         maximum=float(high) if high is not None else None,
         items=tuple((i.name, int(i.value)) for i in items),
         mime=mimes.get(v.name),
-        variability=v.variability or "continuous",
+        discrete=(v.variability or ("continuous" if kind is Kind.REAL else "discrete")) != "continuous",
         nominal=float(nominal) if nominal is not None else None,
         width=_WIDTHS.get(v.type),
         description=v.description or "",
@@ -192,7 +192,7 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         first = members[0][1]
         shape = members[-1][0]
         whole = [m[0] for m in members] == indices_of(shape)
-        alike = len({(p.fmi_type, p.causality, p.unit, p.variability) for _, p in members}) == 1
+        alike = len({(p.fmi_type, p.causality, p.unit, p.discrete) for _, p in members}) == 1
         if shape and whole and alike:
             starts = [p.start for _, p in members]
             start = None if None in starts else " ".join(str(s) for s in starts)

@@ -23,7 +23,7 @@ class GaussSeidel:
     def _one_after_another(self, t: float, due: Sequence[Slot]) -> None:
         with self._ensemble.stopwatch() as charge:
             for slot in due:
-                self._ensemble.feed(slot.unit, t)
+                self._ensemble.feed(slot.unit, t, slot.period)
                 self._ensemble.step(slot.unit, t, slot.period)
                 self._ensemble.publish(slot.unit)
                 charge(slot.unit)

@@ -4,13 +4,18 @@ from collections.abc import Mapping
 from typing import Any
 
 from cosim.coupling import Coupling
+from cosim.linear_inputs import LinearInputs
 from cosim.schedule import Schedule
 
 
 class GridStepper:
-    """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift."""
+    """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
 
-    def __init__(self, schedule: Schedule, coupling: Coupling) -> None:
+    `lines` is what extrapolated inputs follow, if any are.
+    """
+
+    def __init__(self, schedule: Schedule, coupling: Coupling, lines: LinearInputs | None = None) -> None:
+        self._lines = lines
         self.time = 0.0
         self._schedule = schedule
         self._coupling = coupling
@@ -38,11 +43,14 @@ class GridStepper:
             self._due[slot.unit] += slot.every
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the ticks; see `Stepper`."""
-        return {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
+        """Return the ticks, and what inputs follow; see `Stepper`."""
+        lines = {} if self._lines is None else {"lines": self._lines.get_state()}
+        return {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted), **lines}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to ticks that `get_state` gave."""
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
+        if self._lines is not None:
+            self._lines.set_state(state["lines"])
         self.time = self._schedule.time(self._tick)

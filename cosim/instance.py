@@ -2,13 +2,14 @@
 
 import collections
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
 from cosim.variable import Kind
@@ -34,6 +35,7 @@ class Instance:
         self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
         self._fmi = description.fmi
         self._prefix = f"fmi{self._fmi}"
+        self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
         load = load_fmi2 if self._fmi == 2 else load_fmi3
         d = description
         try:
@@ -46,6 +48,10 @@ class Instance:
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
+        self.du: dict[str, Views] = {}
+        """Time derivatives of inputs that `interpolate` named."""
+        self.goes_back = False
+        """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
         self._do_step = self._function("DoStep")
 
@@ -70,7 +76,7 @@ class Instance:
         self._call("ExitInitializationMode")
 
     def set_inputs(self) -> None:
-        """Hand the contents of `u` to the unit."""
+        """Hand the contents of `u`, and of `du`, to the unit."""
         self._carry_out(self._setters)
 
     def set_some_inputs(self, names: Iterable[str]) -> None:
@@ -81,6 +87,13 @@ class Instance:
                 for mine, held in zip(views, self.u[name], strict=True):
                     mine[:] = held
         self._carry_out(setters)
+
+    def interpolate(self, names: Iterable[str]) -> None:
+        """Hand these inputs' time derivatives to the unit too, whenever inputs are set (FMI 2)."""
+        ports = [self.description.inputs[n] for n in names]
+        buffer = RateBuffer(self._function("SetRealInputDerivatives"), self._component, ports)
+        self._setters.append(buffer)
+        self.du = dict(buffer.views)
 
     def get_outputs(self) -> None:
         """Fetch the unit's outputs into `y`."""
@@ -93,7 +106,7 @@ class Instance:
             UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
         """
         self.time = t
-        status = self._do_step(self._component, t, dt, *self._step_arguments)
+        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
         if status > 1:
             self._fail(f"{self._prefix}DoStep", status)
         if self._fmi == 3 and self._terminate.value:
@@ -122,6 +135,46 @@ class Instance:
         """Free a saved state."""
         self._call("FreeFMUstate" if self._fmi == 2 else "FreeFMUState", ctypes.byref(state))
 
+    def serialise_state(self) -> bytes:
+        """Return the unit's state as bytes that mean the same in another process.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state, size = self.save_state(), ctypes.c_size_t()
+        try:
+            name = "FMUstate" if self._fmi == 2 else "FMUState"
+            self._call(f"Serialized{name}Size", state, ctypes.byref(size))
+            data = (self._byte * size.value)()
+            self._call(f"Serialize{name}", state, data, size)
+            return bytes(data)
+        finally:
+            self.free_state(state)
+
+    def deserialise_state(self, data: bytes) -> None:
+        """Go to a state that `serialise_state` gave.
+
+        Raises:
+            UnitFailure: it cannot.
+        """
+        state = State()
+        held = (self._byte * len(data)).from_buffer_copy(data)
+        name = "DeSerializeFMUstate" if self._fmi == 2 else "DeserializeFMUState"
+        self._call(name, held, ctypes.c_size_t(len(data)), ctypes.byref(state))
+        try:
+            self.restore_state(state)
+        finally:
+            self.free_state(state)
+
+    def contents(self) -> list[list[bytes]]:
+        """Return what `y` and the plain values of `u` hold: not always the unit's values at its present time."""
+        return [b.contents() for b in self._held()]
+
+    def refill(self, contents: Sequence[Sequence[bytes]]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        for buffer, content in zip(self._held(), contents, strict=True):
+            buffer.refill(content)
+
     def end(self) -> None:
         """Terminate the unit, unless a call failed: the standards forbid it then."""
         if self._failed is None:
@@ -135,11 +188,11 @@ class Instance:
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:
-            return (True,)
+            return ()
         self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
         self._last_time = ctypes.c_double()
         flags = (self._event, self._terminate, self._early)
-        return (True, *(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
+        return (*(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
 
     def _buffers(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
         by_type: dict[str, list[FmuPort]] = collections.defaultdict(list)
@@ -154,6 +207,10 @@ class Instance:
         make = OutputBuffer if verb == "Get" and kind in ("String", "Binary") else SignalBuffer
         call = f"{self._prefix}{verb}{kind}"
         return make(call, self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
+
+    def _held(self) -> list[SignalBuffer]:
+        """Return the buffers but those of inputs that hold addresses of others' outputs, which are copied anew."""
+        return [*self._getters, *(b for b in self._setters if not b.name.endswith(("String", "Binary")))]
 
     def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:

@@ -20,8 +20,10 @@ class Jacobi:
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
         """Set all inputs, then step."""
         due = (*sampled, *continuous)
-        for slot in due:
+        for slot in sampled:
             self._ensemble.feed(slot.unit, t)
+        for slot in continuous:
+            self._ensemble.feed(slot.unit, t, slot.period)
         with self._ensemble.stopwatch() as charge:
             for slot in due:
                 self._ensemble.step(slot.unit, t, slot.period)

@@ -8,6 +8,7 @@ from types import TracebackType
 from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
 from cosim.exceptions import UnitFailure, UnitRefused
+from cosim.extrapolation import Extrapolation
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
 from cosim.jacobi import Jacobi
@@ -50,7 +51,9 @@ class Master:
         ensemble = Ensemble(self.system)
         try:
             ensemble.initialize(self.schedule.slots)
-            self._stepper = GridStepper(self.schedule, self._coupling(ensemble))
+            if self.options.extrapolation is Extrapolation.LINEAR:
+                ensemble.extrapolate(self.schedule.tick)
+            self._stepper = GridStepper(self.schedule, self._coupling(ensemble), ensemble.lines)
         except UnitFailure as e:
             ensemble.close()
             raise UnitRefused(e) from e

@@ -3,6 +3,8 @@
 import enum
 from dataclasses import dataclass
 
+from cosim.extrapolation import Extrapolation
+
 
 class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs.
@@ -20,8 +22,10 @@ class MasterOptions:
 
     Attributes:
         algorithm: see `Algorithm`.
+        extrapolation: what inputs are between communication points; see `Extrapolation`.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
+    extrapolation: Extrapolation = Extrapolation.HOLD
     compiled: bool = True

@@ -1,43 +1,43 @@
-"""Writes the scalar signals of a run to a Parquet file, one column a signal, safely as they come."""
+"""Records the scalar signals of a run, one column a signal, so that no row is lost however the process ends."""
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from numpy.typing import NDArray
-
-from cosim.signals import Column, Signals
-from cosim.variable import Kind
-from cosim.width import Width
-
-_ROWS = 256
-_TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}
+from cosim.complete_record import finish_record, rewind_stream, stream_of, tail_of
+from cosim.record_block import RecordBlock
+from cosim.record_columns import RecordColumns, record_columns
+from cosim.record_stream import RecordStream, stream_batches
+from cosim.signals import Signals
 
 
 class Recorder:
     """An observer of `Master.run` that records every communication point. Use as a context manager.
 
-    The first column is `time` in seconds. A column's metadata hold its unit and description, an enumeration's also its
-    items. A Parquet file cannot be read before it is complete, so rows go to an Arrow stream beside it
-    (`signals.arrows`), a block at a time; leaving turns that into the Parquet file, also when the run was cut short.
-    If the process dies, the stream stays and holds all blocks that were written.
+    The record is `path`, a Parquet file, with further forms beside it as `formats` asks: see `RECORD_FORMATS`. Such
+    files cannot be written as rows come. Rows go to a block in a memory-mapped file (`signals.tail`), and whole blocks
+    to an Arrow stream (`signals.arrows`), both beside the record; leaving turns the two into the record, also when the
+    run was cut short. If the process dies, both files stay with every row, and `complete_record` makes the record of
+    them.
+
+    Who steps units in another way than `Master.run` calls `open`, then adds rows to `block` as that describes, and
+    calls `flush` when it is full.
+
+    Args:
+        path: the record, with the suffix `.parquet`.
+        formats: forms of the record; Parquet is always written.
+        after: go on with a record that a process left, after so many rows; later ones are forgotten.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, formats: Sequence[str] = (), after: int = 0) -> None:
         self.path = path
-        self.stream = path.with_suffix(".arrows")
-        self.rows = 0
-        self._writer: pa.ipc.RecordBatchStreamWriter | None = None
-        self._file: pa.NativeFile | None = None
-        self._columns: list[Column] = []
-        self._schema = pa.schema([])
-        self._time = np.zeros(_ROWS)
-        self._sources: list[tuple[NDArray[Any], NDArray[Any]]] = []  # a unit's values of one type, and their rows here
-        self._block: list[NDArray[Any]] = []
-        self._filled = 0
+        self.stream, self.tail = stream_of(path), tail_of(path)
+        self._formats = tuple(formats)
+        self._after = after
+        self._block: RecordBlock | None = None
+        self._columns: RecordColumns | None = None
+        self._file: RecordStream | None = None
 
     def __enter__(self) -> "Recorder":
         return self
@@ -45,79 +45,73 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._writer is None:
+        if self._block is None or self._file is None:
             return
         try:
-            self._flush()
+            self.flush()
         finally:
-            self._writer.close()
-            if self._file is not None:
-                self._file.close()
-        self._complete()
+            self._file.close()
+            self._block.close()
+        finish_record(self.path, self._formats, lambda: stream_batches(self.stream))
+        self.tail.unlink(missing_ok=True)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Record one row."""
-        if self._writer is None:
-            self._open(signals)
-        self._time[self._filled] = t
-        for values, rows in self._sources:
-            rows[self._filled] = values
-        self._filled += 1
-        self.rows += 1
-        if self._filled == _ROWS:
-            self._flush()
+        if self._block is None:
+            self.open(signals)
+        if self.block.add(t):
+            self.flush()
 
-    def _open(self, signals: Signals) -> None:
-        self._columns = signals.columns()
-        self._sources, self._block = _rows_of(self._columns)
-        time = pa.field("time", pa.float64(), metadata={"unit": "s", "description": "simulated time"})
-        self._schema = pa.schema([time, *(_field(c) for c in self._columns)])
-        self._file = pa.OSFile(str(self.stream), "wb")
-        self._writer = pa.ipc.new_stream(self._file, self._schema)
+    def open(self, signals: Signals) -> None:
+        """Begin the files; the first row does it where nobody has.
 
-    def _flush(self) -> None:
-        n, self._filled = self._filled, 0
-        if n == 0 or self._writer is None:
+        Raises:
+            OSError: they cannot be made, or another process records into them.
+        """
+        columns, sources = record_columns(signals.columns())
+        about = {"places": columns.places, "formats": self._formats}
+        block = RecordBlock.create(self.tail, sources, about)
+        try:
+            size = rewind_stream(self.path, columns.schema, self._after) if self._after else 0
+            self._file = RecordStream(self.stream, columns.schema, size)
+            block.clear(self._after)
+        except BaseException:
+            block.close()
+            raise
+        self._block, self._columns = block, columns
+
+    @property
+    def block(self) -> RecordBlock:
+        """The rows that are not in the stream yet, and where more of them go. It stays the same while recording."""
+        if self._block is None:
+            raise RuntimeError("nothing is recorded before `open`")
+        return self._block
+
+    @property
+    def rows(self) -> int:
+        """Rows recorded."""
+        return 0 if self._block is None else self._block.rows
+
+    def flush(self) -> None:
+        """Write the block's rows to the stream and empty it.
+
+        Raises:
+            OSError: they cannot be written; they stay in the block.
+        """
+        if self._block is None or self._columns is None or self._file is None or not self._block.filled:
             return
-        arrays: list[pa.Array[Any]] = [pa.array(self._time[:n])]
-        for column, block in zip(self._columns, self._block, strict=True):
-            values = block[:n].astype(bool) if column.port.kind is Kind.BOOLEAN else block[:n]
-            arrays.append(pa.array(values).cast(_type_of(column)))
-        self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
+        rows = self._block.rows
+        self._file.write(self._columns.batch(self._block))
+        self._block.clear(rows)
 
-    def _complete(self) -> None:
-        with (
-            pa.OSFile(str(self.stream), "rb") as source,
-            pa.ipc.open_stream(source) as batches,
-            pq.ParquetWriter(self.path, self._schema) as file,
-        ):
-            for batch in batches:
-                file.write_batch(batch)
-        self.stream.unlink()
+    def sync(self) -> int:
+        """Flush, wait until all rows are on the disk, and return their number.
 
-
-def _rows_of(columns: list[Column]) -> tuple[list[tuple[NDArray[Any], NDArray[Any]]], list[NDArray[Any]]]:
-    """Return each whole array that columns lie in with rows for it, and each column's part of the rows.
-
-    A unit's outputs of one type are views of one array: copying that at once costs a tenth of going entry by entry.
-    """
-    rows: dict[int, tuple[NDArray[Any], NDArray[Any]]] = {}
-    block: list[NDArray[Any]] = []
-    for c in columns:
-        whole = c.values if c.values.base is None else c.values.base
-        if id(whole) not in rows:
-            rows[id(whole)] = (whole, np.zeros((_ROWS, len(whole)), dtype=whole.dtype))
-        first = (c.values.ctypes.data - whole.ctypes.data) // whole.itemsize
-        block.append(rows[id(whole)][1][:, first + c.index])
-    return list(rows.values()), block
-
-
-def _type_of(c: Column) -> "pa.DataType":
-    return pa.uint64() if c.port.width is Width.UINT64 else _TYPES[c.port.kind]
-
-
-def _field(c: Column) -> "pa.Field[Any]":
-    metadata = {"unit": c.port.unit.symbol, "description": c.port.description}
-    if c.port.items:
-        metadata["items"] = ", ".join(f"{v} {n}" for n, v in c.port.items)
-    return pa.field(c.name, _type_of(c), metadata=metadata)
+        Raises:
+            OSError: as by `flush`.
+        """
+        self.flush()
+        if self._file is not None:
+            with contextlib.suppress(OSError):  # file systems without it
+                self._file.sync()
+        return self.rows

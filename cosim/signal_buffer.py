@@ -45,7 +45,7 @@ class SignalBuffer:
         vrs = (ctypes.c_uint * len(references))(*references)
         self._arrays, arguments = _arrays(first, fmi, n)
         count = () if fmi == 2 else (n,)
-        self._arguments = (component, vrs, len(references), *arguments, *count)
+        self._arguments: tuple[Any, ...] = (component, vrs, len(references), *arguments, *count)
         self.views: dict[str, Views] = {}
         at = 0
         for p in ports:
@@ -55,6 +55,15 @@ class SignalBuffer:
     def __call__(self) -> int:
         """Set or get all values; return the FMI status."""
         return self._function(*self._arguments)
+
+    def contents(self) -> list[bytes]:
+        """Return what the buffer holds."""
+        return [a.tobytes() for a in self._arrays]
+
+    def refill(self, contents: Sequence[bytes]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        for array, content in zip(self._arrays, contents, strict=True):
+            array[:] = np.frombuffer(content, dtype=array.dtype)
 
 
 class OutputBuffer(SignalBuffer):
@@ -74,6 +83,19 @@ class OutputBuffer(SignalBuffer):
             for i in range(len(self._kept)):
                 self._keep(i)
         return status
+
+    def contents(self) -> list[bytes]:
+        """Return the texts or binaries that the buffer holds."""
+        if self._is_text:
+            return [ctypes.string_at(kept) for kept in self._kept]
+        return [ctypes.string_at(kept, int(size)) for kept, size in zip(self._kept, self._arrays[1], strict=True)]
+
+    def refill(self, contents: Sequence[bytes]) -> None:
+        """Hold what `contents` gave, be it in another process."""
+        self._kept = [ctypes.create_string_buffer(content) for content in contents]
+        self._arrays[0][:] = [ctypes.addressof(kept) for kept in self._kept]
+        if not self._is_text:
+            self._arrays[1][:] = [len(content) for content in contents]
 
     def _keep(self, i: int) -> None:
         addresses = self._arrays[0]

@@ -1,5 +1,6 @@
 """Units, their parameters and the connections between them, checked before anything starts."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -80,6 +81,7 @@ class System:
     def __init__(self) -> None:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
+        self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
@@ -115,6 +117,7 @@ class System:
         place of that, whatever the units; it is for real values only.
         """
         self.connections.append(Connection(source, target, transformation))
+        self._sources[target.unit][target.port] = source
 
     def check(self) -> None:
         """Check all names, values and connections.
@@ -136,7 +139,7 @@ class System:
 
     def sources_of(self, unit: str) -> dict[str, PortName]:
         """Return, by input's name, the outputs that feed a unit."""
-        return {c.target.port: c.source for c in self.connections if c.target.unit == unit}
+        return dict(self._sources.get(unit, {}))
 
     def change_by(self, c: Connection) -> Linear | None:
         """Return how a connection, one without faults, changes values; None where it copies them."""

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from cosim.exceptions import nearest
+from cosim.record_formats import RECORD_FORMATS
 from fmus.build import cached
 from fmus.catalog import UNITS
 from scenarios.bad_call import BadCall, told_in_one_line
@@ -17,20 +18,20 @@ from scenarios.build_command import build_command
 from scenarios.catalog import SCENARIOS
 from scenarios.check_command import check
 from scenarios.chosen import fmus_of, replacements, scenario_named
+from scenarios.ending import end_with
 from scenarios.export_command import export_command
 from scenarios.interruption import Interruption
-from scenarios.listing import print_catalog, print_scenario, print_summary, print_unit
+from scenarios.listing import print_catalog, print_scenario, print_unit
 from scenarios.parameters import parse_parameters
 from scenarios.progress import progress_bar
+from scenarios.resume_command import resume
 from scenarios.run_folder import RunFolder
 from scenarios.runner import Task, carry_out
-from scenarios.ssp_call import open_experiment, refuse_for_ssp, ssp_options
-from scenarios.ssp_run import is_ssp
+from scenarios.ssp_call import Seconds, open_experiment, refuse_for_ssp, source_of, ssp_options
+from scenarios.ssp_run import NoParameters, is_ssp
 from scenarios.vsl_train_command import vsl_train
 
 _PATH = click.Path(path_type=Path)
-
-TASK_FAILED, UNIT_FAILED = 1, 3
 
 
 _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
@@ -44,6 +45,7 @@ handover build TendonArm --fmi both    units for other tools
 handover check Their.fmu               what is wrong with an FMU, whoever made it
 handover export ir_grasp --ssp x.ssp   a scenario for other tools
 handover run x.ssp --stop 5            a system from another tool
+handover resume runs/long              goes on with a run that has checkpoints
 handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -84,6 +86,7 @@ def list_(name: str | None) -> None:
 main.add_command(build_command)
 main.add_command(check)
 main.add_command(export_command)
+main.add_command(resume)
 main.add_command(vsl_train)
 
 
@@ -95,6 +98,20 @@ main.add_command(vsl_train)
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
 @click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Let another FMU take a unit's place.")
 @ssp_options
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(list(RECORD_FORMATS)),
+    help="Form of the record; may be given more than once. Parquet is always written.  [default: parquet]",
+)
+@click.option(
+    "--checkpoint",
+    "every",
+    type=Seconds(),
+    metavar="SECONDS",
+    help="Write a checkpoint every so many simulated seconds, for `handover resume`.",
+)
 @click.option("--out", type=_PATH, help="Folder for the results [default: a new one in runs/].")
 def run_(
     scenario: str,
@@ -103,6 +120,8 @@ def run_(
     replaced: Sequence[str],
     stop: Fraction | None,
     step: Fraction | None,
+    formats: Sequence[str],
+    every: Fraction | None,
     out: Path | None,
 ) -> None:
     """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
@@ -117,16 +136,24 @@ def run_(
         raise BadCall("--stop and --step are for an SSP; a scenario has its own")
     with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
         if is_ssp(scenario):
-            experiment, values = open_experiment(Path(scenario), stop, step, opened)
+            experiment, values = open_experiment(Path(scenario), stop, step, opened), NoParameters()
+            source = source_of(Path(scenario), experiment.stop_time(values), step)
         else:
+            source = {}
             experiment = scenario_named(scenario)()
             values = parse_parameters(type(experiment), parameters)
         folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{Path(scenario).stem}"))
         fmus = fmus_of(type(experiment), replacements(type(experiment), replaced), lambda unit: cached(unit, 3))
-        task = Task(experiment=experiment, parameters=values, seed=seed, fmus=fmus, folder=folder)
+        task = Task(
+            experiment=experiment,
+            parameters=values,
+            seed=seed,
+            fmus=fmus,
+            folder=folder,
+            formats=formats,
+            every=every,
+            source=source,
+        )
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption)
-    if ended.failure:
-        click.echo(str(ended.failure), err=True)
-    print_summary(ended, experiment.headline, folder)
-    sys.exit(UNIT_FAILED if ended.failure else 0 if ended.outcome.success else TASK_FAILED)
+    end_with(ended, task)

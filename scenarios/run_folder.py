@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from cosim.exceptions import one_line
+
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 
 
@@ -36,6 +38,8 @@ def check_place(path: Path) -> None:
 class RunFolder:
     """Paths of what a run leaves: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `figures/`.
 
+    While it goes on there are the files of a `Recorder`, and `checkpoint.zip` if it was asked for.
+
     Raises:
         BadRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
     """
@@ -49,10 +53,22 @@ class RunFolder:
                 raise BadRunFolder(path, "it is not empty; name a new or an empty folder")
         check_place(path)
 
+    @classmethod
+    def left_at(cls, path: Path) -> "RunFolder":
+        """Return the folder that a run has left."""
+        folder = cls.__new__(cls)
+        folder.path = path
+        return folder
+
     @property
     def signals(self) -> Path:
         """The record."""
         return self.path / "signals.parquet"
+
+    @property
+    def checkpoint(self) -> Path:
+        """The last checkpoint of a run that has not come to its end."""
+        return self.path / "checkpoint.zip"
 
     @property
     def figures(self) -> Path:
@@ -80,11 +96,44 @@ class RunFolder:
         _write_json(self.path / "summary.json", summary)
 
     def write_run(self, configuration: Mapping[str, Any], fmus: Mapping[str, Path]) -> None:
-        """Write `run.json`: configuration, versions, and name and hash of every unit's FMU."""
-        units = {n: {"fmu": p.name, "sha256": hashlib.sha256(p.read_bytes()).hexdigest()} for n, p in fmus.items()}
-        versions = {"python": platform.python_version(), "platform": platform.platform()}
-        versions |= {p: _version(p) for p in _PACKAGES}
-        _write_json(self.path / "run.json", {**configuration, "units": units, "versions": versions})
+        """Write `run.json`: configuration, versions, and place and hash of every unit's FMU."""
+        units = {n: {"fmu": p.name, "path": str(p.absolute()), "sha256": sha256_of(p)} for n, p in fmus.items()}
+        told = {"platform": platform.platform(), **versions()}
+        _write_json(self.path / "run.json", {**configuration, "units": units, "versions": told})
+
+    def read_run(self) -> dict[str, Any]:
+        """Return what `write_run` wrote.
+
+        Raises:
+            BadRunFolder: there is nothing of the kind.
+        """
+        return self._read("run.json", "it is not the folder of a run: it has no run.json")
+
+    def read_summary(self) -> dict[str, Any]:
+        """Return what `write_summary` wrote; nothing if the run has not come so far.
+
+        Raises:
+            BadRunFolder: it is damaged.
+        """
+        return self._read("summary.json", "") if (self.path / "summary.json").exists() else {}
+
+    def _read(self, name: str, missing: str) -> dict[str, Any]:
+        try:
+            return dict(json.loads((self.path / name).read_bytes()))
+        except OSError as e:
+            raise BadRunFolder(self.path, missing) from e
+        except (ValueError, TypeError) as e:
+            raise BadRunFolder(self.path, f"its {name} is damaged: {one_line(e)}") from e
+
+
+def sha256_of(file: Path) -> str:
+    """Return a file's hash."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that a run's numbers depend on."""
+    return {"python": platform.python_version(), **{p: _version(p) for p in _PACKAGES}}
 
 
 def _version(package: str) -> str:

@@ -3,22 +3,25 @@
 import math
 import statistics
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cosim.checkpoint import check_states
+from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
-from cosim.master import Master
+from cosim.master import Master, Observer
 from cosim.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.experiment import Experiment, Metric, Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
 from scenarios.report import write_report
+from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import RunFolder
 
 Progress = Callable[[float, float], None]
@@ -27,13 +30,25 @@ Progress = Callable[[float, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What to run: scenario, parameters, seed, the FMU of each unit, the folder for what it leaves."""
+    """What to run.
+
+    Attributes:
+        experiment, parameters, seed: the scenario and what was chosen of it.
+        fmus: the FMU of each unit.
+        folder: for what it leaves.
+        formats: further forms of the record, see `RECORD_FORMATS`.
+        every: simulated seconds from checkpoint to checkpoint, if there are to be any.
+        source: what `resume` needs to find the experiment again, if it is not one of the catalog.
+    """
 
     experiment: Experiment[Any]
     parameters: Any
     seed: int
     fmus: Mapping[str, Path]
     folder: RunFolder
+    formats: Sequence[str] = ()
+    every: Fraction | None = None
+    source: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,41 +60,67 @@ class Ended:
     failure: UnitFailure | None = None
 
 
-def carry_out(task: Task, progress: Progress, interruption: Interruption) -> Ended:
-    """Run a scenario to its end, its failure or its interruption and write its folder.
+def carry_out(
+    task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None
+) -> Ended:
+    """Run a scenario to its end, its failure or its interruption and write its folder; or go on with a run.
 
     Raises:
-        WiringError, ScheduleError, InvalidFmu, UnitRefused, BadRunFolder: before anything was written.
+        WiringError, ScheduleError, InvalidFmu, UnitRefused, StateNotSaved, BadRunFolder: before anything was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
     """
     experiment, parameters = task.experiment, task.parameters
     stop = experiment.stop_time(parameters)
-    watch = experiment.watch(parameters)
+    spent = Spent() if resumption is None else resumption.spent
+    watch = experiment.watch(parameters) if resumption is None else resumption.watch
     failure: UnitFailure | None = None
-    began, cpu_began = time.perf_counter(), time.process_time()
+    clock = spent.clock()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
+    if task.every is not None:
+        check_states(system)
     with Master(system) as master:
+        if resumption is not None:
+            resumption.checkpoint.restore(master)
         interruption.begin()
-        task.folder.make()
-        with Recorder(task.folder.signals) as recorder:
+        if resumption is None:
+            task.folder.make()
+            configuration = {**_configuration(task), **_options(task)}
+            task.folder.write_run(configuration, {n: u.description.path for n, u in system.units.items()})
+        rows = 0 if resumption is None else resumption.checkpoint.rows
+        with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
+            checkpoints = _checkpoints(task, master, recorder, lambda: pack(watch, parameters, clock()))
 
             def tell(t: float, _signals: Signals) -> None:
                 progress(t, float(stop))
 
+            observers: list[Observer] = [recorder, watch, *checkpoints]
+            if resumption is not None:
+                observers = [from_then_on(resumption.checkpoint.time, observe) for observe in observers]
             try:
-                master.run(stop, [recorder, watch, tell], until=lambda: watch.over or interruption.asked)
+                master.run(stop, [*observers, tell], until=lambda: watch.over or interruption.asked)
+                if interruption.asked and not watch.over:
+                    for checkpointer in checkpoints:
+                        checkpointer.write()
                 watch.finish(master.signals)
             except UnitFailure as e:
                 interruption.check()
                 failure = e
-    spent = {"wall": time.perf_counter() - began, "cpu": time.process_time() - cpu_began}
+    spent = clock()
     outcome = _outcome(watch, failure, interruption.asked)
     metrics = {**outcome.metrics, **_speed(experiment, master)}
-    summary = _summary(task, outcome, metrics, master, spent)
+    complete = failure is None and (watch.over or not interruption.asked)
+    summary = _summary(task, outcome, metrics, master, spent, complete)
     task.folder.write_summary(summary)
-    task.folder.write_run(_configuration(task), {n: u.description.path for n, u in system.units.items()})
+    if complete:
+        task.folder.checkpoint.unlink(missing_ok=True)
     _present(task, watch, summary, system_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
+
+
+def _checkpoints(task: Task, master: Master, recorder: Recorder, keep: Callable[[], bytes]) -> list[Checkpointer]:
+    if task.every is None:
+        return []
+    return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
 def system_rows(master: Master) -> list[tuple[str, str, str, int, float]]:
@@ -132,17 +173,23 @@ def _configuration(task: Task) -> dict[str, Any]:
     return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed}
 
 
+def _options(task: Task) -> dict[str, Any]:
+    every = None if task.every is None else str(task.every)
+    return {"source": task.source, "formats": list(task.formats), "checkpoint": every}
+
+
 def _summary(
-    task: Task, outcome: Outcome, metrics: Mapping[str, Metric], master: Master, spent: Mapping[str, float]
+    task: Task, outcome: Outcome, metrics: Mapping[str, Metric], master: Master, spent: Spent, complete: bool
 ) -> dict[str, Any]:
     return {
         **_configuration(task),
+        "complete": complete,
         "success": outcome.success,
         "reason": outcome.reason,
         "metrics": {k: _metric(m) for k, m in metrics.items()},
         "simulated_seconds": master.time,
-        "wall_seconds": spent["wall"],
-        "cpu_seconds": spent["cpu"],
+        "wall_seconds": spent.wall,
+        "cpu_seconds": spent.cpu,
     }
 
 

@@ -13,7 +13,8 @@ import click
 from cosim.ssp.ssp_file import SspFile
 from scenarios.bad_call import BadCall
 from scenarios.experiment import Experiment
-from scenarios.ssp_run import SspParameters, UntilStop, experiment_of, parameters_of
+from scenarios.run_folder import sha256_of
+from scenarios.ssp_run import UntilStop, experiment_of
 
 _SECONDS = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
 """Larger exponents would take long to reckon with."""
@@ -58,8 +59,8 @@ def refuse_for_ssp(**given: Any) -> None:
 
 def open_experiment(
     path: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
-) -> tuple[Experiment[UntilStop], SspParameters]:
-    """Open an SSP as an experiment with its parameters; `opened` closes it.
+) -> Experiment[UntilStop]:
+    """Open an SSP as an experiment; `opened` closes it.
 
     Raises:
         InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
@@ -68,4 +69,10 @@ def open_experiment(
     until = stop or ssp.stop
     if until is None:
         raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
-    return experiment_of(ssp, until), parameters_of(ssp, until)
+    return experiment_of(ssp, until)
+
+
+def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
+    """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
+    told = {"stop": str(stop), "step": None if step is None else str(step)}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **told}

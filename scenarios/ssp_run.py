@@ -1,6 +1,5 @@
 """An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
 
-import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,11 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
-from cosim.ports import parameter
 from cosim.signals import Signals
 from cosim.ssp.ssp_file import SspFile
 from cosim.system import System
-from cosim.units import Second
 from cosim.variable import Kind
 from scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
 from scenarios.plotting import COLOURS, figure
@@ -23,11 +20,8 @@ _MOST_SIGNALS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
-class SspParameters:
-    """What tells one run of an SSP from another; the values of its units are bound in it."""
-
-    sha256: str = parameter("", "SHA-256 of the SSP")
-    stop: Second = parameter(0.0, "when the run ends")
+class NoParameters:
+    """An SSP's parameters are bound in it."""
 
 
 class UntilStop(Watch):
@@ -56,11 +50,6 @@ def is_ssp(name: str) -> bool:
     return Path(name).suffix.lower() == ".ssp"
 
 
-def parameters_of(ssp: SspFile, stop: Fraction) -> SspParameters:
-    """Return what is told of a run of an SSP that ends at a time, s."""
-    return SspParameters(sha256=hashlib.sha256(ssp.path.read_bytes()).hexdigest(), stop=float(stop))
-
-
 def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
     """Return an SSP as an experiment that ends at a time, s."""
 
@@ -69,7 +58,7 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
 
         name: ClassVar[str] = ssp.path.name
         title: ClassVar[str] = f"{ssp.name}, a system from {ssp.path.name}"
-        parameters_type: ClassVar[type[Any]] = SspParameters
+        parameters_type: ClassVar[type[Any]] = NoParameters
         units: ClassVar[Mapping[str, str]] = {}
         headline: ClassVar[tuple[str, ...]] = ()
 

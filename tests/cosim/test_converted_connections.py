@@ -2,6 +2,7 @@
 
 import logging
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from cosim.system import PlacedUnit, System
 QUANTITIES = ("angle", "length", "temperature")
 
 
-def pair(fmi: int, **start: float) -> tuple[System, PlacedUnit, PlacedUnit]:
+def pair(fmi: int, **start: Any) -> tuple[System, PlacedUnit, PlacedUnit]:
     """Return a system of a unit that gives deg, mm and degC and one that takes rad, m and K, unwired."""
     s = System()
     return s, s.add("a", native_fmu("workshop", fmi), **start), s.add("b", native_fmu("si", fmi))

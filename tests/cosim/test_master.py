@@ -1,6 +1,4 @@
 import re
-import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from fractions import Fraction
@@ -8,7 +6,6 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-import pyarrow as pa
 import pytest
 
 from cosim.exceptions import InvalidFmu, ScheduleError, UnitFailure, UnitRefused, WiringError
@@ -261,23 +258,3 @@ def test_pictures_and_numbers_can_be_read_after_the_run(fmu: FmuOf):
     del master
     assert signals["counter.picture"].tolist() == [5] * 24
     assert int(signals["counter.n"]) == 5
-
-
-def test_a_record_of_a_killed_process_keeps_its_blocks(fmu: FmuOf, tmp_path: Path):
-    program = f"""
-import os
-from fractions import Fraction
-from pathlib import Path
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.recorder import Recorder
-from cosim.system import System
-s = System()
-s.add("counter", Path({str(fmu("Counter"))!r}))
-with Master(s) as master, Recorder(Path({str(tmp_path / "signals.parquet")!r})) as recorder:
-    master.run(Fraction(10**6), [recorder], until=lambda: recorder.rows == 1000 and os._exit(9))
-"""
-    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 9
-    with pa.OSFile(str(tmp_path / "signals.arrows"), "rb") as source, pa.ipc.open_stream(source) as stream:
-        rows = sum(batch.num_rows for batch in stream)
-    assert 700 <= rows <= 1000

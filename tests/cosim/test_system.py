@@ -129,11 +129,11 @@ def test_both_standards_describe_a_unit_alike(fmu: FmuOf):
     ],
 )
 def test_units_are_compared_by_what_they_mean(a: Unit, b: Unit, fault: str | None):
-    made = [
+    output, target = (
         FmuPort(name="x", kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="Float64", references=(1,), unit=u)
         for u in (a, b)
-    ]
-    found = mismatch(*made)
+    )
+    found = mismatch(output, target)
     assert (found is None) if fault is None else (found is not None and fault in found)
 
 

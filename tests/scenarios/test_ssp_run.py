@@ -49,7 +49,7 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
     assert (summary["success"], summary["simulated_seconds"]) == (True, 2.0)
     told = json.loads((out / "run.json").read_text())
     sha256 = hashlib.sha256((tmp_path / "springs.ssp").read_bytes()).hexdigest()
-    assert told["parameters"] == {"sha256": sha256, "stop": 2.0}
+    assert (told["source"]["sha256"], told["source"]["stop"]) == (sha256, "2")
     units = told["units"]
     assert {u: told["fmu"] for u, told in units.items()} == dict.fromkeys(("left", "right"), "TearingSpring.fmi2.fmu")
     page = (out / "report.html").read_text()

@@ -1,0 +1,159 @@
+"""What a run needs to go on in another process: the states of its units and of its master, in one file."""
+
+import array
+import json
+import os
+import pickle
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.exceptions import CosimError, one_line
+from cosim.master import Master
+from cosim.system import System
+
+_FORMAT = 1
+
+
+class BadCheckpoint(CosimError):
+    """A checkpoint cannot be used."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"{path}: {fault}")
+        self.path, self.fault = path, fault
+
+
+class StateNotSaved(CosimError):
+    """Units of a run that should write checkpoints cannot save their states; nothing has started."""
+
+    def __init__(self, units: Mapping[str, str]) -> None:
+        told = "; ".join(f"{name}: {reason}" for name, reason in units.items())
+        super().__init__(f"a run with these units cannot write checkpoints, as they do not save their states: {told}")
+        self.units = dict(units)
+
+
+def check_states(system: System) -> None:
+    """Check that all units say that their states can be fetched, set and serialised.
+
+    Raises:
+        StateNotSaved: with all that do not.
+    """
+    faults: dict[str, str] = {}
+    for name, unit in system.units.items():
+        d, state = unit.description, "FMUstate" if unit.description.fmi == 2 else "FMUState"
+        able = {
+            f"canGetAndSet{state}": d.capabilities.saves_state,
+            f"canSerialize{state}": d.capabilities.serialises_state,
+        }
+        if not all(able.values()):
+            faults[name] = f"{d.path.name} lacks {' and '.join(flag for flag, has in able.items() if not has)}"
+    if faults:
+        raise StateNotSaved(faults)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """A run at a communication point, after its observers have seen it.
+
+    Attributes:
+        time: simulated time, s.
+        rows: rows of the record until then.
+        stepper: what the stepper says of itself.
+        units: of each unit its serialised state.
+        contents: of each unit what its buffers held, which may be values of another time than its state's.
+        cpu: of each unit the CPU seconds of its steps.
+        kept: what whoever runs the master wants back.
+    """
+
+    time: float
+    rows: int
+    stepper: Mapping[str, Any]
+    units: Mapping[str, bytes]
+    contents: Mapping[str, Sequence[Sequence[bytes]]]
+    cpu: Mapping[str, bytes]
+    kept: bytes = b""
+
+    def restore(self, master: Master) -> None:
+        """Take a master that has been entered to where this one was.
+
+        Raises:
+            UnitFailure: a unit does not take its state. CosimError: these are other units.
+        """
+        if set(self.units) != set(master.system.units):
+            raise CosimError(f"a checkpoint of the units {', '.join(self.units)}, not of these")
+        for name, instance in master.ensemble.instances.items():
+            instance.time = self.time
+            instance.deserialise_state(self.units[name])
+            instance.refill(self.contents[name])
+            master.cpu[name][:] = array.array("d", self.cpu[name])
+        master.stepper.set_state(self.stepper)
+
+
+def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
+    """Return where a master is, of whose record there are so many rows.
+
+    Raises:
+        UnitFailure: a unit does not give its state.
+    """
+    instances = master.ensemble.instances
+    return Checkpoint(
+        time=master.time,
+        rows=rows,
+        stepper=master.stepper.get_state(),
+        units={name: i.serialise_state() for name, i in instances.items()},
+        contents={name: i.contents() for name, i in instances.items()},
+        cpu={name: spent.tobytes() for name, spent in master.cpu.items()},
+        kept=kept,
+    )
+
+
+def write_checkpoint(path: Path, c: Checkpoint) -> None:
+    """Write a checkpoint: the file is either the former one or whole, whenever the process ends.
+
+    Raises:
+        OSError: it cannot be written; the former one stays.
+    """
+    head = {"format": _FORMAT, "time": c.time, "rows": c.rows, "stepper": c.stepper, "units": list(c.units)}
+    unfinished = path.with_name(path.name + ".part")
+    with open(unfinished, "wb") as file:
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("checkpoint.json", json.dumps(head))
+            for i, name in enumerate(c.units):
+                archive.writestr(f"{i}.state", c.units[name])
+                archive.writestr(f"{i}.contents", pickle.dumps(c.contents[name]))
+                archive.writestr(f"{i}.cpu", c.cpu[name])
+            archive.writestr("kept", c.kept)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(unfinished, path)
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint. Python objects in it are unpickled, so it must be from someone whom one trusts.
+
+    Raises:
+        BadCheckpoint: there is none, or it is damaged or of another version.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            head = json.loads(archive.read("checkpoint.json"))
+            if head["format"] != _FORMAT:
+                raise BadCheckpoint(path, f"a checkpoint of format {head['format']}; format {_FORMAT} can be read")
+            names: list[str] = head["units"]
+            return Checkpoint(
+                time=head["time"],
+                rows=head["rows"],
+                stepper=head["stepper"],
+                units={name: archive.read(f"{i}.state") for i, name in enumerate(names)},
+                contents={name: pickle.loads(archive.read(f"{i}.contents")) for i, name in enumerate(names)},
+                cpu={name: archive.read(f"{i}.cpu") for i, name in enumerate(names)},
+                kept=archive.read("kept"),
+            )
+    except FileNotFoundError as e:
+        raise BadCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint EVERY") from e
+    except BadCheckpoint:
+        raise
+    except Exception as e:  # whatever the readers of archive, JSON and pickle make of damaged bytes
+        raise BadCheckpoint(path, f"the checkpoint is damaged: {one_line(e)}") from e

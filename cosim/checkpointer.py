@@ -1,0 +1,67 @@
+"""Writes checkpoints while a run goes on."""
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+from cosim.checkpoint import take_checkpoint, write_checkpoint
+from cosim.master import Master, Observer
+from cosim.recorder import Recorder
+from cosim.signals import Signals
+
+
+def nothing() -> bytes:
+    """Keep nothing besides the units' and the master's states."""
+    return b""
+
+
+class Checkpointer:
+    """An observer of `Master.run`, the last of them, that writes a checkpoint every so many simulated seconds.
+
+    A checkpoint is due at the multiples of `every`, and written at the first communication point that is not before.
+
+    Args:
+        path: the checkpoint's file, of which a newer one takes the place.
+        every: seconds.
+        master, recorder: of the run.
+        keep: gives what has to be kept besides, such as the states of other observers.
+    """
+
+    def __init__(
+        self, path: Path, every: Fraction, master: Master, recorder: Recorder, keep: Callable[[], bytes] = nothing
+    ) -> None:
+        self.path = path
+        self._every = every
+        self._master, self._recorder, self._keep = master, recorder, keep
+        self._next = self._after(master.time)
+
+    def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
+        """Write a checkpoint if one is due.
+
+        Raises:
+            UnitFailure: a unit does not give its state. OSError: it cannot be written.
+        """
+        if t >= self._next:
+            self.write()
+            self._next = self._after(t)
+
+    def write(self) -> None:
+        """Write a checkpoint of the communication point that observers saw last; raises as by calling."""
+        write_checkpoint(self.path, take_checkpoint(self._master, self._recorder.sync(), self._keep()))
+
+    def _after(self, t: float) -> float:
+        count = math.floor(Fraction(t) / self._every)
+        while float(count * self._every) <= t:  # a time is rounded, so a multiple may seem to be not reached
+            count += 1
+        return float(count * self._every)
+
+
+def from_then_on(t_0: float, observe: Observer) -> Observer:
+    """Return an observer of a run that goes on from t_0, which was seen before."""
+
+    def observe_later(t: float, signals: Signals) -> None:
+        if t > t_0:
+            observe(t, signals)
+
+    return observe_later

@@ -1,0 +1,14 @@
+"""Saved states of several units."""
+
+from collections.abc import Mapping
+
+from cosim.instance import State
+from cosim.linear_inputs import Memory
+
+
+class SavedStates(dict[str, State]):
+    """Saved states by unit, with what the extrapolation of inputs remembers of these units."""
+
+    def __init__(self, states: Mapping[str, State], lines: Mapping[str, Memory]) -> None:
+        super().__init__(states)
+        self.lines = lines

@@ -1,0 +1,109 @@
+"""A run that a process has left: whether it can go on, and how."""
+
+import contextlib
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from cosim.checkpoint import BadCheckpoint
+from cosim.complete_record import complete_record
+from cosim.exceptions import nearest
+from cosim.file_lock import FileLocked
+from fmus.build import cached
+from scenarios.catalog import SCENARIOS
+from scenarios.experiment import Experiment
+from scenarios.resumption import Resumption, unpack
+from scenarios.run_folder import BadRunFolder, RunFolder, sha256_of, versions
+from scenarios.runner import Task
+from scenarios.ssp_call import open_experiment
+
+
+class LeftRun:
+    """A run's folder, whose record is completed as far as it goes; nothing else is changed.
+
+    Raises:
+        BadRunFolder: it is not the folder of a run, or of one that goes on, or has ended, or is of other versions than
+            are installed. BadCheckpoint: it has no checkpoint that can be used.
+    """
+
+    def __init__(self, folder: RunFolder) -> None:
+        self.folder = folder
+        self._told = folder.read_run()
+        if folder.read_summary().get("complete"):
+            raise BadRunFolder(folder.path, "the run is complete; there is nothing to go on with")
+        rows = self._complete()
+        self._check_versions(self._told.get("versions", {}))
+        self.resumption: Resumption = unpack(folder.checkpoint)
+        if rows < self.resumption.checkpoint.rows:
+            counted = self.resumption.checkpoint.rows
+            raise BadCheckpoint(folder.checkpoint, f"it counts {counted} rows, the record beside it has {rows}")
+
+    def task(self, opened: contextlib.ExitStack) -> Task:
+        """Return what the run was to do; `opened` closes what that opens.
+
+        Raises:
+            BadRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
+        """
+        told = self._told
+        try:
+            experiment = self._experiment(opened)
+            fmus = {name: self._fmu(name, unit) for name, unit in experiment.units.items()}
+            every = told["checkpoint"]
+            task = Task(
+                experiment=experiment,
+                parameters=self.resumption.parameters,
+                seed=int(told["seed"]),
+                fmus=fmus,
+                folder=self.folder,
+                formats=tuple(told["formats"]),
+                every=None if every is None else Fraction(every),
+                source=told["source"],
+            )
+        except BadRunFolder:
+            raise
+        except (KeyError, TypeError, ValueError) as e:
+            raise BadRunFolder(self.folder.path, f"its run.json is damaged: {type(e).__name__} {e}") from e
+        self._check_fmus(task)
+        return task
+
+    def _complete(self) -> int:
+        try:
+            return complete_record(self.folder.signals)
+        except FileLocked as e:
+            raise BadRunFolder(self.folder.path, "the run still goes on") from e
+        except FileNotFoundError:  # it ended before it recorded
+            return 0
+
+    def _check_versions(self, before: Mapping[str, str]) -> None:
+        here = versions()
+        other = [f"{name} {before.get(name)} (here {version})" for name, version in here.items()
+                 if before.get(name) != version]  # fmt: skip
+        if other:
+            raise BadRunFolder(self.folder.path, f"the run began with other versions: {', '.join(other)}")
+
+    def _experiment(self, opened: contextlib.ExitStack) -> Experiment[Any]:
+        source, name = self._told["source"], self._told["scenario"]
+        if not source:
+            if name not in SCENARIOS:
+                raise BadRunFolder(self.folder.path, f"its scenario {name!r} is not here; {nearest(name, SCENARIOS)}")
+            return SCENARIOS[name]()
+        file, step = Path(source["ssp"]), source["step"]
+        if not file.is_file() or sha256_of(file) != source["sha256"]:
+            raise BadRunFolder(self.folder.path, f"{file} is not the file that the run began with")
+        return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
+
+    def _fmu(self, name: str, unit: str) -> Path:
+        """Return a unit's file, or the same unit built anew where the folder of built units was cleared."""
+        path = Path(self._told["units"][name]["path"])
+        return path if path.is_file() else cached(unit, 3)
+
+    def _check_fmus(self, task: Task) -> None:
+        system = task.experiment.build(task.parameters, task.seed, lambda unit: task.fmus[unit])
+        here = {name: unit.description.path for name, unit in system.units.items()}
+        before = {name: unit.get("sha256") for name, unit in self._told["units"].items()}
+        other = [f"{name} ({here[name]})" for name in here if before.get(name) != sha256_of(here[name])]
+        if other:
+            raise BadRunFolder(
+                self.folder.path, f"these FMUs are not those that the run began with: {', '.join(other)}"
+            )

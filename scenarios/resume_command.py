@@ -1,0 +1,36 @@
+"""The command `handover resume`."""
+
+import contextlib
+import sys
+from pathlib import Path
+
+import click
+
+from scenarios.bad_call import told_in_one_line
+from scenarios.ending import end_with
+from scenarios.interruption import Interruption
+from scenarios.left_run import LeftRun
+from scenarios.progress import progress_bar
+from scenarios.run_folder import RunFolder
+from scenarios.runner import carry_out
+
+_HELP = """Go on with a run that was interrupted, killed, or that failed, from its last checkpoint.
+
+DIR is the folder of a run with --checkpoint. What it leaves at its end is what it would have left without the break,
+bit for bit in its signals; only times that it took differ. Units and versions must be those that it began with.
+
+A checkpoint holds Python objects, which can do anything when they are read: go on only with runs from people whom you
+trust.
+"""
+
+
+@click.command("resume", help=_HELP)
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+def resume(folder: Path) -> None:
+    """Go on with a run from its last checkpoint."""
+    with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
+        left = LeftRun(RunFolder.left_at(folder))
+        task = left.task(opened)
+        with progress_bar(sys.stderr) as progress:
+            ended = carry_out(task, progress, interruption, left.resumption)
+    end_with(ended, task)

@@ -1,0 +1,54 @@
+"""What a run keeps of itself in its checkpoints, and where another process goes on from there."""
+
+import pickle
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
+from cosim.exceptions import one_line
+from scenarios.experiment import Watch
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Seconds that a run has taken until now, in all its processes."""
+
+    wall: float = 0.0
+    cpu: float = 0.0
+
+    def clock(self) -> Callable[[], "Spent"]:
+        """Return a function that tells what has been spent since, this included."""
+        wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
+        return lambda: Spent(time.perf_counter() - wall, time.process_time() - cpu)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resumption:
+    """Where a run goes on: its checkpoint, and what `pack` put into it."""
+
+    checkpoint: Checkpoint
+    watch: Watch
+    parameters: Any
+    spent: Spent
+
+
+def pack(watch: Watch, parameters: Any, spent: Spent) -> bytes:
+    """Return what a checkpoint keeps besides the units' states."""
+    return pickle.dumps((watch, parameters, spent))
+
+
+def unpack(path: Path) -> Resumption:
+    """Read a run's checkpoint. Python objects are unpickled: it must be from someone whom one trusts.
+
+    Raises:
+        BadCheckpoint: there is none, or it cannot be used.
+    """
+    checkpoint = read_checkpoint(path)
+    try:
+        watch, parameters, spent = pickle.loads(checkpoint.kept)
+    except Exception as e:  # unpickling raises what it likes
+        raise BadCheckpoint(path, f"what it keeps of the scenario cannot be read: {one_line(e)}") from e
+    return Resumption(checkpoint=checkpoint, watch=watch, parameters=parameters, spent=spent)

@@ -1,0 +1,116 @@
+"""What the master costs: rings of trivial native units beside other masters, wiring, and memory while recording.
+
+`pytest tests/benchmarks/test_master_speed.py --benchmark-enable -s` prints the tables. Every host runs in a process of
+its own, see ring_hosts.py; all of a ring size are measured in one run.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from cosim.master import Master
+from cosim.schedule import Schedule
+from cosim.system import System
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="Ecos and libcosim are there for Linux alone"),
+]
+
+NativeFmu = Callable[..., Path]
+HOSTS = {
+    "ours, FMI 2": "handover",
+    "ours, FMI 3": "handover",
+    "ours, recorded": "recorded",
+    "ours, general path": "general",
+    "Ecos": "ecos",
+    "Ecos, CSV": "ecos_csv",
+    "prebuilt ctypes calls": "prebuilt_calls",
+    "libcosim": "libcosim",
+    "libcosim, CSV": "libcosim_csv",
+    "FMPy loop": "fmpy_loop",
+}
+TARGET, TARGET_RECORDED = 0.05, 0.1
+"""Most us of CPU per unit and macro step."""
+WIRING = 2.0
+"""Most seconds of CPU for 1,000 units and 5,000 connections, before anything is loaded."""
+
+
+def script(name: str, environment: dict[str, str], *arguments: object) -> float:
+    """Return the number that a script of this folder prints last."""
+    command = [sys.executable, str(Path(__file__).with_name(name)), *map(str, arguments)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=170, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return float(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.mark.parametrize("n", [2, 10, 50])
+def test_ring(benchmark: BenchmarkFixture, environment: dict[str, str], native_fmu: NativeFmu, n: int) -> None:
+    spent: dict[str, float] = {}
+
+    def measure() -> None:
+        for name, host in HOSTS.items():
+            spent[name] = script("ring_hosts.py", environment, host, n, native_fmu("trivial", 3 if "3" in name else 2))
+
+    benchmark.pedantic(measure)
+    print(f"\nring of {n} units, us of CPU per unit and macro step")
+    for name, microseconds in spent.items():
+        print(f"  {name:24}{microseconds:8.3f}")
+    benchmark.extra_info.update(spent)
+    assert spent["ours, FMI 2"] <= TARGET
+    assert spent["ours, FMI 3"] <= TARGET
+    assert spent["ours, recorded"] <= TARGET_RECORDED
+
+
+def test_memory_of_a_long_record(
+    benchmark: BenchmarkFixture, environment: dict[str, str], native_fmu: NativeFmu
+) -> None:
+    """10^7 values are 76 MB."""
+    fmu = native_fmu("trivial", 2)
+    grown: float = benchmark.pedantic(script, args=("record_memory.py", environment, fmu))  # pyright: ignore
+    print(f"\na record of 10^7 values: the peak of resident memory grew by {grown:.1f} MB")
+    assert grown < 10.0
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_wiring(benchmark: BenchmarkFixture, native_fmu: NativeFmu, fmi: int) -> None:
+    """1,000 units, each fed by the five before it."""
+    spent: dict[str, float] = {}
+    began = time.process_time()
+
+    def note(what: str) -> None:
+        nonlocal began
+        ended = time.process_time()
+        spent[what] = ended - began
+        began = ended
+
+    def wire() -> None:
+        fmu = native_fmu("hub", fmi)
+        note("building the FMU")
+        system = System()
+        units = [system.add(f"u{i}", fmu, period=Fraction(1, 100)) for i in range(1000)]
+        for i, unit in enumerate(units):
+            for j in range(5):
+                system.connect(units[i - 1 - j].y.y, getattr(unit.u, f"u{j + 1}"))
+        note("adding and connecting")
+        system.check()
+        note("checking")
+        Schedule(system)
+        note("schedule")
+        with Master(system) as master:
+            note("loading, initialising")
+            master.run(Fraction(1, 100))
+            assert [float(master.signals[f"u{i}.y"]) for i in range(7)] == [1, 2, 4, 8, 16, 32, 63]
+
+    benchmark.pedantic(wire)
+    told = ", ".join(f"{what} {seconds:.2f}" for what, seconds in spent.items())
+    print(f"\n1,000 units, 5,000 connections, FMI {fmi}, s of CPU: {told}")
+    benchmark.extra_info.update(spent)
+    assert sum(spent[what] for what in ("adding and connecting", "checking", "schedule")) < WIRING

@@ -1,0 +1,84 @@
+"""Runs of native units that are cut off and go on."""
+
+import sys
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+from native_units import native_fmu
+
+from cosim.checkpoint import read_checkpoint
+from cosim.checkpointer import Checkpointer, from_then_on
+from cosim.master import Master, Observer
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.recorder import Recorder
+from cosim.signals import Signals
+from cosim.system import System
+
+STOP, EVERY = Fraction(40), Fraction(7, 2)
+PASSED = 20.0
+"""When a run tells that it may be killed, s."""
+WAITS = 20.9
+"""When it waits for that, before its next checkpoint, s."""
+
+
+def record_of(folder: Path) -> Path:
+    """Return where a run's record is."""
+    return folder / "signals.parquet"
+
+
+def checkpoint_of(folder: Path) -> Path:
+    """Return where a run's checkpoint is."""
+    return folder / "checkpoint.zip"
+
+
+def oscillator() -> System:
+    """Return two masses with a spring between, of both standards, at three rates."""
+    s = System()
+    a = s.add("a", native_fmu("mass", 2), x0=1.0, k=3.0, period=Fraction(1, 50))
+    b = s.add("b", native_fmu("mass", 3), v0=1.0, k=2.0, period=Fraction(1, 20))
+    between = s.add("between", native_fmu("spring", 3), k=5.0, d=0.01, period=Fraction(1, 30))
+    s.connect(a.y.x, between.u.x1)
+    s.connect(a.y.v, between.u.v1)
+    s.connect(b.y.x, between.u.x2)
+    s.connect(b.y.v, between.u.v2)
+    s.connect(between.y.f1, a.u.f)
+    s.connect(between.y.f2, b.u.f)
+    return s
+
+
+def run(folder: Path, options: MasterOptions, *others: Observer) -> None:
+    """Run from the start, with checkpoints."""
+    with Master(oscillator(), options) as master, Recorder(record_of(folder), ["csv"]) as recorder:
+        write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
+        master.run(STOP, [recorder, *others, write])
+
+
+def go_on(folder: Path, options: MasterOptions) -> float:
+    """Go on from the checkpoint, with more of them; return its time."""
+    c = read_checkpoint(checkpoint_of(folder))
+    with Master(oscillator(), options) as master:
+        c.restore(master)
+        with Recorder(record_of(folder), ["csv"], after=c.rows) as recorder:
+            write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
+            master.run(STOP, [from_then_on(c.time, observe) for observe in (recorder, write)])
+    return c.time
+
+
+def stop_to_be_killed(t: float, signals: Signals) -> None:  # noqa: ARG001
+    """Tell when a time is passed, go on for a while, and wait before the next checkpoint is written."""
+    if t >= PASSED:
+        sys.stdout.write("passed\n")
+        sys.stdout.flush()
+    if t >= WAITS:
+        sys.stdin.read()
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Run in a folder by an algorithm, until killed."""
+    folder, algorithm = arguments
+    run(Path(folder), MasterOptions(algorithm=Algorithm(algorithm)), stop_to_be_killed)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,173 @@
+import contextlib
+import os
+import subprocess
+import sys
+import zipfile
+from fractions import Fraction
+from pathlib import Path
+
+import checkpointed
+import pytest
+from checkpointed import checkpoint_of, go_on, record_of, run
+from fmu_of import FmuOf
+from hypothesis import given
+from hypothesis import strategies as st
+from native_units import native_fmu
+
+from cosim.checkpoint import (
+    BadCheckpoint,
+    Checkpoint,
+    StateNotSaved,
+    check_states,
+    read_checkpoint,
+    take_checkpoint,
+    write_checkpoint,
+)
+from cosim.complete_record import complete_record
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.recorder import Recorder
+from cosim.system import System
+from scenarios.record import Record
+
+
+@pytest.mark.parametrize("algorithm", Algorithm)
+def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path: Path, algorithm: Algorithm):
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    whole.mkdir()
+    killed.mkdir()
+    options = MasterOptions(algorithm=algorithm)
+    run(whole, options)
+    command = [sys.executable, checkpointed.__file__ or "", str(killed), algorithm.value]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "passed\n"
+        process.kill()
+    complete_record(record_of(killed))
+    assert checkpointed.PASSED <= Record(record_of(killed)).time[-1] <= checkpointed.WAITS + 0.02
+    assert go_on(killed, options) == 17.5
+    for name in ("signals.parquet", "signals.csv"):
+        assert (killed / name).read_bytes() == (whole / name).read_bytes()
+    assert sorted(os.listdir(killed)) == sorted(os.listdir(whole))
+
+
+def test_a_checkpoint_is_written_at_the_first_communication_point_that_is_not_before_it(tmp_path: Path):
+    s = System()
+    s.add("sine", native_fmu("sine"), period=Fraction(1, 3))
+    times: list[float] = []
+    with Master(s) as master, Recorder(record_of(tmp_path)) as recorder:
+        write = checkpointed.Checkpointer(
+            checkpoint_of(tmp_path), Fraction(1, 2), master, recorder, lambda: times.append(master.time) or b""
+        )
+        master.run(Fraction(3), [recorder, write])
+    assert times == [2 / 3, 1.0, 5 / 3, 2.0, 8 / 3, 3.0]
+
+
+@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL])
+def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, algorithm: Algorithm):
+    options = MasterOptions(algorithm=algorithm)
+    points: list[Checkpoint] = []
+    with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "whole.parquet") as recorder:
+        master.run(Fraction(1, 2), [recorder, lambda _t, _s: points.append(take_checkpoint(master, recorder.rows))])
+    whole = Record(tmp_path / "whole.parquet")
+    for c in points[:-1]:
+        with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "rest.parquet") as recorder:
+            c.restore(master)
+            assert len(master.cpu["a"]) == len(c.cpu["a"]) // 8
+            master.run(Fraction(1, 2), [recorder])
+        rest = Record(tmp_path / "rest.parquet")
+        for name in ("a.x", "b.v", "between.f1"):
+            assert rest[name].tolist() == whole[name].tolist()[c.rows - 1 :], (c.time, name)
+
+
+def test_pictures_and_truths_that_a_buffer_held_are_there_again(fmu: FmuOf):
+    s = System()
+    counter, echo = s.add("counter", fmu("Counter")), s.add("echo", fmu("Echo"), period=Fraction(3, 10))
+    for name in ("n", "odd", "light", "pair", "picture"):
+        s.connect(getattr(counter.y, name), getattr(echo.u, name))
+    with Master(s) as master:
+        master.run(Fraction(1, 2))
+        c = take_checkpoint(master, 0)
+        told = {n: master.signals[n].tolist() for n in ("counter.picture", "counter.odd", "echo.brightness")}
+        master.run(Fraction(1))
+        later = {n: master.signals[n].tolist() for n in ("counter.picture", "counter.n", "echo.brightness")}
+    with Master(s) as master:
+        c.restore(master)
+        assert {n: master.signals[n].tolist() for n in told} == told
+        assert master.signals.text("counter.light") == "GREEN"
+        master.run(Fraction(1))
+        assert {n: master.signals[n].tolist() for n in later} == later
+
+
+def test_units_that_do_not_save_their_states_are_refused_by_name():
+    s = System()
+    s.add("able", native_fmu("sine"))
+    s.add("unable", native_fmu("sine", canGetAndSetFMUState=False))
+    s.add("mute", native_fmu("sine", 2, canSerializeFMUstate=False))
+    with pytest.raises(StateNotSaved) as caught:
+        check_states(s)
+    assert list(caught.value.units) == ["unable", "mute"]
+    assert "lacks canGetAndSetFMUState" in caught.value.units["unable"]
+    assert "lacks canSerializeFMUstate" in caught.value.units["mute"]
+
+
+def test_what_is_read_is_what_was_written(tmp_path: Path):
+    file = tmp_path / "checkpoint.zip"
+    write_checkpoint(file, _some())
+    assert read_checkpoint(file) == _some()
+
+
+def test_a_missing_checkpoint_is_told(tmp_path: Path):
+    with pytest.raises(BadCheckpoint, match="there is no checkpoint; a run writes them with --checkpoint"):
+        read_checkpoint(tmp_path / "checkpoint.zip")
+
+
+def test_a_checkpoint_of_another_version_is_told(tmp_path: Path):
+    file = tmp_path / "checkpoint.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("checkpoint.json", '{"format": 2}')
+    with pytest.raises(BadCheckpoint, match="of format 2; format 1 can be read"):
+        read_checkpoint(file)
+
+
+@given(st.data())
+def test_a_damaged_checkpoint_is_told_or_is_what_was_written(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+):
+    file = tmp_path_factory.mktemp("damaged") / "checkpoint.zip"
+    write_checkpoint(file, _some())
+    content = bytearray(file.read_bytes())
+    if data.draw(st.booleans(), "cut off"):
+        del content[data.draw(st.integers(0, len(content) - 1)) :]
+    else:
+        content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+    file.write_bytes(content)
+    with contextlib.suppress(BadCheckpoint):
+        assert read_checkpoint(file) == _some()
+
+
+@pytest.mark.parametrize("size", range(0, 2000, 97))
+def test_a_checkpoint_that_cannot_be_written_leaves_the_former_one(tmp_path: Path, size: int):
+    resource = pytest.importorskip("resource")
+    file = tmp_path / "checkpoint.zip"
+    write_checkpoint(file, _some())
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            write_checkpoint(file, _some(b"x" * 5000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert read_checkpoint(file) == _some()
+
+
+def _some(kept: bytes = b"kept") -> Checkpoint:
+    return Checkpoint(
+        time=0.1,
+        rows=3,
+        stepper={"tick": 7},
+        units={"a/../b": b"\0state"},
+        contents={"a/../b": [[b"y"], []]},
+        cpu={"a/../b": b"\0" * 8},
+        kept=kept,
+    )

@@ -1,0 +1,100 @@
+"""Inputs on lines through their sources' last two points."""
+
+import json
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from native_units import native_fmu
+from oscillator import STATES, three_units
+
+from cosim.extrapolation import Extrapolation
+from cosim.linear import Linear
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.signals import Signals
+from cosim.system import System
+from cosim.trace import Trace
+
+LINEAR = MasterOptions(extrapolation=Extrapolation.LINEAR)
+LINEAR_JACOBI = MasterOptions(extrapolation=Extrapolation.LINEAR, algorithm=Algorithm.JACOBI)
+
+
+def integrated_ramp(slow: Fraction, fast: Fraction, **placing: Any) -> System:
+    """Return a system in which a fast unit integrates what a slow one says: y = t."""
+    s = System()
+    ramp = s.add("ramp", native_fmu("ramp"), period=slow, **placing)
+    integrator = s.add("integrator", native_fmu("integrator"), period=fast)
+    s.connect(ramp.y.y, integrator.u.u)
+    return s
+
+
+def course(system: System, signal: str, stop: Fraction, options: MasterOptions = LINEAR) -> dict[float, float]:
+    seen: dict[float, float] = {}
+
+    def observe(t: float, signals: Signals) -> None:
+        seen[t] = float(signals[signal])
+
+    with Master(system, options) as master:
+        master.run(stop, [observe])
+    return seen
+
+
+@pytest.mark.parametrize("fast", [Fraction(1, 10), Fraction(1, 7), Fraction(1, 3000)])
+def test_a_fast_unit_gets_a_slow_ones_values_at_its_own_times(fast: Fraction):
+    seen = course(integrated_ramp(Fraction(1), fast), "integrator.x", Fraction(3))
+    assert len(seen) == 3 / fast + 1
+    assert list(seen.values()) == pytest.approx([t * t / 2 for t in seen], rel=1e-12, abs=1e-12)
+
+
+def test_a_line_begins_level_and_is_drawn_on():
+    seen = course(integrated_ramp(Fraction(1), Fraction(1, 4)), "integrator.x", Fraction(3), LINEAR_JACOBI)
+    assert [seen[t] for t in (0.5, 1.0, 1.5, 2.5, 3.0)] == [0.0, 0.0, 0.625, 2.625, 4.0]
+
+
+def test_what_acts_at_instants_is_held():
+    seen = course(integrated_ramp(Fraction(1), Fraction(1, 4), sampled=True), "integrator.x", Fraction(3))
+    assert seen[3.0] == 1 + 2 + 3
+
+
+@pytest.mark.parametrize(("interpolates", "error"), [(True, 0.0), (False, 2 * (1 / 4) ** 2 / 12)])
+def test_input_derivatives_are_used_where_a_unit_of_fmi2_interpolates(interpolates: bool, error: float):
+    """x'' = 2 t + 1; a force that is held at its value in the middle of steps of h makes x lead by 2 h^2 t / 12."""
+    s = System()
+    ramp = s.add("ramp", native_fmu("ramp", 2), period=Fraction(1, 4))
+    mass = s.add("mass", native_fmu("mass", 2, canInterpolateInputs=interpolates), period=Fraction(1, 4))
+    s.connect(ramp.y.y, mass.u.f, Linear(2.0, 1.0))
+    x = course(s, "mass.x", Fraction(1))[1.0]
+    assert x == pytest.approx(1 / 3 + 1 / 2 + error, abs=1e-9)
+
+
+def test_a_run_goes_on_bit_by_bit_from_a_state():
+    with Master(three_units(Fraction(1, 100), 2), LINEAR) as master:
+        master.run(Fraction(1, 2))
+        state = json.loads(json.dumps(master.stepper.get_state()))
+        units = dict(master.ensemble.save(master.ensemble.instances))
+        found: list[list[float]] = []
+        for _ in range(2):
+            master.run(Fraction(1))
+            found.append([float(master.signals[s]) for s in STATES])
+            master.ensemble.restore(units)
+            master.stepper.set_state(state)
+        master.ensemble.forget(units)
+    assert found[0] == found[1]
+
+
+def test_places_on_a_line_do_not_depend_on_how_late_it_is():
+    def line_from(first: int) -> Trace:
+        values = np.array([1.0, 2.0])
+        trace = Trace(values)
+        trace.record(first)
+        values[...] = (1.3, -0.4)
+        trace.record(first + 3)
+        return trace
+
+    early, late = 21, 21 * 10**13
+    for half_ticks in range(-6, 20):
+        a, b = (line_from(first).at(2 * first + half_ticks) for first in (early, late))
+        assert a.tolist() == b.tolist() == pytest.approx([1 + 0.05 * half_ticks, 2 - 0.4 * half_ticks])
+    assert line_from(late).rate(0.1).tolist() == pytest.approx([1.0, -8.0])

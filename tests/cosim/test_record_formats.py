@@ -1,0 +1,122 @@
+"""Records in all their forms are read back by readers that are not ours."""
+
+import csv
+import struct
+from pathlib import Path
+from typing import Any
+
+import DyMat
+import numpy as np
+import pytest
+import scipy.io
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from signals_of import signals_of
+
+from cosim.recorder import Recorder
+from cosim.units import Unit
+from cosim.variable import Kind
+from scenarios.record import Record
+
+ROWS = 700
+
+
+def recorded(folder: Path) -> Path:
+    """Record all kinds of signal, with the greatest and least integers, in all forms."""
+    arrays: dict[str, NDArray[Any]] = {
+        "x": np.zeros(2),
+        "single": np.zeros(1, np.float32),
+        "n": np.zeros(1, np.int64),
+        "small": np.zeros(1, np.int8),
+        "large": np.zeros(1, np.uint64),
+        "on": np.zeros(1, bool),
+    }
+    signals = signals_of(arrays, unit=Unit("m"), description="a length in μm")
+    with Recorder(folder / "signals.parquet", ["csv", "mat"]) as recorder:
+        for i in range(ROWS):
+            arrays["x"][:] = i / 3, -i * 1e-300
+            arrays["single"][:] = i / 3
+            arrays["n"][:] = -(2**63) + i
+            arrays["small"][:] = i % 256 - 128
+            arrays["large"][:] = np.uint64(2**64 - 1 - i)
+            arrays["on"][:] = i % 3 == 0
+            recorder(i / 10, signals)
+    return folder / "signals.parquet"
+
+
+def test_parquet_holds_every_kind_of_number_exactly(tmp_path: Path):
+    record = Record(recorded(tmp_path))
+    assert record["unit.x"].tolist() == [[i / 3, -i * 1e-300] for i in range(ROWS)]
+    assert record["unit.single"].tolist() == [float(np.float32(i / 3)) for i in range(ROWS)]
+    assert record["unit.n"].tolist() == [-(2**63) + i for i in range(ROWS)]
+    assert record["unit.small"].tolist() == [i % 256 - 128 for i in range(ROWS)]
+    assert record["unit.large"].tolist() == [2**64 - 1 - i for i in range(ROWS)]
+    assert record["unit.on"].tolist() == [i % 3 == 0 for i in range(ROWS)]
+
+
+def test_csv_has_time_first_units_in_its_title_and_every_number_exactly(tmp_path: Path):
+    with open(recorded(tmp_path).with_suffix(".csv"), encoding="utf-8", newline="") as file:
+        title, *rows = csv.reader(file)
+    assert title[:3] == ["time [s]", "unit.x[1] [m]", "unit.x[2] [m]"]
+    named = {name: [row[i] for row in rows] for i, name in enumerate(title)}
+    assert [float(v) for v in named["time [s]"]] == [i / 10 for i in range(ROWS)]
+    assert [float(v) for v in named["unit.x[1] [m]"]] == [i / 3 for i in range(ROWS)]
+    assert [float(v) for v in named["unit.x[2] [m]"]] == [-i * 1e-300 for i in range(ROWS)]
+    assert [int(v) for v in named["unit.n [m]"]] == [-(2**63) + i for i in range(ROWS)]
+    assert [int(v) for v in named["unit.large [m]"]] == [2**64 - 1 - i for i in range(ROWS)]
+    assert named["unit.on [m]"] == ["true" if i % 3 == 0 else "false" for i in range(ROWS)]
+
+
+@given(st.lists(st.integers(0, 2**64 - 1), min_size=1, max_size=40))
+def test_csv_gives_any_double_back(tmp_path_factory: pytest.TempPathFactory, bits: list[int]):
+    file, x = tmp_path_factory.mktemp("doubles") / "signals.parquet", np.zeros(1)
+    signals = signals_of({"x": x})
+    numbers = np.array(bits, dtype=np.uint64).view(np.float64)
+    with Recorder(file, ["csv"]) as recorder:
+        for number in numbers:
+            x[:] = number
+            recorder(0.0, signals)
+    with open(file.with_suffix(".csv"), encoding="utf-8", newline="") as lines:
+        read = [float(row[1]) for row in list(csv.reader(lines))[1:]]
+    np.testing.assert_array_equal(np.array(read), numbers)
+    assert [struct.pack("<d", v) for v in read if v == v] == [struct.pack("<d", v) for v in numbers if v == v]
+
+
+def test_mat_is_read_by_a_reader_of_modelica_results(tmp_path: Path):
+    result: Any = DyMat.DyMatFile(str(recorded(tmp_path).with_suffix(".mat")))
+    time, name, _ = result.abscissa(2)
+    assert name == "time"
+    assert time.tolist() == [i / 10 for i in range(ROWS)]
+    assert sorted(result.names()) == [
+        "unit.large", "unit.n", "unit.on", "unit.single", "unit.small", "unit.x[1]", "unit.x[2]",
+    ]  # fmt: skip
+    assert result.data("unit.x[1]").tolist() == [i / 3 for i in range(ROWS)]
+    assert result.data("unit.x[2]").tolist() == [-i * 1e-300 for i in range(ROWS)]
+    assert result.data("unit.on").tolist() == [float(i % 3 == 0) for i in range(ROWS)]
+    assert result.data("unit.small").tolist() == [i % 256 - 128 for i in range(ROWS)]
+    assert result.data("unit.n").tolist() == [float(-(2**63) + i) for i in range(ROWS)]
+    assert result.description("unit.x[1]").startswith("a length in ")
+    assert result.description("unit.x[1]").endswith("m [m]")
+
+
+def test_mat_has_the_matrices_of_a_trajectory_in_their_order(tmp_path: Path):
+    file = recorded(tmp_path).with_suffix(".mat")
+    matrices: dict[str, Any] = scipy.io.loadmat(file)
+    assert [row.rstrip() for row in matrices["Aclass"]] == ["Atrajectory", "1.1", "", "binTrans"]
+    order = [name for name, _, _ in scipy.io.whosmat(file)]
+    assert order == ["Aclass", "name", "description", "dataInfo", "data_1", "data_2"]
+    assert matrices["dataInfo"].tolist() == [[0, *[2] * 7], [1, 2, 3, 4, 5, 6, 7, 8], [0] * 8, [-1] * 8]
+    assert matrices["data_1"].tolist() == [[0.0, (ROWS - 1) / 10]]
+    assert matrices["data_2"].shape == (8, ROWS)
+
+
+def test_an_enumeration_has_its_items_in_the_description(tmp_path: Path):
+    light = np.ones(1, dtype=np.int64)
+    told = {"kind": Kind.ENUMERATION, "items": (("RED", 1), ("GREEN", 2)), "description": "a light"}
+    with Recorder(tmp_path / "signals.parquet", ["mat", "csv"]) as recorder:
+        recorder(0.0, signals_of({"light": light}, **told))
+    result: Any = DyMat.DyMatFile(str(tmp_path / "signals.mat"))
+    assert result.description("unit.light") == "a light (1 RED, 2 GREEN)"
+    assert Record(tmp_path / "signals.parquet").items("unit.light") == {1: "RED", 2: "GREEN"}
+    assert (tmp_path / "signals.csv").read_text().splitlines()[1] == "0,1"

@@ -1,0 +1,39 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from cosim.recorder import Recorder
+from signals_of import signals_of
+
+def record(name, rows):
+    x = np.zeros(100)
+    signals = signals_of({"x": x})
+    noise = np.random.default_rng(1)
+    with Recorder(Path(name), ["csv", "mat"]) as recorder:
+        for i in range(rows):
+            x[:] = noise.random(100)
+            recorder(i / 100, signals)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+print(record("short.parquet", 40_000), record("long.parquet", 100_000))
+"""
+
+
+@pytest.mark.slow
+def test_a_record_of_ten_million_values_takes_no_more_memory_than_one_of_four(tmp_path: Path):
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n{PROGRAM}"],
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    short, long = (int(n) for n in done.stdout.split())
+    assert (tmp_path / "long.parquet").stat().st_size > 70e6
+    assert long - short < 20e6

@@ -1,0 +1,195 @@
+import fcntl
+import json
+import shutil
+import signal
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fmus.build import cached
+from scenarios.command import main
+from scenarios.record import Record
+
+sys.path.insert(0, str(Path(__file__).parent))  # killed_run
+
+from killed_run import end_between
+
+OF_TIME = ("cpu_", "pace_", "peak_memory")
+
+
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    """Return all of a summary that measures no time."""
+    told = json.loads((folder / "summary.json").read_text())
+    metrics = {k: v for k, v in told["metrics"].items() if not k.startswith(OF_TIME)}
+    return {k: v for k, v in told.items() if k not in ("wall_seconds", "cpu_seconds")} | {"metrics": metrics}
+
+
+def assert_same(joined: Path, whole: Path) -> None:
+    assert (joined / "signals.parquet").read_bytes() == (whole / "signals.parquet").read_bytes()
+    assert summary_of(joined) == summary_of(whole)
+    names = {str(p.relative_to(whole)) for p in whole.rglob("*")}
+    assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
+
+
+def slow(*values: Any) -> Any:
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "every", "passed", "number"),
+    [
+        ("ir_grasp", 3, 7, signal.SIGKILL),
+        slow("ir_grasp", 3, 7, signal.SIGINT),
+        slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
+        slow("vsl_hybrid", 0.5, 1.2, signal.SIGKILL),
+        slow("helix_handover", 2, 5, signal.SIGKILL),
+    ],
+)
+def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
+    tmp_path: Path, scenario: str, every: float, passed: float, number: signal.Signals
+):
+    killed, whole = tmp_path / "killed", tmp_path / "whole"
+    waits = passed + every / 3
+    arguments = ("run", scenario, "--seed", "3", "--out")
+    ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
+    assert ended in (-signal.SIGKILL, 1)
+    assert call(*arguments, whole).exit_code == 0
+    result = call("resume", killed)
+    assert result.exit_code == 0, result.output
+    assert_same(killed, whole)
+    assert Record(killed / "signals.parquet").time[-1] > waits
+
+
+@pytest.mark.slow
+def test_a_run_of_an_ssp_goes_on(tmp_path: Path):
+    killed, whole, file = tmp_path / "killed", tmp_path / "whole", tmp_path / "grasp.ssp"
+    assert call("export", "ir_grasp", "--ssp", file).exit_code == 0
+    arguments = ("run", file, "--stop", "4", "--out")
+    end_between(2.1, 2.5, signal.SIGKILL, *arguments, killed, "--checkpoint", "1")
+    assert call(*arguments, whole).exit_code == 0
+    content = file.read_bytes()
+    file.write_bytes(content + b" ")
+    result = call("resume", killed)
+    assert result.exit_code == 2
+    assert "grasp.ssp is not the file that the run began with" in result.output
+    file.write_bytes(content)
+    result = call("resume", killed)
+    assert result.exit_code == 0, result.output
+    assert_same(killed, whole)
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Leave a run that was killed early."""
+    folder = tmp_path_factory.mktemp("left") / "run"
+    scene = folder.with_name("scene.fmu")
+    shutil.copy(cached("GraspScene", 3), scene)
+    end_between(
+        0.3, 0.35, signal.SIGKILL, "run", "ir_grasp", "--unit", f"scene={scene}", "--out", folder, "--checkpoint", "0.1"
+    )
+    return folder
+
+
+@pytest.fixture
+def copy(left: Path, tmp_path: Path) -> Path:
+    """Copy it."""
+    return Path(shutil.copytree(left, tmp_path / "run"))
+
+
+def assert_refused(folder: Path, told: str) -> None:
+    before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file() and "signals" not in p.name}
+    result = call("resume", folder)
+    assert result.exit_code == 2, result.output
+    assert told in result.output
+    assert len(result.output.splitlines()) == 1
+    assert {p: p.read_bytes() for p in before} == before
+
+
+def assert_record_is_whole(folder: Path) -> None:
+    """Check that no row is lost which the killed process had recorded."""
+    assert Record(folder / "signals.parquet").time[-1] >= 0.3
+
+
+def test_a_folder_of_no_run_is_refused(tmp_path: Path):
+    assert_refused(tmp_path, "it is not the folder of a run: it has no run.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_configuration_is_refused(copy: Path):
+    (copy / "run.json").write_text("{")
+    assert_refused(copy, "its run.json is damaged")
+    (copy / "run.json").write_text("{}")
+    assert_refused(copy, "the run began with other versions: python None (here ")
+
+
+def test_a_complete_run_is_refused(copy: Path):
+    (copy / "summary.json").write_text('{"complete": true}')
+    assert_refused(copy, "the run is complete")
+
+
+def test_a_run_that_goes_on_is_refused(copy: Path):
+    with open(copy / "signals.tail", "rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert_refused(copy, "the run still goes on")
+    assert not (copy / "signals.parquet").exists()
+
+
+def test_a_run_without_a_checkpoint_is_refused_and_its_record_is_whole(copy: Path):
+    (copy / "checkpoint.zip").unlink()
+    assert_refused(copy, "there is no checkpoint; a run writes them with --checkpoint EVERY")
+    assert_record_is_whole(copy)
+
+
+def test_a_damaged_checkpoint_is_refused_and_the_record_is_whole(copy: Path):
+    content = (copy / "checkpoint.zip").read_bytes()
+    (copy / "checkpoint.zip").write_bytes(content[: len(content) // 2])
+    assert_refused(copy, "the checkpoint is damaged")
+    assert_record_is_whole(copy)
+
+
+def test_a_record_that_is_shorter_than_the_checkpoint_is_refused(copy: Path):
+    (copy / "signals.arrows").unlink()
+    assert_refused(copy, "rows, the record beside it has 0")
+
+
+def test_fmus_that_changed_are_refused_by_name(copy: Path, left: Path):
+    scene = left.with_name("scene.fmu")
+    content = scene.read_bytes()
+    try:
+        with zipfile.ZipFile(scene, "a") as archive:
+            archive.writestr("documentation/more.txt", "more")
+        assert_refused(copy, f"these FMUs are not those that the run began with: scene ({scene})")
+    finally:
+        scene.write_bytes(content)
+    assert_record_is_whole(copy)
+
+
+def test_other_versions_are_refused_by_name(copy: Path):
+    told = json.loads((copy / "run.json").read_text())
+    told["versions"]["numpy"] = "1.0"
+    (copy / "run.json").write_text(json.dumps(told))
+    assert_refused(copy, "the run began with other versions: numpy 1.0 (here 2.")
+
+
+def test_units_that_do_not_save_their_states_are_refused_at_the_start(tmp_path: Path):
+    unable = tmp_path / "unable.fmu"
+    with zipfile.ZipFile(cached("GraspScene", 3)) as source, zipfile.ZipFile(unable, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "modelDescription.xml":
+                assert b'canSerializeFMUState="true"' in content
+                content = content.replace(b'canSerializeFMUState="true"', b"")
+            target.writestr(name, content)
+    out = tmp_path / "out"
+    result = call("run", "ir_grasp", "--unit", f"scene={unable}", "--out", out, "--checkpoint", "1")
+    assert result.exit_code == 2, result.output
+    assert "scene: unable.fmu lacks canSerializeFMUState" in result.output
+    assert not out.exists()
