@@ -2,15 +2,21 @@
 
 import array
 import contextlib
+import functools
 import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import NamedTuple
 
+from cosim.endings import Endings
 from cosim.exceptions import CosimError
+from cosim.finite_check import FiniteCheck
 from cosim.fmpy_edge import unpack
+from cosim.fmu_description import FmuPort
+from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance, State
 from cosim.linear_inputs import LinearInputs
 from cosim.narrowing import Narrowing, narrows
@@ -24,6 +30,14 @@ from cosim.system import PortName, System
 _log = logging.getLogger(__name__)
 
 
+class Feeding(NamedTuple):
+    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
+
+    narrowings: Sequence[Narrowing]
+    copies: Sequence[Copy]
+    scaled: Sequence[ScaledCopy]
+
+
 class Ensemble:
     """Loads a system's units and carries out what an algorithm wants of them, one unit at a time.
 
@@ -31,32 +45,46 @@ class Ensemble:
         InvalidFmu: an FMU cannot be used; what was loaded until then is freed.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+        """Load the units; with `endings` given, whoever gave them carries them out if this fails."""
         self.system = system
+        self.heartbeat = heartbeat or Heartbeat()
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
+        self.measures_cpu = False
+        """Whether CPU time is taken of steps."""
         self.lines: LinearInputs | None = None
         """What inputs follow that are extrapolated; None where all are held."""
         self._copies: dict[str, Sequence[Copy]] = {}
         self._scaled: dict[str, list[ScaledCopy]] = {}
         self._narrowings: dict[str, list[Narrowing]] = {}
-        with contextlib.ExitStack() as cleanup:
-            self._load(cleanup)
+        self._finite: dict[str, FiniteCheck] = {}
+        self._endings = endings or Endings()
+        try:
+            self._load()
             self._wire()
-            self._cleanup = cleanup.pop_all()
+            self._watch_numbers()
+        except BaseException:
+            if endings is None:
+                self.close()
+            raise
 
     def close(self) -> None:
         """Terminate and free all units."""
-        self._cleanup.close()
+        self._endings.carry_out()
 
     def signals(self) -> Signals:
         """Return the units' outputs as they are."""
         ports = {n: u.description.outputs for n, u in self.system.units.items()}
         return Signals({n: i.y for n, i in self.instances.items()}, ports, self)
 
-    def initialize(self, slots: Sequence[Slot]) -> None:
-        """Take all units through initialisation mode, in the order given.
+    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
+        """Take all units through initialisation mode.
+
+        Args:
+            slots: in the order in which they leave it.
+            work_out: is called in between, to set inputs and get outputs in whatever order.
 
         Raises:
             UnitFailure: a unit does not accept its start values or does not initialise.
@@ -64,11 +92,7 @@ class Ensemble:
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
-        known: set[str] = set()
-        for slot in slots:
-            self._feed_known(slot.unit, known)
-            self.publish(slot.unit)
-            known.add(slot.unit)
+        work_out()
         for slot in slots:
             self.feed(slot.unit, 0.0)
             self.instances[slot.unit].exit_initialization()
@@ -85,10 +109,45 @@ class Ensemble:
         Raises:
             UnitFailure: the unit does not take them.
         """
-        self._copy(unit, t)
+        self.gather(unit, t)
         if self.lines is not None and dt is not None:
             self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
+
+    def feeding(self, unit: str) -> Feeding:
+        """Return what `feed` does before it sets a unit's inputs, where none are extrapolated."""
+        return Feeding(self._narrowings[unit], self._copies[unit], self._scaled[unit])
+
+    def feed_known(self, unit: str, known: Collection[str]) -> None:
+        """Set only the inputs whose sources are units that are known; the others keep what they have.
+
+        Raises:
+            UnitFailure: the unit does not take them.
+        """
+        self.gather(unit, 0.0)
+        self.set_known(unit, known)
+
+    def set_known(self, unit: str, known: Collection[str]) -> None:
+        """Hand over, of the inputs that were gathered, only those whose sources are units that are known.
+
+        Raises:
+            UnitFailure: the unit does not take them.
+        """
+        sources = self.system.sources_of(unit)
+        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
+
+    def gather(self, unit: str, t: float) -> None:
+        """Copy to a unit's buffers what its sources give; it is told by `set_inputs`.
+
+        Raises:
+            UnitFailure: a number does not fit its input.
+        """
+        for narrowing in self._narrowings[unit]:
+            narrowing.check(t)
+        for target, source in self._copies[unit]:
+            target[...] = source
+        for scaled in self._scaled[unit]:
+            scaled()
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt.
@@ -101,8 +160,14 @@ class Ensemble:
             self.lines.step(unit)
 
     def publish(self, unit: str) -> None:
-        """Fetch a unit's outputs, for observers and for the units that they feed."""
-        self.instances[unit].get_outputs()
+        """Fetch a unit's outputs, for observers and for the units that they feed.
+
+        Raises:
+            NotFinite: one that feeds a unit is NaN or infinite. UnitFailure: the unit does not give them.
+        """
+        instance = self.instances[unit]
+        instance.get_outputs()
+        self._finite[unit](instance.time, instance.log)
         if self.lines is not None:
             self.lines.publish(unit)
 
@@ -124,45 +189,47 @@ class Ensemble:
         for name, state in states.items():
             self.instances[name].free_state(state)
 
+    def finite_check(self, unit: str) -> FiniteCheck:
+        """Return the check that `publish` makes of a unit's outputs."""
+        return self._finite[unit]
+
     @contextlib.contextmanager
     def stopwatch(self) -> Generator[Callable[[str], None], None, None]:
         """Give a function that charges the CPU time since it was last called, or since the start, to a unit."""
-        began = time.process_time()
+        began = time.process_time() if self.measures_cpu else 0.0
 
         def charge(unit: str) -> None:
             nonlocal began
-            ended = time.process_time()
-            self.cpu[unit].append(ended - began)
-            began = ended
+            if self.measures_cpu:
+                ended = time.process_time()
+                self.cpu[unit].append(ended - began)
+                began = ended
 
         yield charge
 
-    def _copy(self, unit: str, t: float) -> None:
-        for narrowing in self._narrowings[unit]:
-            narrowing.check(t)
-        for target, source in self._copies[unit]:
-            target[...] = source
-        for scaled in self._scaled[unit]:
-            scaled()
-
-    def _feed_known(self, unit: str, known: Collection[str]) -> None:
-        """Set only inputs whose sources are known already; the others keep their start values."""
-        self._copy(unit, 0.0)
-        sources = self.system.sources_of(unit)
-        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
-
-    def _load(self, cleanup: contextlib.ExitStack) -> None:
+    def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        folder = Path(cleanup.enter_context(temporary))
+        self._endings.add(temporary.cleanup)
+        folder = Path(temporary.name)
+        self.heartbeat.tell_scratch(temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name))
-            cleanup.callback(instance.free)
+            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name), self.heartbeat)
+            self._endings.add(functools.partial(self._free, instance))
             self.instances[name] = instance
+
+    def _watch_numbers(self) -> None:
+        read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in self.instances}
+        for name in self.instances:
+            for port, source in self.system.sources_of(name).items():
+                output = self.instances[source.unit].description.outputs[source.port]
+                read[source.unit].setdefault(source.port, (output, []))[1].append(f"{name}.{port}")
+        for name, instance in self.instances.items():
+            self._finite[name] = FiniteCheck(name, instance.description.fmi, instance.y, read[name])
 
     def _wire(self) -> None:
         changes = {c.target: change for c in self.system.connections if (change := self.system.change_by(c))}
@@ -186,6 +253,16 @@ class Ensemble:
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:
             with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
-                instance.end()
+                if not self._corrupt(instance):
+                    instance.end()
 
-        self._cleanup.callback(end)
+        self._endings.add(end)
+
+    def _free(self, instance: Instance) -> None:
+        if not self._corrupt(instance):
+            instance.free()
+
+    def _corrupt(self, instance: Instance) -> bool:
+        """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
+        path = instance.description.path
+        return any(i.fatal for i in self.instances.values() if i.description.path == path)

@@ -4,6 +4,7 @@ import difflib
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any, ClassVar
 
 _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
@@ -73,6 +74,14 @@ class NotExportable(CosimError):
         self.faults = tuple(faults)
 
 
+class RecordNotWritten(CosimError):
+    """A run's record cannot be written, as on a full disk; the rows until then are kept beside it."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"{path} cannot be written: {fault}")
+        self.path, self.fault = path, fault
+
+
 class WiringError(CosimError):
     """A system is wired wrongly; `faults` lists everything that is wrong with it."""
 
@@ -87,12 +96,33 @@ class ScheduleError(CosimError):
 
 
 class UnitFailure(CosimError):
-    """A unit's call failed while running; `log` holds the unit's last lines."""
+    """A unit's call failed; `failures` has a type for each way in which it can.
+
+    Attributes:
+        kind: which way, as one word for programs that read a run's summary.
+        unit: the instance.
+        call: the FMI call, or what else was done with the unit.
+        t: simulated time in seconds.
+        status: what the call answered, or what happened instead.
+        log: the unit's last log lines.
+    """
+
+    kind: ClassVar[str] = "failure"
 
     def __init__(self, unit: str, call: str, t: float, status: str, log: Sequence[str] = ()) -> None:
-        told = "".join(f"\n  {line}" for line in log)
-        super().__init__(f"{unit}: {call} at t = {t:.6g} s answered {status}{told}")
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)
+        told = "".join(f"\n  {line}" for line in log)
+        super().__init__(self.headline + told)
+
+    @property
+    def headline(self) -> str:
+        """One line: unit, call, time, and what happened."""
+        return f"{self.unit}: {self.call} at t = {self.t:.6g} s {self.what}"
+
+    @property
+    def what(self) -> str:
+        """What happened, to be read after the call."""
+        return f"answered {self.status}"
 
     @property
     def told(self) -> str:
@@ -104,6 +134,17 @@ class UnitFailure(CosimError):
         """One line: unit, call, time, and the last thing that the unit logged."""
         return f"{self.unit}: {self.call} at t = {self.t:.6g} s: {self.told}"
 
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as JSON can hold it."""
+        return {
+            "kind": self.kind,
+            "instance": self.unit,
+            "call": self.call,
+            "time": self.t,
+            "status": self.status,
+            "log": log_lines(self.log),
+        }
+
 
 class UnitRefused(CosimError):
     """A unit did not accept its parameters or did not initialise; nothing has run yet."""
@@ -111,3 +152,11 @@ class UnitRefused(CosimError):
     def __init__(self, failure: UnitFailure) -> None:
         super().__init__(f"{failure.unit} does not start: {failure.told}")
         self.failure = failure
+
+
+class BadOptions(CosimError, ValueError):
+    """Options of a master that make no sense; `faults` lists everything that is wrong with them."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("; ".join(faults))
+        self.faults = tuple(faults)

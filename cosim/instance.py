@@ -3,12 +3,18 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import InvalidFmu, UnitFailure, last_line
+import numpy as np
+
+from cosim.exceptions import InvalidFmu, last_line
+from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.heartbeat import Abandoned, Heartbeat
+from cosim.magnitudes import Floats
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
@@ -18,30 +24,49 @@ State = ctypes.c_void_p
 """A saved state of one instance, which alone knows what it points to."""
 
 _LOG_LINES = 30
-_FATAL = 4
+_DISCARD, _FATAL = 2, 4
+
+
+@dataclass(frozen=True)
+class NativeStep:
+    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
+
+    fmi: int
+    function: int
+    component: int
+    flags: tuple[int, ...]
 
 
 class Instance:
     """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
 
+    Each call is told to `heartbeat`. If a call returns after the unit was given up, `Abandoned` is raised.
+
     Raises:
         InvalidFmu: the library does not load or does not instantiate.
     """
 
-    def __init__(self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str]) -> None:
+    def __init__(
+        self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
+        heartbeat: Heartbeat | None = None,
+    ) -> None:  # fmt: skip
         self.name = name
         self.description = description
         self.time = 0.0
         self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
         self._fmi = description.fmi
         self._prefix = f"fmi{self._fmi}"
+        self._heartbeat = heartbeat or Heartbeat()
+        self._codes: dict[str, int] = {}
         self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
         load = load_fmi2 if self._fmi == 2 else load_fmi3
         d = description
         try:
-            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line)
+            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line, self._begins)
         except InvalidFmu as e:
             raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
+        finally:
+            self._returned()
         self._component = self._fmu.component
         self._failed: int | None = None
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])
@@ -53,7 +78,7 @@ class Instance:
         self.goes_back = False
         """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
-        self._do_step = self._function("DoStep")
+        self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
 
     def set_start(self, values: Mapping[str, Any]) -> None:
         """Set parameters or start values of inputs, before initialisation."""
@@ -106,12 +131,71 @@ class Instance:
             UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
         """
         self.time = t
+        self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
-        if status > 1:
-            self._fail(f"{self._prefix}DoStep", status)
-        if self._fmi == 3 and self._terminate.value:
-            raise UnitFailure(self.name, "fmi3DoStep", t, "a request to end the simulation", tuple(self.log))
+        self._returned()
+        self.judge_step(status)
         self.time = t + dt
+
+    def judge_step(self, status: int) -> None:
+        """Look at what a step that was taken at `time` answered.
+
+        Raises:
+            UnitFailure: anything but OK or a warning, or the wish to end the simulation.
+        """
+        self.judge(f"{self._prefix}DoStep", status)
+        if self._fmi == 3 and self._terminate.value:
+            raise UnitEnded(self.name, "fmi3DoStep", self.time, tuple(self.log))
+
+    def judge(self, call: str, status: int) -> None:
+        """Look at what a call answered at `time`.
+
+        Raises:
+            UnitFailure: anything but OK or a warning.
+        """
+        if status > 1:
+            self._fail(call, status)
+
+    @property
+    def setters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `set_inputs` sets."""
+        return self._setters
+
+    @property
+    def getters(self) -> Sequence[SignalBuffer]:
+        """The buffers that `get_outputs` fetches."""
+        return self._getters
+
+    @property
+    def native_step(self) -> NativeStep:
+        """The call that `step` makes, for a program in C."""
+        function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
+        flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
+        return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
+
+    def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return how outputs change with inputs at this instant, the unit's state being as it is.
+
+        Args:
+            outputs: names of real outputs.
+            inputs: a direction: how fast each of some real inputs changes, all its entries in row-major order.
+
+        Returns:
+            How fast the outputs change then, by name.
+
+        Raises:
+            UnitFailure: it does not tell.
+        """
+        d = self.description
+        unknowns, knowns = [d.outputs[y] for y in outputs], [d.inputs[u] for u in inputs]
+        seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
+        found = np.zeros(sum(p.size for p in unknowns))
+        references = (_references(unknowns), _references(knowns))
+        lengths = ((), ()) if self._fmi == 2 else ((len(seed),), (len(found),))
+        vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
+        self._call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
+        ends = np.cumsum([p.size for p in unknowns])[:-1]
+        return dict(zip(outputs, np.split(found, ends), strict=True))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -176,15 +260,37 @@ class Instance:
             buffer.refill(content)
 
     def end(self) -> None:
-        """Terminate the unit, unless a call failed: the standards forbid it then."""
-        if self._failed is None:
+        """Terminate the unit, unless a call failed: the standards forbid it then, but for Discard."""
+        if self._failed in (None, _DISCARD) and not self._abandoned:
             self._call("Terminate")
 
     def free(self) -> None:
-        """Free the unit and its library; after a fatal error the standards forbid any call, and it is left."""
-        if self._component is not None and self._failed != _FATAL:
+        """Free the unit and its library; it is left after a fatal error, as the standards ask, or if a call hangs."""
+        if self._component is not None and not self.fatal and not self._abandoned:
             self._component = None
+            self._begins(f"{self._prefix}FreeInstance")
             self._fmu.freeInstance()
+            self._returned()
+
+    @property
+    def fatal(self) -> bool:
+        """Whether a call was answered with Fatal."""
+        return self._failed == _FATAL
+
+    @property
+    def _abandoned(self) -> bool:
+        return self.name in self._heartbeat.abandoned
+
+    def _begins(self, call: str) -> None:
+        code = self._codes.get(call)
+        if code is None:
+            code = self._codes[call] = self._heartbeat.code(self.name, call)
+        self._heartbeat.begin(code, self.time)
+
+    def _returned(self) -> None:
+        self._heartbeat.end()
+        if self._heartbeat.abandoned and self._abandoned:
+            raise Abandoned
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:
@@ -214,7 +320,9 @@ class Instance:
 
     def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:
+            self._begins(buffer.name)
             status = buffer()
+            self._returned()
             if status > 1:
                 self._fail(buffer.name, status)
 
@@ -224,14 +332,14 @@ class Instance:
         if port.kind is Kind.STRING:
             kept = ctypes.create_string_buffer(str(value).encode())
             views[0][0] = ctypes.addressof(kept)
-            status = buffer()
         elif port.kind is Kind.BINARY:
-            data = ctypes.create_string_buffer(bytes(value), len(value))
-            views[0][0], views[1][0] = ctypes.addressof(data), len(value)
-            status = buffer()
+            kept = ctypes.create_string_buffer(bytes(value), len(value))
+            views[0][0], views[1][0] = ctypes.addressof(kept), len(value)
         else:
             views[0][:] = numbers_of(port, value)
-            status = buffer()
+        self._begins(buffer.name)
+        status = buffer()
+        self._returned()
         if status > 1:
             self._fail(f"setting {port.name}", status)
 
@@ -239,16 +347,28 @@ class Instance:
         return getattr(self._fmu.dll, self._prefix + name)
 
     def _call(self, name: str, *arguments: Any) -> None:
+        self._begins(self._prefix + name)
         status = self._function(name)(self._component, *arguments)
+        self._returned()
         if status > 1:
             self._fail(self._prefix + name, status)
 
     def _fail(self, call: str, status: int) -> None:
         self._failed = status
-        told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        raise UnitFailure(self.name, call, self.time, told, tuple(self.log))
+        raise failure_of(self.name, call, self.time, status, tuple(self.log))
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
             told = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
-            self.log.append(f"[{STATUS[status] if status < len(STATUS) else status}] {told}")
+            line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
+            self.log.append(line)
+            self._heartbeat.log(self.name, line)
+
+
+def _references(ports: Sequence[FmuPort]) -> Any:
+    references = [r for p in ports for r in p.references]
+    return (ctypes.c_uint * len(references))(*references)
+
+
+def _doubles(values: Floats) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,24 @@ _VALUES: dict[str, Any] = {
 }
 
 
+@dataclass(frozen=True)
+class NativeCall:
+    """What a program in C needs to make a buffer's call itself.
+
+    Attributes:
+        function: the function's address.
+        component: the instance's.
+        references: the value references.
+        arrays: the memory: values; of binaries addresses and sizes.
+    """
+
+    fmi: int
+    function: int
+    component: int
+    references: "ctypes.Array[ctypes.c_uint]"
+    arrays: Views
+
+
 class SignalBuffer:
     """The variables of one FMI type of one instance, in the order given, in one block of memory.
 
@@ -34,9 +53,7 @@ class SignalBuffer:
     port, in row-major order; a connection copies one port's views into another's.
     """
 
-    def __init__(
-        self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
-    ) -> None:
+    def __init__(self, name: str, function: Any, component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
         self.name = name
         first = ports[0].fmi_type
         references = [r for p in ports for r in p.references]
@@ -46,6 +63,7 @@ class SignalBuffer:
         self._arrays, arguments = _arrays(first, fmi, n)
         count = () if fmi == 2 else (n,)
         self._arguments: tuple[Any, ...] = (component, vrs, len(references), *arguments, *count)
+        self._fmi = fmi
         self.views: dict[str, Views] = {}
         at = 0
         for p in ports:
@@ -55,6 +73,13 @@ class SignalBuffer:
     def __call__(self) -> int:
         """Set or get all values; return the FMI status."""
         return self._function(*self._arguments)
+
+    @property
+    def native(self) -> NativeCall:
+        """The same call for a program in C."""
+        component, references, *_ = self._arguments
+        function = ctypes.cast(self._function, ctypes.c_void_p).value or 0
+        return NativeCall(self._fmi, function, component, references, self._arrays)
 
     def contents(self) -> list[bytes]:
         """Return what the buffer holds."""
@@ -67,11 +92,15 @@ class SignalBuffer:
 
 
 class OutputBuffer(SignalBuffer):
-    """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call."""
+    """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call.
 
-    def __init__(
-        self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
-    ) -> None:
+    Attributes:
+        kept_elsewhere: what keeps the memory alive that others than this buffer copy them to.
+    """
+
+    kept_elsewhere: object = None
+
+    def __init__(self, name: str, function: Any, component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
         super().__init__(name, function, component, fmi, ports)
         self._is_text = ports[0].fmi_type == "String"
         self._kept: list[Any] = [ctypes.create_string_buffer(1) for _ in range(len(self._arrays[0]))]
@@ -86,9 +115,10 @@ class OutputBuffer(SignalBuffer):
 
     def contents(self) -> list[bytes]:
         """Return the texts or binaries that the buffer holds."""
+        addresses = map(int, self._arrays[0])
         if self._is_text:
-            return [ctypes.string_at(kept) for kept in self._kept]
-        return [ctypes.string_at(kept, int(size)) for kept, size in zip(self._kept, self._arrays[1], strict=True)]
+            return [ctypes.string_at(a) if a else b"" for a in addresses]
+        return [ctypes.string_at(a, int(size)) for a, size in zip(addresses, self._arrays[1], strict=True)]
 
     def refill(self, contents: Sequence[bytes]) -> None:
         """Hold what `contents` gave, be it in another process."""

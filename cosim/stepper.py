@@ -5,13 +5,12 @@ from typing import Any, Protocol
 
 
 class Stepper(Protocol):
-    """Moves an ensemble through time.
+    """Moves an ensemble through time."""
 
-    Attributes:
-        time: simulated time in seconds.
-    """
-
-    time: float
+    @property
+    def time(self) -> float:
+        """Simulated time in seconds."""
+        ...
 
     def arrive(self, last: int) -> bool:
         """Go to the next communication point, tick `last` at the latest; return whether that tick is reached."""

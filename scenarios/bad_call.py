@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import click
 
-from cosim.exceptions import CosimError
+from cosim.exceptions import CosimError, UnitFailure
 from fmus.binaries import NotCompiled
 from fmus.compile import CompilationError, UnknownPlatform
 from scenarios.parameters import BadParameter
@@ -18,11 +18,22 @@ class BadCall(click.ClickException):
     exit_code = 2
 
 
+class UnitLost(click.ClickException):
+    """A unit that failed before anything ran, in another way than by refusing what it was given."""
+
+    exit_code = 3
+
+
 @contextmanager
 def told_in_one_line() -> Generator[None, None, None]:
-    """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback."""
+    """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback.
+
+    A unit that does not answer at all is told as UnitLost.
+    """
     try:
         yield
+    except UnitFailure as e:
+        raise UnitLost(str(e)) from e
     except (CosimError, BadParameter, BadRunFolder, NotCompiled, UnknownPlatform) as e:
         raise BadCall(str(e)) from e
     except CompilationError as e:

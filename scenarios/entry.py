@@ -1,15 +1,34 @@
 """Where the command `handover` starts: Ctrl-C counts from its first instant."""
 
 import sys
+from typing import NoReturn
 
 ABORTED = 130
+
+_SUPERVISED = ("run", "resume")
+"""Commands that load units, which may end the process that they are in."""
 
 
 def main() -> None:
     """Run the command; loading it takes a second or so, in which it can be aborted like later."""
     try:
+        if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
+            from scenarios.supervisor import can_supervise, run_to_end, supervise
+
+            (supervise if can_supervise() else run_to_end)(_command)
+        _command()
+    except KeyboardInterrupt:
+        _abort()
+
+
+def _command() -> None:
+    try:
         from scenarios.command import main as command
     except KeyboardInterrupt:
-        sys.stderr.write("Aborted!\n")
-        sys.exit(ABORTED)
+        _abort()
     command()
+
+
+def _abort() -> NoReturn:
+    sys.stderr.write("Aborted!\n")
+    sys.exit(ABORTED)

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
+from scenarios.supervisor import leave
+
 ABORTED = 130
 """Exit status of what Ctrl-C aborted, as shells have it."""
 
@@ -104,7 +106,7 @@ class Interruption:
                 _say("ending after this step; Ctrl-C again to abort")
             elif not self._handled.wait(_GRACE):
                 _say("aborted; a unit did not return")
-                os._exit(ABORTED)
+                leave(ABORTED)
 
 
 def _say(line: str) -> None:

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cosim.block_description import describe
+from cosim.pacing import PaceReport
 from cosim.start_values import range_of
 from cosim.variable import Causality, Kind, Variable
 from fmus.build import import_block
@@ -67,6 +68,8 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
     metrics = summary["metrics"]
     rows = [(metrics[n]["description"] or n, told(metrics[n])) for n in headline if n in metrics]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
+    if summary.get("pace"):
+        rows.append(("deadlines missed", str(PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"}))))
     _print_rows(console, rows)
     console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import jinja2
 
-from scenarios.experiment import Experiment, Figure
+from scenarios.experiment import Figure
 from scenarios.run_folder import RunFolder
 
 
 def write_report(
     folder: RunFolder,
-    experiment: Experiment[Any],
+    title: str,
+    headline: Sequence[str],
     summary: Mapping[str, Any],
     parameters: Sequence[tuple[str, str, str]],
     units: Sequence[tuple[str, str, str, int, float]],
@@ -23,7 +24,8 @@ def write_report(
 
     Args:
         folder: the run's folder; the figures are in it.
-        experiment: the scenario; the figures of merit in its headline are shown first.
+        title: the scenario's.
+        headline: names of the figures of merit that are shown first.
         summary: what is in `summary.json`.
         parameters: name, value with unit, and description of each parameter.
         units: name, FMU, step, number of steps and CPU seconds of each unit.
@@ -34,8 +36,8 @@ def write_report(
     environment.filters["figure"] = told
     pictures = [(f, _inline(folder, f)) for f in figures]
     page = environment.from_string(source).render(
-        title=experiment.title,
-        metrics=_in_order(summary["metrics"], experiment.headline),
+        title=title,
+        metrics=_in_order(summary["metrics"], headline),
         summary=summary,
         parameters=parameters,
         units=units,

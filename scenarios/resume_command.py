@@ -2,6 +2,7 @@
 
 import contextlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -10,6 +11,7 @@ from scenarios.bad_call import told_in_one_line
 from scenarios.ending import end_with
 from scenarios.interruption import Interruption
 from scenarios.left_run import LeftRun
+from scenarios.limit_arguments import limit_options, limits
 from scenarios.progress import progress_bar
 from scenarios.run_folder import RunFolder
 from scenarios.runner import carry_out
@@ -26,11 +28,13 @@ trust.
 
 @click.command("resume", help=_HELP)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-def resume(folder: Path) -> None:
+@limit_options
+def resume(folder: Path, call_limit: float, pace: float | None) -> None:
     """Go on with a run from its last checkpoint."""
     with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
         left = LeftRun(RunFolder.left_at(folder))
         task = left.task(opened)
+        task = replace(task, options=replace(task.options, **limits(call_limit, pace)))
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption, left.resumption)
     end_with(ended, task)

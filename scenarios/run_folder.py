@@ -101,6 +101,14 @@ class RunFolder:
         told = {"platform": platform.platform(), **versions()}
         _write_json(self.path / "run.json", {**configuration, "units": units, "versions": told})
 
+    def add_to_run(self, **told: Any) -> None:
+        """Add facts to `run.json`.
+
+        Raises:
+            BadRunFolder: there is none.
+        """
+        _write_json(self.path / "run.json", {**self.read_run(), **told})
+
     def read_run(self) -> dict[str, Any]:
         """Return what `write_run` wrote.
 
@@ -144,4 +152,7 @@ def _version(package: str) -> str:
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    """Write a file that is whole or not there, whenever the process ends."""
+    unfinished = path.with_name(path.name + ".part")
+    unfinished.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    os.replace(unfinished, path)

@@ -4,17 +4,20 @@ import math
 import statistics
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.checkpoint import check_states
+from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
+from cosim.failures import UnitHung
+from cosim.iteration_count import IterationCount
 from cosim.master import Master, Observer
+from cosim.master_options import MasterOptions
 from cosim.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.experiment import Experiment, Metric, Outcome, Watch
@@ -23,6 +26,7 @@ from scenarios.record import Record
 from scenarios.report import write_report
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import RunFolder
+from scenarios.supervisor import heartbeat_of_run
 
 Progress = Callable[[float, float], None]
 """Told the simulated time and the time at which the run ends at the latest, in seconds."""
@@ -39,6 +43,7 @@ class Task:
         formats: further forms of the record, see `RECORD_FORMATS`.
         every: simulated seconds from checkpoint to checkpoint, if there are to be any.
         source: what `resume` needs to find the experiment again, if it is not one of the catalog.
+        options: how its units are run.
     """
 
     experiment: Experiment[Any]
@@ -49,6 +54,7 @@ class Task:
     formats: Sequence[str] = ()
     every: Fraction | None = None
     source: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    options: MasterOptions = field(default_factory=MasterOptions)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +73,10 @@ def carry_out(
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, UnitRefused, StateNotSaved, BadRunFolder: before anything was written.
+        UnitHung: a unit does not return as it is loaded or initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
     """
     experiment, parameters = task.experiment, task.parameters
-    stop = experiment.stop_time(parameters)
     spent = Spent() if resumption is None else resumption.spent
     watch = experiment.watch(parameters) if resumption is None else resumption.watch
     failure: UnitFailure | None = None
@@ -78,48 +84,98 @@ def carry_out(
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
     if task.every is not None:
         check_states(system)
-    with Master(system) as master:
-        if resumption is not None:
-            resumption.checkpoint.restore(master)
-        interruption.begin()
-        if resumption is None:
-            task.folder.make()
-            configuration = {**_configuration(task), **_options(task)}
-            task.folder.write_run(configuration, {n: u.description.path for n, u in system.units.items()})
-        rows = 0 if resumption is None else resumption.checkpoint.rows
-        with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
-            checkpoints = _checkpoints(task, master, recorder, lambda: pack(watch, parameters, clock()))
-
-            def tell(t: float, _signals: Signals) -> None:
-                progress(t, float(stop))
-
-            observers: list[Observer] = [recorder, watch, *checkpoints]
+    master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())
+    began = False
+    try:
+        with master:
             if resumption is not None:
-                observers = [from_then_on(resumption.checkpoint.time, observe) for observe in observers]
-            try:
-                master.run(stop, [*observers, tell], until=lambda: watch.over or interruption.asked)
-                if interruption.asked and not watch.over:
-                    for checkpointer in checkpoints:
-                        checkpointer.write()
-                watch.finish(master.signals)
-            except UnitFailure as e:
-                interruption.check()
-                failure = e
+                master.carry_out(lambda: resumption.checkpoint.restore(master))
+            interruption.begin()
+            began = True
+            _begin_folder(task, master, resumption)
+            failure = _run(task, master, watch, resumption, _Surroundings(progress, interruption, clock))
+    except UnitHung as e:  # as units were loaded, or terminated
+        if not began:
+            raise
+        failure = failure or e
     spent = clock()
     outcome = _outcome(watch, failure, interruption.asked)
     metrics = {**outcome.metrics, **_speed(experiment, master)}
     complete = failure is None and (watch.over or not interruption.asked)
-    summary = _summary(task, outcome, metrics, master, spent, complete)
+    summary = {**_summary(task, outcome, metrics, master, spent, complete), **_trouble(failure, master)}
     task.folder.write_summary(summary)
+    if failure is not None:
+        task.folder.add_to_run(failure=failure.as_data())
     if complete:
-        task.folder.checkpoint.unlink(missing_ok=True)
+        remove_checkpoint(task.folder.checkpoint)
     _present(task, watch, summary, system_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
-def _checkpoints(task: Task, master: Master, recorder: Recorder, keep: Callable[[], bytes]) -> list[Checkpointer]:
+@dataclass(frozen=True)
+class _Surroundings:
+    progress: Progress
+    interruption: Interruption
+    clock: Callable[[], Spent]
+
+
+def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> None:
+    """Make the run's folder, and tell what has to be known of the run if this process dies."""
+    if resumption is None:
+        task.folder.make()
+    fmus = {n: u.description.path for n, u in master.system.units.items()}
+    task.folder.write_run({**_configuration(task), **_options(task)}, fmus)
+    master.heartbeat.tell(
+        folder=str(task.folder.path),
+        configuration=_configuration(task),
+        title=task.experiment.title,
+        parameters=_parameter_rows(task),
+        units=system_rows(master),
+    )
+
+
+def _run(
+    task: Task, master: Master, watch: Watch, resumption: Resumption | None, around: _Surroundings
+) -> UnitFailure | None:
+    """Step until the end, and record; return the failure that it ended with, if any."""
+    stop, interruption = task.experiment.stop_time(task.parameters), around.interruption
+    rows = 0 if resumption is None else resumption.checkpoint.rows
+    with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
+        checkpoints = _checkpoints(task, master, recorder, watch, around.clock)
+
+        def tell(t: float, _signals: Signals) -> None:
+            around.progress(t, float(stop))
+
+        observers: list[Observer] = [recorder, watch, *checkpoints]
+        if resumption is not None:
+            observers = [from_then_on(resumption.checkpoint.time, observe) for observe in observers]
+        try:
+            master.run(stop, [*observers, tell], until=lambda: watch.over or interruption.asked)
+            if interruption.asked and not watch.over:
+                for checkpointer in checkpoints:
+                    master.carry_out(checkpointer.write)
+            watch.finish(master.signals)
+        except UnitFailure as e:
+            interruption.check()
+            return e
+    return None
+
+
+def _trouble(failure: UnitFailure | None, master: Master) -> dict[str, Any]:
+    """Return what a summary says of a failure and of missed deadlines."""
+    paced = {} if master.pacer is None else {"pace": master.pacer.report.as_data()}
+    return {"failure": None if failure is None else failure.as_data(), **paced}
+
+
+def _checkpoints(
+    task: Task, master: Master, recorder: Recorder, watch: Watch, clock: Callable[[], Spent]
+) -> list[Checkpointer]:
     if task.every is None:
         return []
+
+    def keep() -> bytes:
+        return pack(watch, task.parameters, task.options, clock())
+
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
@@ -154,9 +210,20 @@ def _speed(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
     for name, spent in master.cpu.items():
         total = float(np.sum(spent))
         metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
-        simulated = len(spent) * float(master.system.units[name].period)
+        unit = master.system.units[name]  # its own period says nothing of steps that follow their error
+        simulated = master.time if master.steps and not unit.sampled else len(spent) * float(unit.period)
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
-    return metrics
+    return {**metrics, **_iterations(master.iterations)}
+
+
+def _iterations(count: IterationCount) -> dict[str, Metric]:
+    if not count.steps:
+        return {}
+    told = f"mean number of iterations of a step that was iterated, {count.most} at most"
+    return {
+        "iterations": Metric(count.iterations / count.steps, "1", told),
+        "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
+    }
 
 
 def _peak_memory() -> float | None:
@@ -170,7 +237,7 @@ def _peak_memory() -> float | None:
 
 def _configuration(task: Task) -> dict[str, Any]:
     values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
-    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed}
+    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed, "master": task.options.as_data()}
 
 
 def _options(task: Task) -> dict[str, Any]:
@@ -188,6 +255,7 @@ def _summary(
         "reason": outcome.reason,
         "metrics": {k: _metric(m) for k, m in metrics.items()},
         "simulated_seconds": master.time,
+        **({} if master.steps is None else {"steps": asdict(master.steps)}),
         "wall_seconds": spent.wall,
         "cpu_seconds": spent.cpu,
     }
@@ -205,7 +273,9 @@ def _present(
     if task.folder.signals.exists():
         record = Record(task.folder.signals)
         figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
-    write_report(task.folder, task.experiment, summary, _parameter_rows(task), units, figures)
+    write_report(
+        task.folder, task.experiment.title, task.experiment.headline, summary, _parameter_rows(task), units, figures
+    )
 
 
 def _parameter_rows(task: Task) -> list[tuple[str, str, str]]:

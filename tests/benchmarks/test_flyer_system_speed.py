@@ -12,6 +12,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from cosim.master import Master
+from cosim.master_options import MasterOptions
 from cosim.signals import Signals
 from fmus.build import cached
 from scenarios.catalog import SCENARIOS
@@ -36,7 +37,7 @@ def pace(experiment: Experiment[Any]) -> tuple[float, float]:
     p, clock = experiment.parameters_type(), Clock()
     watch = experiment.watch(p)
     system = experiment.build(p, SEED, lambda unit: cached(experiment.units[unit], 3))
-    with Master(system) as master:
+    with Master(system, MasterOptions(cpu_times=True)) as master:
         master.run(experiment.stop_time(p), [watch, clock], until=lambda: watch.over)
         spent = time.process_time() - clock.begin
     assert watch.over

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Raster, Vector2, output, parameter, port
+from cosim.ports import Int8, Raster, Single, UInt16, UInt64, Vector2, output, parameter, port
 from cosim.units import Kilogram, Metre, MetrePerSecond, Newton, NewtonPerMetre, Number
 
 TinyPicture = Annotated[NDArray[np.uint8], Raster(4, 2)]
@@ -238,3 +238,91 @@ class Pushed(Mass):
     def step(self, t: float, dt: float, u: MassInputs) -> PushedOutputs:  # type: ignore[override]
         super().step(t, dt, u)
         return self.outputs(t + dt, u)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiaryParams:
+    mark: str = parameter("a", "what it writes")
+
+
+@dataclass(kw_only=True)
+class DiaryInputs:
+    heard: str = port("", "a text")
+
+
+@dataclass(kw_only=True)
+class DiaryOutputs:
+    text: str = output("mark and the end of what it heard at each step; longer from step to step")
+    pages: int = output("number of characters")
+
+
+class Diary:
+    """Writes down what it hears."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: DiaryParams) -> None:
+        self.mark, self.text = params.mark, ""
+
+    def outputs(self, t: float, u: DiaryInputs) -> DiaryOutputs:  # noqa: ARG002
+        return DiaryOutputs(text=self.text, pages=len(self.text))
+
+    def step(self, t: float, dt: float, u: DiaryInputs) -> DiaryOutputs:
+        self.text += f"{self.mark}{u.heard[-7:]}é"
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return self.text.encode()
+
+    def set_state(self, state: bytes) -> None:
+        self.text = state.decode()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TallyParams:
+    factor: int = parameter(3, "by which the numbers grow", minimum=-10, maximum=10)
+
+
+@dataclass(kw_only=True)
+class TallyInputs:
+    small: Int8 = port(0, "a small number")
+    whole: UInt64 = port(0, "a large number")
+    single: Single[Number] = port(0.0, "a number of low precision")
+    double: Number = port(0.0, "a number")
+
+
+@dataclass(kw_only=True)
+class TallyOutputs:
+    power: int = output("power of the factor by the number of steps")
+    positive: UInt16 = output("its absolute value, of which the last digits only")
+    third: Number = output("a third of it")
+    single_third: Single[Number] = output("a third of it")
+    heard: Number = output("sum of the inputs")
+
+
+class Tally:
+    """Gives numbers of many widths that grow from step to step."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: TallyParams) -> None:
+        self.factor, self.power, self.heard = params.factor, 1, 0.0
+
+    def outputs(self, t: float, u: TallyInputs) -> TallyOutputs:  # noqa: ARG002
+        third = self.power / 3
+        return TallyOutputs(
+            power=self.power, positive=abs(self.power) % 50000, third=third, single_third=third, heard=self.heard
+        )
+
+    def step(self, t: float, dt: float, u: TallyInputs) -> TallyOutputs:
+        self.power *= self.factor
+        self.heard = u.small + u.whole + u.single + u.double
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return pickle.dumps((self.power, self.heard))
+
+    def set_state(self, state: bytes) -> None:
+        self.power, self.heard = pickle.loads(state)

@@ -1,0 +1,152 @@
+"""The ways in which a unit can fail, each a type with its data; what they share is `UnitFailure`."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from cosim.exceptions import UnitFailure
+
+_STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+_DISCARD, _FATAL = 2, 4
+
+
+class UnitError(UnitFailure):
+    """A call was answered with Error: the unit may be reset or freed, nothing else."""
+
+    kind = "error"
+
+
+class UnitFatal(UnitFailure):
+    """A call was answered with Fatal: the unit must not be called again, not even to be freed."""
+
+    kind = "fatal"
+
+
+class UnitDiscarded(UnitFailure):
+    """A call was answered with Discard: the unit cannot do this, but is whole.
+
+    Attributes:
+        reached: the time in seconds until which its step was successful, None where it does not tell.
+    """
+
+    kind = "discard"
+
+    def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = (), reached: float | None = None) -> None:
+        self.reached = reached
+        super().__init__(unit, call, t, _STATUS[_DISCARD], log)
+
+    @property
+    def what(self) -> str:
+        """What happened, with the time that was reached."""
+        return super().what + ("" if self.reached is None else f", having reached t = {self.reached:.6g} s")
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as JSON can hold it."""
+        return {**super().as_data(), "last_successful_time": self.reached}
+
+
+class NotFinite(UnitFailure):
+    """An output that feeds another unit is NaN or infinite.
+
+    Attributes:
+        port: the output's name.
+        index: which element of it, counted from 1 as in FMI; empty for a scalar.
+        value: nan, inf or -inf.
+        readers: the inputs that it feeds, as `unit.port`.
+    """
+
+    kind = "not finite"
+
+    def __init__(
+        self, unit: str, call: str, t: float, port: str, index: Sequence[int], value: float, *,
+        readers: Sequence[str] = (), log: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self.port, self.index, self.value, self.readers = port, tuple(index), value, tuple(readers)
+        super().__init__(unit, call, t, "NaN" if math.isnan(value) else "-infinity" if value < 0 else "infinity", log)
+
+    @property
+    def element(self) -> str:
+        """The element's name, as `y` or `p_WG[3]`."""
+        return self.port + (f"[{','.join(map(str, self.index))}]" if self.index else "")
+
+    @property
+    def what(self) -> str:
+        """What happened: which element, and what it feeds."""
+        feeds = f", which feeds {', '.join(self.readers)}" if self.readers else ""
+        return f"gave {self.element} = {self.status}{feeds}"
+
+    @property
+    def told(self) -> str:
+        """Which element has which value; that matters more than what the unit logged."""
+        return f"{self.element} = {self.status}"
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as JSON can hold it."""
+        return {**super().as_data(), "port": self.port, "element": list(self.index), "value": self.status}
+
+
+class UnitEnded(UnitFailure):
+    """The unit asked to end the simulation: FMI 3 `terminateSimulation`, FMI 2 `fmi2Terminated`."""
+
+    kind = "ended"
+
+    def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = ()) -> None:
+        super().__init__(unit, call, t, "a request to end the simulation", log)
+
+    @property
+    def what(self) -> str:
+        """What happened."""
+        return "asked to end the simulation"
+
+
+class UnitHung(UnitFailure):
+    """A call did not return within the time limit; the unit is left where it is and never called again.
+
+    Attributes:
+        limit: seconds of wall time.
+    """
+
+    kind = "hang"
+
+    def __init__(self, unit: str, call: str, t: float, limit: float, log: Sequence[str] = ()) -> None:
+        self.limit = limit
+        super().__init__(unit, call, t, f"no return within {limit:g} s", log)
+
+    @property
+    def what(self) -> str:
+        """What happened, with the limit."""
+        return f"did not return within {self.limit:g} s"
+
+    @property
+    def told(self) -> str:
+        """The limit: what the unit logged before has led nowhere."""
+        return self.what
+
+
+class UnitCrashed(UnitFailure):
+    """The process ended within a unit's call; `status` says how, as "segmentation fault"."""
+
+    kind = "crash"
+
+    @property
+    def headline(self) -> str:
+        """One line: unit, call, time, and how the process ended."""
+        return f"unit {self.unit} crashed in {self.call} at t = {self.t:.6g} s: {self.status}"
+
+    @property
+    def told(self) -> str:
+        """How the process ended."""
+        return self.status
+
+    @property
+    def cause(self) -> str:
+        """The same line: it needs none of the log."""
+        return self.headline
+
+
+def failure_of(unit: str, call: str, t: float, status: int, log: Sequence[str] = ()) -> UnitFailure:
+    """Return the failure that an FMI status above Warning is."""
+    told = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
+    if status == _DISCARD:
+        return UnitDiscarded(unit, call, t, log)
+    return (UnitFatal if status == _FATAL else UnitError)(unit, call, t, told, log)

@@ -1,0 +1,88 @@
+"""Keeps a run in step with the wall clock, and counts where it could not."""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+_SLICE = 0.1  # s, after which a wait asks whether the run is to end
+
+
+@dataclass(frozen=True)
+class PaceReport:
+    """How a run kept its pace.
+
+    Attributes:
+        pace: simulated seconds per second of wall time.
+        deadlines: communication points that had to wait for the clock.
+        missed: those that were reached too late.
+        largest_lateness: seconds of wall time by which the worst of them was late; 0 where none was.
+        latest_at: simulated time of that one in seconds; None where none was late.
+    """
+
+    pace: float
+    deadlines: int
+    missed: int
+    largest_lateness: float
+    latest_at: float | None
+
+    @property
+    def share(self) -> float:
+        """The part of the deadlines that were missed."""
+        return self.missed / self.deadlines if self.deadlines else 0.0
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the report as JSON can hold it."""
+        return {**asdict(self), "share": self.share}
+
+    def __str__(self) -> str:
+        if not self.missed:
+            return f"none of {self.deadlines}"
+        return (
+            f"{self.missed} of {self.deadlines} ({self.share:.1%}), "
+            f"at most {self.largest_lateness * 1000:.3g} ms late, at t = {self.latest_at:.6g} s"
+        )
+
+
+class Pacer:
+    """Lets simulated time t pass at w(t) = w_0 + (t - t_0) / pace of the wall clock, where the run is quick enough.
+
+    Deadlines are counted from the run's start, so lateness of one does not shift the others and nothing adds up.
+
+    Args:
+        pace: simulated seconds per second of wall time.
+        clock: tells the time in seconds.
+        sleep: waits for so many seconds.
+    """
+
+    def __init__(
+        self, pace: float, clock: Callable[[], float] = time.monotonic, sleep: Callable[[float], None] = time.sleep
+    ) -> None:
+        self._pace, self._clock, self._sleep = pace, clock, sleep
+        self._t_0, self._w_0 = 0.0, 0.0
+        self._report = PaceReport(pace, 0, 0, 0.0, None)
+
+    @property
+    def report(self) -> PaceReport:
+        """How it went until now."""
+        return self._report
+
+    def start(self, t: float) -> None:
+        """Let the wall clock count from here, at simulated time t in seconds."""
+        self._t_0, self._w_0 = t, self._clock()
+
+    def wait(self, t: float, ended: Callable[[], bool]) -> None:
+        """Wait until simulated time t in seconds is due, or until `ended()` says that the run is to end."""
+        if t <= self._t_0:
+            return
+        deadline = self._w_0 + (t - self._t_0) / self._pace
+        left = deadline - self._clock()
+        self._count(t, max(-left, 0.0))
+        while left > 0 and not ended():
+            self._sleep(min(left, _SLICE))
+            left = deadline - self._clock()
+
+    def _count(self, t: float, lateness: float) -> None:
+        r = self._report
+        worst, at = max((r.largest_lateness, r.latest_at), (lateness, t), key=lambda late: late[0])
+        self._report = PaceReport(r.pace, r.deadlines + 1, r.missed + (lateness > 0), worst, at if worst else None)

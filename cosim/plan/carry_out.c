@@ -1,0 +1,226 @@
+/* Carries out operations, one after another. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "plan.h"
+
+typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
+typedef int (*Access3)(void *, const uint32_t *, size_t, void *, size_t);
+typedef int (*Binaries3)(void *, const uint32_t *, size_t, size_t *, void *, size_t);
+typedef int (*Step2)(void *, double, double, int);
+typedef int (*Step3)(void *, double, double, bool, bool *, bool *, bool *, double *);
+
+enum { OK, WARNING };
+
+#define LOAD(ENUM, T)                                                                                                  \
+    case ENUM: {                                                                                                       \
+        T value;                                                                                                       \
+        memcpy(&value, (const T *)from + i, sizeof value);                                                             \
+        return value;                                                                                                  \
+    }
+#define STORE(ENUM, T)                                                                                                 \
+    case ENUM: {                                                                                                       \
+        T made = (T)value;                                                                                             \
+        memcpy((T *)to + i, &made, sizeof made);                                                                       \
+        return;                                                                                                        \
+    }
+
+/* An unsigned number of 64 bits keeps its bits. */
+static int64_t integer(const void *from, int type, size_t i) {
+    switch (type) {
+        LOAD(BOOL8, uint8_t)
+        LOAD(INT8, int8_t)
+        LOAD(INT16, int16_t)
+        LOAD(INT32, int32_t)
+        LOAD(INT64, int64_t)
+        LOAD(UINT8, uint8_t)
+        LOAD(UINT16, uint16_t)
+        LOAD(UINT32, uint32_t)
+    default: {
+        uint64_t value;
+        memcpy(&value, (const uint64_t *)from + i, sizeof value);
+        return (int64_t)value;
+    }
+    }
+}
+
+static void store_integer(void *to, int type, size_t i, int64_t value) {
+    switch (type) {
+    case BOOL8:
+        ((uint8_t *)to)[i] = value != 0;
+        return;
+        STORE(INT8, int8_t)
+        STORE(INT16, int16_t)
+        STORE(INT32, int32_t)
+        STORE(INT64, int64_t)
+        STORE(UINT8, uint8_t)
+        STORE(UINT16, uint16_t)
+        STORE(UINT32, uint32_t)
+        STORE(UINT64, uint64_t)
+    }
+}
+
+static double real(const void *from, int type, size_t i) {
+    return type == FLOAT32 ? (double)((const float *)from)[i] : ((const double *)from)[i];
+}
+
+static void store_real(void *to, int type, size_t i, double value) {
+    if (type == FLOAT32)
+        ((float *)to)[i] = (float)value;
+    else
+        ((double *)to)[i] = value;
+}
+
+static void convert(const Operation *o) {
+    bool reals = o->copy.from_type >= FLOAT32;
+    for (size_t i = 0; i < o->copy.n; i++)
+        if (reals)
+            store_real(o->copy.to, o->copy.to_type, i, real(o->copy.from, o->copy.from_type, i));
+        else
+            store_integer(o->copy.to, o->copy.to_type, i, integer(o->copy.from, o->copy.from_type, i));
+}
+
+static void scale(const Operation *o) {
+#pragma STDC FP_CONTRACT OFF
+    for (size_t i = 0; i < o->copy.n; i++) {
+        double scaled = real(o->copy.from, o->copy.from_type, i) * o->copy.factor;
+        store_real(o->copy.to, o->copy.to_type, i, scaled + o->copy.offset);
+    }
+}
+
+static bool fits(const Operation *o) {
+    for (size_t i = 0; i < o->check.n; i++) {
+        int64_t value = integer(o->check.values, (int)o->check.type, i);
+        if (o->check.type == UINT64 && value < 0) {
+            if ((uint64_t)value > o->check.high)
+                return false;
+        } else if (value < o->check.low || (value > 0 && (uint64_t)value > o->check.high))
+            return false;
+    }
+    return true;
+}
+
+/* A number times zero is zero, unless it is infinite or none. */
+static bool finite(const Operation *o) {
+    double sum = 0;
+    for (size_t i = 0; i < o->check.n; i++)
+        sum += real(o->check.values, (int)o->check.type, i) * 0.0;
+    return sum == 0;
+}
+
+static bool keep(const Operation *o) {
+    for (size_t i = 0; i < o->keep.n; i++) {
+        const void *given = o->keep.addresses[i];
+        Kept *kept = &o->keep.kept[i];
+        bool text = o->kind == KEEP_TEXTS;
+        size_t size = !text ? o->keep.sizes[i] : given ? strlen(given) + 1 : 1;
+        if (kept->size < size || !kept->memory) {
+            void *larger = realloc(kept->memory, size ? size : 1);
+            if (!larger)
+                return false;
+            kept->memory = larger;
+            kept->size = size;
+        }
+        if (given && size)
+            memcpy(kept->memory, given, size);
+        else if (text)
+            *(char *)kept->memory = 0;
+        o->keep.addresses[i] = kept->memory;
+    }
+    return true;
+}
+
+static bool ends(const Operation *o) { return o->kind == STEP_3 && *o->step.terminate; }
+
+static int step(Plan *plan, const Operation *o) {
+    double t = plan->time;
+    plan->unit_times[o->unit] = t;
+    int status;
+    if (o->kind == STEP_2)
+        status = ((Step2)o->step.function)(o->step.component, t, o->step.step, true);
+    else
+        status = ((Step3)o->step.function)(o->step.component, t, o->step.step, true, o->step.event_needed,
+                                           o->step.terminate, o->step.early, o->step.last_time);
+    if (status <= WARNING && !ends(o))
+        plan->unit_times[o->unit] = t + o->step.step;
+    return status;
+}
+
+static void charge(Plan *plan, const Operation *o) {
+    double now = cpu_clock();
+    plan->spent[o->unit * plan->spent_capacity + plan->n_spent[o->unit]++] = now - plan->clock;
+    plan->clock = now;
+}
+
+/* Return PAUSED if all went well, else STOPPED, and the plan tells at which operation and what that answered; ABANDONED
+ * if the units were taken from this thread while it was in a call. */
+enum outcome carry_out(Plan *plan, const Segment *segment) {
+    const Operation *all = plan->operations, *end = all + segment->end;
+    volatile int64_t *heartbeat = plan->heartbeat;
+    enum outcome outcome = PAUSED;
+    for (const Operation *o = all + segment->first; o < end; o++) {
+        int status = OK;
+        bool well = true;
+        if (o->code >= 0) {
+            heartbeat[COUNT] += 1;
+            heartbeat[DOING] = o->code;
+        }
+        switch (o->kind) {
+        case COPY:
+            if (o->copy.n == sizeof(double))
+                memcpy(o->copy.to, o->copy.from, sizeof(double));
+            else
+                memcpy(o->copy.to, o->copy.from, o->copy.n);
+            break;
+        case ACCESS_2:
+            status = ((Access2)o->access.function)(o->access.component, o->access.references, o->access.n_references,
+                                                   o->access.values);
+            break;
+        case ACCESS_3:
+            status = ((Access3)o->access.function)(o->access.component, o->access.references, o->access.n_references,
+                                                   o->access.values, o->access.n_values);
+            break;
+        case BINARIES_3:
+            status = ((Binaries3)o->access.function)(o->access.component, o->access.references, o->access.n_references,
+                                                     o->access.sizes, o->access.values, o->access.n_values);
+            break;
+        case STEP_2:
+        case STEP_3:
+            status = step(plan, o);
+            well = !ends(o);
+            break;
+        case CONVERT:
+            convert(o);
+            break;
+        case SCALE:
+            scale(o);
+            break;
+        case FITS:
+            well = fits(o);
+            break;
+        case FINITE:
+            well = finite(o);
+            break;
+        case KEEP_BYTES:
+        case KEEP_TEXTS:
+            well = keep(o);
+            break;
+        case START_CLOCK:
+            plan->clock = cpu_clock();
+            break;
+        case CHARGE:
+            charge(plan, o);
+            break;
+        }
+        if (heartbeat[TAKEN])
+            return ABANDONED;
+        if (status > WARNING || !well) {
+            plan->stopped_at = o - all;
+            plan->status = status;
+            outcome = STOPPED;
+            break;
+        }
+    }
+    heartbeat[DOING] = -1;
+    return outcome;
+}

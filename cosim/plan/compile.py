@@ -1,0 +1,41 @@
+"""Compiles the plan's loop, `cosim/plan/*.c`, for this machine; `python -m cosim.plan.compile` does it by hand.
+
+Used by `setup.py` while the package is built, where nothing but the standard library and ziglang is installed.
+"""
+
+from pathlib import Path
+
+from cosim.native_libraries import TARGETS, NativeLibraries, has_compiler, host_platform, zig_cc
+
+FOLDER = Path(__file__).parent
+SOURCES = ("carry_out.c", "cpu_clock.c", "exact_time.c", "plan.c")
+
+
+def compile_plan() -> None:
+    """Compile the library if it is missing or older than its sources; nothing on a machine that zig is not told of.
+
+    Raises:
+        CompilationError: the compiler refused or is missing, or there is no place for the library.
+    """
+    if host_platform() in TARGETS:
+        _libraries().compile(host_platform())
+
+
+def plan_library() -> "Path | None":
+    """Return the library for this machine, compiled first if it has to be and can; None if there is none.
+
+    Raises:
+        CompilationError: the compiler refused, or there is no place for the library.
+    """
+    host = host_platform()
+    if host in TARGETS and not _libraries().is_current(host) and has_compiler():
+        compile_plan()
+    return _libraries().library(host, "plan") if _libraries().is_current(host) else None
+
+
+def _libraries() -> NativeLibraries:
+    return NativeLibraries("master's plan", "plan", FOLDER, {"plan": SOURCES}, zig_cc)
+
+
+if __name__ == "__main__":
+    compile_plan()

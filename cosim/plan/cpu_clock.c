@@ -1,0 +1,24 @@
+/* The CPU time that this process has spent, in seconds: the clock that Python's `time.process_time` reads. */
+#define _POSIX_C_SOURCE 199309L
+
+#include "plan.h"
+
+#ifdef _WIN32
+#include <windows.h>
+
+static double seconds(FILETIME t) { return ((uint64_t)t.dwHighDateTime << 32 | t.dwLowDateTime) * 1e-7; }
+
+double cpu_clock(void) {
+    FILETIME created, exited, kernel, user;
+    GetProcessTimes(GetCurrentProcess(), &created, &exited, &kernel, &user);
+    return seconds(kernel) + seconds(user);
+}
+#else
+#include <time.h>
+
+double cpu_clock(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+#endif

@@ -1,0 +1,34 @@
+/* ticks * numerator / denominator, rounded once: the same bits as Python's division of whole numbers. */
+#include <math.h>
+
+#include "plan.h"
+
+typedef unsigned __int128 Wide;
+
+static const uint64_t EXACT = (uint64_t)1 << 53; /* whole numbers up to here are doubles */
+
+double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator) {
+    Wide product = (Wide)ticks * numerator;
+    if (product == 0)
+        return 0;
+    if (product <= EXACT && denominator <= EXACT)
+        return (double)(uint64_t)product / (double)denominator; /* IEEE 754 rounds a quotient of two doubles once */
+
+    Wide quotient = product / denominator;
+    Wide rest = product % denominator;
+    int shift = 0; /* the quotient is 2^shift times too large */
+    while (quotient < EXACT << 2) {
+        rest <<= 1;
+        quotient = quotient << 1 | (rest >= denominator);
+        if (rest >= denominator)
+            rest -= denominator;
+        shift++;
+    }
+    bool more = rest != 0;
+    while (quotient >> 62) { /* at least two bits more than a double holds stay, and one that tells of the others */
+        more = more || (quotient & 1);
+        quotient >>= 1;
+        shift--;
+    }
+    return ldexp((double)((uint64_t)quotient | more), -shift);
+}

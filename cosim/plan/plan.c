@@ -1,0 +1,98 @@
+/* The loop over communication points; what Python calls. The order of calls is that of grid_stepper.py. */
+#include "plan.h"
+
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef _WIN32
+#define API __declspec(dllexport)
+#else
+#define API __attribute__((visibility("default")))
+#endif
+
+API double plan_time(uint64_t ticks, uint64_t numerator, uint64_t denominator) {
+    return exact_time(ticks, numerator, denominator);
+}
+
+API void plan_free_kept(Kept *kept, int64_t n) {
+    for (int64_t i = 0; i < n; i++)
+        free(kept[i].memory);
+    memset(kept, 0, (size_t)n * sizeof *kept);
+}
+
+static enum outcome carry_out_all(Plan *plan, const Segment *segments, int64_t n, bool arriving) {
+    for (int64_t i = 0; i < n; i++) {
+        int64_t group = segments[i].group;
+        if (group >= 0) {
+            const Group *g = &plan->groups[group];
+            if (g->due != plan->tick || (arriving && g->sampled && g->acted >= plan->tick))
+                continue;
+        }
+        enum outcome outcome = carry_out(plan, &segments[i]);
+        if (outcome != PAUSED)
+            return outcome;
+    }
+    return PAUSED;
+}
+
+static enum outcome arrive(Plan *plan, int64_t last) {
+    int64_t tick = last;
+    for (int64_t i = 0; i < plan->n_groups; i++)
+        if (plan->groups[i].due < tick)
+            tick = plan->groups[i].due;
+    plan->tick = tick;
+    plan->time = exact_time((uint64_t)tick, plan->numerator, plan->denominator);
+    ((volatile double *)plan->heartbeat)[TIME] = plan->time;
+    enum outcome outcome = carry_out_all(plan, plan->arrive, plan->n_arrive, true);
+    if (outcome != PAUSED)
+        return outcome;
+    for (int64_t i = 0; i < plan->n_groups; i++)
+        if (plan->groups[i].sampled && plan->groups[i].due == tick)
+            plan->groups[i].acted = tick;
+    return tick == last ? LAST_REACHED : PAUSED;
+}
+
+static enum outcome depart(Plan *plan) {
+    enum outcome outcome = carry_out_all(plan, plan->depart, plan->n_depart, false);
+    if (outcome != PAUSED)
+        return outcome;
+    for (int64_t i = 0; i < plan->n_groups; i++)
+        if (plan->groups[i].due == plan->tick)
+            plan->groups[i].due += plan->groups[i].every;
+    return PAUSED;
+}
+
+/* Return whether the record is full: the row counts only after it is written, whenever the process may die. */
+static bool add_row(const Plan *plan, const Record *record) {
+    int64_t row = *record->filled;
+    record->time[row] = plan->time;
+    for (int64_t i = 0; i < record->n_parts; i++) {
+        const Part *part = &record->parts[i];
+        memcpy(part->rows + (size_t)row * part->bytes, part->values, part->bytes);
+    }
+    atomic_thread_fence(memory_order_release);
+    *(volatile int64_t *)record->filled = row + 1;
+    return row + 1 == record->capacity;
+}
+
+API int plan_arrive(Plan *plan, int64_t last) { return arrive(plan, last); }
+
+API int plan_depart(Plan *plan) { return depart(plan); }
+
+/* Go through at most `points` communication points, tick `last` at the latest, with a row of the record at each.
+ * Where the former call left the plan at a communication point, as all but the first of a run do, `leave` it first. */
+API int plan_run(Plan *plan, int64_t last, int64_t points, bool leave, const Record *record) {
+    enum outcome outcome = PAUSED;
+    for (int64_t i = 0; i < points && outcome == PAUSED; i++) {
+        if (leave && (outcome = depart(plan)) != PAUSED)
+            break;
+        leave = true;
+        outcome = arrive(plan, last);
+        if (outcome > PAUSED)
+            break;
+        if (record && add_row(plan, record) && outcome == PAUSED)
+            outcome = RECORD_FULL;
+    }
+    return outcome;
+}

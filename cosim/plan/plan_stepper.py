@@ -1,0 +1,171 @@
+"""Fixed steps, each unit at its own rate, on one exact grid: the same calls as by `GridStepper`, made in C."""
+
+import array
+import ctypes
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from cosim.coupling import Coupling
+from cosim.ensemble import Ensemble
+from cosim.heartbeat import Abandoned
+from cosim.plan import memory
+from cosim.plan.plan_maker import PlanMaker
+from cosim.record_block import RecordBlock
+from cosim.recorder import Recorder
+from cosim.schedule import Schedule
+from cosim.signals import Signals
+
+_STRETCH = 0.05
+"""Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""
+_LONGEST = 4096
+_LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
+_FARTHEST = 2**62
+
+Observer = Callable[[float, Signals], None]
+
+
+class PlanStepper:
+    """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
+
+    Its states are those of `GridStepper`: either goes on from the other's.
+
+    Attributes:
+        coupling: what does the same as the plan on the general path.
+    """
+
+    def __init__(self, schedule: Schedule, ensemble: Ensemble, coupling: Coupling, made: PlanMaker) -> None:
+        self._schedule, self._ensemble, self.coupling = schedule, ensemble, coupling
+        self._library, self._clock = made.library, made.has_clock
+        self._judges, self._units = made.judges, list(ensemble.instances)
+        self._members = list(made.groups.values())
+        n = len(self._units)
+        self._operations = ctypes.create_string_buffer(made.packed, len(made.packed))
+        self._groups = (memory.Group * len(made.groups))(
+            *(memory.Group(every, 0, -1, sampled) for every, sampled in made.groups)
+        )
+        self._arrive = (memory.Segment * len(made.arrive))(*made.arrive)
+        self._depart = (memory.Segment * len(made.depart))(*made.depart)
+        self._times = (ctypes.c_double * n)()
+        self._spent = (ctypes.c_double * (n * _LONGEST if self._clock else 0))()
+        self._n_spent = (ctypes.c_int64 * n)()
+        self._plan = memory.Plan(
+            operations=ctypes.addressof(self._operations),
+            arrive=self._arrive,
+            depart=self._depart,
+            groups=self._groups,
+            n_arrive=len(made.arrive),
+            n_depart=len(made.depart),
+            n_groups=len(made.groups),
+            numerator=schedule.tick.numerator,
+            denominator=schedule.tick.denominator,
+            unit_times=self._times,
+            spent=self._spent,
+            n_spent=self._n_spent,
+            spent_capacity=_LONGEST,
+            heartbeat=ensemble.heartbeat.address,
+        )
+        self._hear_times()
+
+    @property
+    def time(self) -> float:
+        """Simulated time in seconds."""
+        return self._plan.time
+
+    def arrive(self, last: int) -> bool:
+        """Go to the next tick at which a unit is due; see `Stepper`."""
+        return self._concluded(self._library.plan_arrive(self._plan, min(last, _FARTHEST))) == _LAST_REACHED
+
+    def depart(self) -> None:
+        """Step what is due at the tick."""
+        self._concluded(self._library.plan_depart(self._plan))
+
+    def run(
+        self, last: int, signals: Signals, observers: Sequence[Observer],
+        until: Callable[[], bool] | None = None, pause: Callable[[], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Go on to tick `last` as `Master.run` says; `pause` is called before observers look.
+
+        The loop itself writes the rows of a recorder that stands first among the observers. Nobody else watching, it
+        takes many communication points at once.
+        """
+        recorder = observers[0] if observers and isinstance(observers[0], Recorder) else None
+        watching = observers if recorder is None else observers[1:]
+        rows = None if recorder is None else _rows_of(recorder, signals)
+        watched = bool(watching) or until is not None or pause is not None
+        points, leave = 1, False
+        while True:
+            began = time.perf_counter()
+            outcome = self._library.plan_run(self._plan, min(last, _FARTHEST), points, leave, rows)
+            self._concluded(outcome)
+            if recorder is not None and recorder.block.filled == recorder.block.capacity:
+                recorder.flush()
+            if pause is not None:
+                pause()
+            for observe in watching:
+                observe(self.time, signals)
+            if outcome == _LAST_REACHED or (until is not None and until()):
+                break
+            leave = True
+            if not watched:
+                points = min(2 * points, _LONGEST) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return the ticks; see `Stepper`."""
+        self._tell_times()
+        grouped = list(zip(self._members, self._groups, strict=True))
+        due = {unit: group.due for units, group in grouped for unit in units}
+        acted = {unit: group.acted for units, group in grouped for unit in units if group.sampled}
+        order = [slot.unit for slot in self._schedule.slots]
+        return {
+            "tick": self._plan.tick,
+            "due": {unit: due[unit] for unit in order},
+            "acted": {slot.unit: acted[slot.unit] for slot in self._schedule.sampled},
+            "coupling": self.coupling.get_state(),
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to ticks that `get_state` gave."""
+        for units, group in zip(self._members, self._groups, strict=True):
+            group.due = state["due"][units[0]]
+            group.acted = state["acted"].get(units[0], -1)
+        self.coupling.set_state(state["coupling"])
+        self._plan.tick = state["tick"]
+        self._plan.time = self._schedule.time(state["tick"])
+        self._hear_times()
+
+    def _concluded(self, outcome: int) -> int:
+        if self._clock:
+            self._collect_cpu()
+        if outcome == _ABANDONED:
+            raise Abandoned
+        if outcome == _STOPPED:
+            self._tell_times()
+            self._judges[self._plan.stopped_at](self._plan.status, self.time)
+            raise RuntimeError(f"operation {self._plan.stopped_at} of the plan stopped it without a reason")
+        return outcome
+
+    def _collect_cpu(self) -> None:
+        for i, unit in enumerate(self._units):
+            spent = array.array("d", self._spent[i * _LONGEST : i * _LONGEST + self._n_spent[i]])
+            self._ensemble.cpu[unit].extend(spent)
+            self._n_spent[i] = 0
+
+    def _tell_times(self) -> None:
+        for instance, t in zip(self._ensemble.instances.values(), self._times, strict=True):
+            instance.time = t
+
+    def _hear_times(self) -> None:
+        for i, instance in enumerate(self._ensemble.instances.values()):
+            self._times[i] = instance.time
+
+
+def _rows_of(recorder: Recorder, signals: Signals) -> "memory.Rows":
+    """Return where a recorder's rows go; it is opened if no row has been recorded yet."""
+    if not recorder.is_open:
+        recorder.open(signals)
+    block: RecordBlock = recorder.block
+    parts = (memory.Part * len(block.parts))(
+        *(memory.Part(p.values.ctypes.data, p.rows.ctypes.data, p.values.nbytes) for p in block.parts)
+    )
+    return memory.Rows(block.counters.ctypes.data, block.time.ctypes.data, block.capacity, parts, len(block.parts))

@@ -1,0 +1,149 @@
+"""Runs a command in a child process, so that a unit which ends its process does not end what tells of it.
+
+Only where processes can be forked, thus not on Windows. What is imported here is loaded before every run.
+"""
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from cosim.heartbeat import Heartbeat
+from cosim.stillness import Stillness
+
+_LOOK = 0.25  # s
+_GRACE = 5.0
+"""How much later than the child itself the parent gives up a call, s; only a child that cannot act is late."""
+
+_ORDERS = (
+    () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
+)
+"""Signals that ask a process to end: no crash."""
+
+heartbeat = Heartbeat()
+"""Of the run in this process; a parent and its child share it."""
+
+_in_child = False
+
+
+def heartbeat_of_run() -> Heartbeat:
+    """Return the heartbeat that a run in this process has to use: the one that the parent reads, if there is one."""
+    global heartbeat
+    if not _in_child:
+        heartbeat = Heartbeat()
+    return heartbeat
+
+
+def can_supervise() -> bool:
+    """Return whether this process can be forked: the system does it, and no thread would be lost."""
+    return hasattr(os, "fork") and threading.active_count() == 1
+
+
+def supervise(command: Callable[[], Any]) -> NoReturn:
+    """Run a command in a child process and end with its status; if it dies, tell how and complete what it left.
+
+    The child is a process group of its own: the parent alone hears of Ctrl-C and passes on what it hears, so that the
+    child hears of each once. If the parent dies, so does the child.
+    """
+    began = time.monotonic()
+    alive, lives = os.pipe()
+    parent_alive, parent_lives = os.pipe()
+    heard = [signal.SIGINT, signal.SIGTERM, signal.SIGTSTP, signal.SIGCONT]
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
+    child = os.fork()
+    if child == 0:
+        global _in_child
+        _in_child = True
+        os.close(alive)
+        os.close(parent_lives)
+        os.setpgid(0, 0)
+        signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # a group in the background may write to the terminal
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        threading.Thread(target=_die_with_parent, args=(parent_alive,), daemon=True).start()
+        run_to_end(command)
+    os.close(lives)
+    os.close(parent_alive)
+    with contextlib.suppress(OSError):  # it has done so itself, or is gone
+        os.setpgid(child, child)
+    _pass_on(child)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    _end_as(*_wait(child, alive), began)
+
+
+def run_to_end(command: Callable[[], Any]) -> NoReturn:
+    """Run a command and end this process with its status."""
+    status = 1
+    try:
+        command()
+        status = 0
+    except SystemExit as e:
+        status = e.code if isinstance(e.code, int) else int(e.code is not None)
+    finally:
+        heartbeat.status = status
+    if heartbeat.abandoned:  # a thread is still in a unit's call: the interpreter could not end
+        leave(status)
+    sys.exit(status)
+
+
+def leave(status: int) -> NoReturn:
+    """End this process at once, in order."""
+    heartbeat.status = status
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(status)
+
+
+def _die_with_parent(parent_alive: int) -> None:
+    os.read(parent_alive, 1)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _pass_on(child: int) -> None:
+    def tell(number: int, _frame: Any) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child, number)
+
+    def stop(_number: int, _frame: Any) -> None:
+        tell(signal.SIGSTOP, None)
+        os.kill(os.getpid(), signal.SIGSTOP)
+        tell(signal.SIGCONT, None)
+
+    signal.signal(signal.SIGINT, tell)
+    signal.signal(signal.SIGTERM, tell)
+    if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL:
+        signal.signal(signal.SIGTSTP, stop)
+
+
+def _wait(child: int, alive: int) -> tuple[int, bool]:
+    """Return the child's status as `os.waitpid` has it, and whether it was ended because a call did not return."""
+    stillness = Stillness(heartbeat, 2 * _LOOK)
+    hung = False
+    while True:
+        gone, _, _ = select.select([alive], [], [], _LOOK)
+        pid, status = os.waitpid(child, 0 if gone else os.WNOHANG)
+        if pid:
+            return status, hung
+        if heartbeat.limit and stillness.look() >= heartbeat.limit + _GRACE:
+            hung = True
+            os.kill(child, signal.SIGKILL)
+
+
+def _end_as(status: int, hung: bool, began: float) -> NoReturn:
+    """End as the child did; where it was not done, tell what it died of."""
+    number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else None
+    if number is not None and number in _ORDERS:
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+    if heartbeat.status is not None:
+        sys.exit(heartbeat.status if number is not None else os.WEXITSTATUS(status))
+    from scenarios.death import tell_death
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    code = 0 if number is not None else os.WEXITSTATUS(status)
+    sys.exit(tell_death(heartbeat, number, code, time.monotonic() - began, hung=hung))

@@ -1,0 +1,81 @@
+"""Runs a system as a compiled plan and on the general path, and tells what came of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from cosim.exceptions import UnitFailure
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.plan.plan_stepper import PlanStepper
+from cosim.recorder import Recorder
+from cosim.signals import Signals
+from cosim.system import System
+from cosim.variable import Kind
+
+Build = Callable[[], System]
+
+PLAIN = (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL)
+"""The algorithms that a plan knows."""
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What came of a run: the record's bytes, what an observer saw, and the failure in which it ended."""
+
+    record: bytes
+    seen: tuple[object, ...] = ()
+    failure: UnitFailure | None = None
+
+
+def recorded(
+    build: Build, stops: Sequence[Fraction], folder: Path, *, compiled: bool,
+    algorithm: Algorithm = Algorithm.GAUSS_SEIDEL, watched: bool = False,
+) -> Ran:  # fmt: skip
+    """Run a system from stop to stop; watched, Python looks at all signals at each communication point."""
+    seen: list[object] = []
+    system = build()
+
+    def look(t: float, signals: Signals) -> None:
+        seen.append((t, everything(system, signals)))
+
+    file = folder / f"{algorithm.value}-{compiled}-{watched}.parquet"
+    failure: UnitFailure | None = None
+    with Master(system, MasterOptions(algorithm=algorithm, compiled=compiled)) as master:
+        assert isinstance(master.stepper, PlanStepper) == compiled
+        with Recorder(file) as recorder:
+            try:
+                for stop in stops:
+                    master.run(stop, [recorder, look] if watched else [recorder])
+            except UnitFailure as e:
+                failure = e
+        seen.append((master.time, everything(system, master.signals)))
+    return Ran(file.read_bytes(), tuple(seen), failure)
+
+
+def everything(system: System, signals: Signals) -> tuple[object, ...]:
+    """Return all outputs, texts and pictures too."""
+    return tuple(
+        signals.text(f"{name}.{port}") if p.kind is Kind.STRING else signals[f"{name}.{port}"].tobytes()
+        for name, unit in system.units.items()
+        for port, p in unit.description.outputs.items()
+    )
+
+
+def expect_alike(
+    build: Build, stop: Fraction, folder: Path, algorithm: Algorithm, stops: Sequence[Fraction] = ()
+) -> Ran:
+    """Expect that both paths, watched or not, give the same; return it."""
+    stops = stops or [stop]
+    general = recorded(build, stops, folder, compiled=False, algorithm=algorithm, watched=True)
+    watched = recorded(build, stops, folder, compiled=True, algorithm=algorithm, watched=True)
+    alone = recorded(build, stops, folder, compiled=True, algorithm=algorithm)
+    assert watched.record == general.record
+    assert alone.record == general.record
+    assert watched.seen == general.seen
+    assert alone.seen == general.seen[-1:]
+    for ran in (watched, alone):
+        assert type(ran.failure) is type(general.failure)
+        assert ran.failure is None or repr(vars(ran.failure)) == repr(vars(general.failure))
+    return alone

@@ -1,0 +1,94 @@
+"""A run keeps to the wall clock by absolute deadlines, and tells of those that it missed; the clock here is a list."""
+
+from fractions import Fraction
+
+import pytest
+from native_units import native_fmu
+
+from cosim.master import Master
+from cosim.master_options import MasterOptions
+from cosim.pacing import Pacer, PaceReport
+from cosim.system import System
+
+
+class Clock:
+    """A clock that goes on only when somebody sleeps, or by what work takes."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.slept: list[float] = []
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.slept.append(seconds)
+        self.now += seconds * 1.01  # as real sleeps do, it ends late
+
+
+def paced(work: list[float], pace: float = 1.0) -> tuple[PaceReport, list[float], Clock]:
+    """Run points every 0.05 s that take so long to compute; return also when each was let pass."""
+    clock = Clock()
+    pacer = Pacer(pace, clock, clock.sleep)
+    pacer.start(0.0)
+    pacer.wait(0.0, lambda: False)
+    passed: list[float] = []
+    for k, seconds in enumerate(work):
+        clock.now += seconds
+        pacer.wait(0.05 * (k + 1), lambda: False)
+        passed.append(clock.now - 100.0)
+    return pacer.report, passed, clock
+
+
+def test_points_pass_at_their_own_times_without_drift():
+    report, passed, _ = paced([0.01] * 100)
+    assert passed == pytest.approx([0.05 * k for k in range(1, 101)], abs=0.001)
+    assert passed[-1] >= 5.0
+    assert (report.deadlines, report.missed, report.largest_lateness, report.latest_at) == (100, 0, 0.0, None)
+    assert str(report) == "none of 100"
+
+
+def test_a_pace_of_two_halves_the_wall_time():
+    _, passed, _ = paced([0.001] * 10, pace=2.0)
+    assert passed == pytest.approx([0.025 * k for k in range(1, 11)], abs=0.001)
+
+
+def test_a_missed_deadline_is_counted_and_the_others_stay_where_they_are():
+    report, passed, _ = paced([0.01, 0.01, 0.12, 0.01, 0.01, 0.01])
+    assert passed[-1] == pytest.approx(0.3, abs=0.001)
+    assert (report.deadlines, report.missed) == (6, 2)  # 0.12 s of work at the third take until 0.22 s, then 0.23 s
+    assert report.largest_lateness == pytest.approx(0.07, abs=0.001)
+    assert report.latest_at == pytest.approx(0.15)
+    assert report.share == pytest.approx(1 / 3)
+    assert "2 of 6 (33.3%), at most 7" in str(report)
+
+
+def test_it_sleeps_until_the_deadline_at_once_and_not_in_a_loop():
+    _, _, clock = paced([0.01] * 100)
+    assert len(clock.slept) == 100
+
+
+def test_a_wait_ends_when_the_run_is_to_end():
+    clock = Clock()
+    pacer = Pacer(1e-6, clock, clock.sleep)
+    pacer.start(0.0)
+    pacer.wait(1.0, lambda: len(clock.slept) == 3)
+    assert len(clock.slept) == 3
+
+
+def test_the_master_lets_each_communication_point_wait():
+    s = System()
+    s.add("unit", native_fmu("trivial"), period=Fraction(1, 100))
+    clock = Clock()
+    seen: list[tuple[float, float]] = []
+    with Master(s, MasterOptions(pace=0.5)) as master:
+        master.pacer = Pacer(0.5, clock, clock.sleep)
+        master.run(Fraction(1, 10), [lambda t, _: seen.append((t, clock.now - 100.0))])
+    assert [wall for _, wall in seen] == pytest.approx([2 * t for t, _ in seen], abs=0.001)
+    assert master.pacer.report.deadlines == 10
+
+
+@pytest.mark.parametrize("pace", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_pace_that_is_none_is_refused(pace: float):
+    with pytest.raises(ValueError, match="above 0 is right"):
+        MasterOptions(pace=pace)

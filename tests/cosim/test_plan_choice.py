@@ -1,0 +1,95 @@
+"""The master takes the compiled plan where it can, and says in the log why where it cannot."""
+
+import ctypes
+import logging
+from fractions import Fraction
+
+import pytest
+from native_units import native_fmu
+
+from cosim.extrapolation import Extrapolation
+from cosim.grid_stepper import GridStepper
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.native_libraries import CompilationError
+from cosim.plan import choice, memory
+from cosim.plan.plan_stepper import PlanStepper
+from cosim.system import System
+
+
+def build(period: Fraction = Fraction(1, 10)) -> System:
+    s = System()
+    s.add("sine", native_fmu("sine", 2), period=period)
+    return s
+
+
+def told(options: MasterOptions, caplog: pytest.LogCaptureFixture, period: Fraction = Fraction(1, 10)) -> list[str]:
+    with caplog.at_level(logging.INFO, "cosim.plan"), Master(build(period), options) as master:
+        assert isinstance(master.stepper, GridStepper)
+        master.run(Fraction(1))
+    return [r.getMessage() for r in caplog.records]
+
+
+def test_a_plain_system_is_compiled(caplog: pytest.LogCaptureFixture):
+    with caplog.at_level(logging.INFO, "cosim.plan"), Master(build()) as master:
+        assert isinstance(master.stepper, PlanStepper)
+    assert caplog.records == []
+
+
+@pytest.mark.parametrize(
+    ("options", "period", "why"),
+    [
+        (MasterOptions(compiled=False), Fraction(1, 10), "the options ask for none"),
+        (MasterOptions(extrapolation=Extrapolation.LINEAR), Fraction(1, 10), "inputs are extrapolated"),
+        (MasterOptions(algorithm=Algorithm.NEWTON), Fraction(1, 10), "the coupling is newton"),
+        (MasterOptions(), Fraction(2**64, 2**65 + 1), "a tick of 18446744073709551616/36893488147419103233 s is too"),
+    ],
+)
+def test_what_a_plan_cannot_do(options: MasterOptions, period: Fraction, why: str, caplog: pytest.LogCaptureFixture):
+    (line,) = told(options, caplog, period)
+    assert line.startswith(f"no compiled plan: {why}")
+
+
+def test_a_loop_that_is_gone_over_again(caplog: pytest.LogCaptureFixture):
+    s = System()
+    a, b = s.add("a", native_fmu("gain", 2), a=0.5), s.add("b", native_fmu("gain", 3), a=0.5, b=1.0)
+    s.connect(a.y.y, b.u.u)
+    s.connect(b.y.y, a.u.u)
+    with caplog.at_level(logging.INFO, "cosim.plan"), Master(s) as master:
+        assert isinstance(master.stepper, GridStepper)
+    assert [r.getMessage() for r in caplog.records] == ["no compiled plan: units make a loop"]
+    with Master(s, MasterOptions(algorithm=Algorithm.JACOBI)) as master:
+        assert isinstance(master.stepper, PlanStepper)
+
+
+def test_without_its_library(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture):
+    def no_library() -> ctypes.CDLL | None:
+        return None
+
+    monkeypatch.setattr(choice, "loop", no_library)
+    assert told(MasterOptions(), caplog) == ["no compiled plan: its library is not compiled for this machine"]
+
+
+def test_a_compiler_that_refuses_does_not_keep_a_system_from_running(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    def refuse() -> None:
+        raise CompilationError("master's plan", "some-machine", "no space left")
+
+    monkeypatch.setattr(memory, "plan_library", refuse)
+    memory.loop.cache_clear()
+    try:
+        lines = told(MasterOptions(), caplog)
+    finally:
+        memory.loop.cache_clear()
+    assert lines[0] == "the master's plan does not compile for some-machine:\nno space left"
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_the_cpu_time_of_each_step_is_taken_where_it_is_asked_for(compiled: bool):
+    for asked in (True, False):
+        with Master(build(), MasterOptions(compiled=compiled, cpu_times=asked)) as master:
+            master.run(Fraction(1))
+            master.run(Fraction(500))
+            assert len(master.cpu["sine"]) == (5000 if asked else 0)
+            assert sum(master.cpu["sine"]) < 10.0

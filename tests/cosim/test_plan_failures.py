@@ -1,0 +1,98 @@
+"""A unit that fails in a compiled plan is told as on the general path, and the record ends with the last good step."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from both_paths import PLAIN, expect_alike, recorded
+from fmu_of import FmuOf
+from native_units import native_fmu
+
+from cosim.exceptions import UnitFailure
+from cosim.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
+from cosim.master_options import Algorithm
+from cosim.system import System
+
+
+@pytest.mark.parametrize("algorithm", PLAIN)
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("unit", "failure"),
+    [("errs", UnitError), ("fatal", UnitFatal), ("gives_nan", NotFinite), ("gives_infinity", NotFinite)],
+)
+def test_failures_in_the_midst_of_a_run(
+    unit: str, failure: type[UnitFailure], fmi: int, algorithm: Algorithm, tmp_path: Path
+):
+    def build() -> System:
+        s = System()
+        faulty = s.add("faulty", native_fmu(unit, fmi), at=4.05)
+        reader = s.add("reader", native_fmu("integrator", 3))
+        s.connect(faulty.y.y, reader.u.u)
+        return s
+
+    ran = expect_alike(build, Fraction(10), tmp_path, algorithm)
+    assert isinstance(ran.failure, failure)
+    file = tmp_path / f"{algorithm.value}-True-False.parquet"
+    assert pq.read_table(file)["time"].to_pylist() == [k / 10 for k in range(41)]
+
+
+def test_numbers_that_cannot_be_pass_where_nobody_reads_them(tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("faulty", native_fmu("gives_nan", 2))
+        return s
+
+    assert expect_alike(build, Fraction(1), tmp_path, Algorithm.JACOBI).failure is None
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_step_that_is_discarded(fmi: int, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("short", native_fmu("discards", fmi), period=Fraction(1), longest=0.5)
+        return s
+
+    assert isinstance(expect_alike(build, Fraction(10), tmp_path, Algorithm.JACOBI).failure, UnitDiscarded)
+
+
+def test_an_exception_in_a_block_is_told_with_its_log(fmu: FmuOf, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("steady", fmu("Counter"), sampled=True)
+        s.add("failing", fmu("Counter"), fails_at=5)
+        return s
+
+    ran = recorded(build, [Fraction(1)], tmp_path, compiled=True)
+    assert ran.failure is not None
+    assert ran.failure.cause.startswith("failing: fmi3DoStep at t = 0.4 s: ")
+    assert any("count 5 was asked to fail" in line for line in ran.failure.log)
+    assert expect_alike(build, Fraction(1), tmp_path, Algorithm.GAUSS_SEIDEL).failure is not None
+
+
+@pytest.mark.parametrize("factor", [3, -3])
+@pytest.mark.parametrize("algorithm", PLAIN)
+def test_a_number_that_has_become_too_large_for_its_reader(
+    fmu: FmuOf, factor: int, algorithm: Algorithm, tmp_path: Path
+):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Tally"), factor=factor), s.add("b", fmu("Tally"))
+        s.connect(a.y.power, b.u.small)
+        return s
+
+    failure = expect_alike(build, Fraction(3), tmp_path, algorithm).failure
+    assert failure is not None
+    assert f"a.power is {factor**5}, which does not fit Int8" in str(failure)
+
+
+def test_a_negative_number_has_no_place_where_signs_have_none(fmu: FmuOf, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Tally"), factor=-1), s.add("b", fmu("Tally"))
+        s.connect(a.y.power, b.u.whole)
+        return s
+
+    failure = expect_alike(build, Fraction(3), tmp_path, Algorithm.JACOBI).failure
+    assert failure is not None
+    assert "a.power is -1, which does not fit UInt64" in str(failure)

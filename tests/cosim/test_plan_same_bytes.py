@@ -1,0 +1,161 @@
+"""A compiled plan gives the bytes of the general path, whatever flows between units, and however they are timed."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from both_paths import PLAIN, expect_alike
+from fmu_of import FmuOf
+from native_units import native_fmu
+
+from cosim.linear import Linear
+from cosim.master import Master
+from cosim.master_options import Algorithm
+from cosim.signal_buffer import SignalBuffer
+from cosim.system import System
+
+SECOND = Fraction(1)
+algorithms = pytest.mark.parametrize("algorithm", PLAIN)
+
+
+def two_masses(fmi: tuple[int, int], *, slower: int = 1, step: Fraction = Fraction(1, 64)) -> System:
+    """Two masses and the spring between them; the second mass steps less often."""
+    s = System()
+    first = s.add("first", native_fmu("mass", fmi[0]), period=step, k=10.0, x0=1.0)
+    second = s.add("second", native_fmu("mass", fmi[1]), period=step * slower, m=2.0, k=3.0)
+    spring = s.add("spring", native_fmu("spring", fmi[1]), period=step, k=5.0, d=0.5)
+    for mass, i in ((first, 1), (second, 2)):
+        s.connect(mass.y.x, getattr(spring.u, f"x{i}"))
+        s.connect(mass.y.v, getattr(spring.u, f"v{i}"))
+        s.connect(getattr(spring.y, f"f{i}"), mass.u.f)
+    return s
+
+
+@algorithms
+@pytest.mark.parametrize("fmi", [(2, 2), (3, 3), (2, 3)])
+def test_native_units(fmi: tuple[int, int], algorithm: Algorithm, tmp_path: Path):
+    expect_alike(lambda: two_masses(fmi), 3 * SECOND, tmp_path, algorithm)
+
+
+@algorithms
+def test_units_at_rates_of_their_own(algorithm: Algorithm, tmp_path: Path):
+    expect_alike(lambda: two_masses((2, 3), slower=7, step=Fraction(1, 300)), SECOND, tmp_path, algorithm)
+
+
+def test_a_record_longer_than_the_block_that_its_rows_wait_in(tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("sine", native_fmu("sine", 2), period=Fraction(1, 1000))
+        return s
+
+    expect_alike(build, 10 * SECOND, tmp_path, Algorithm.JACOBI)
+
+
+@algorithms
+def test_a_stop_between_communication_points(algorithm: Algorithm, tmp_path: Path):
+    expect_alike(lambda: two_masses((3, 3), step=Fraction(3, 10)), SECOND, tmp_path, algorithm)
+
+
+@algorithms
+def test_a_second_run_goes_on_where_the_first_ended(algorithm: Algorithm, tmp_path: Path):
+    stops = [SECOND, SECOND, Fraction(3, 2), 2 * SECOND]
+    expect_alike(lambda: two_masses((2, 3), slower=3), SECOND, tmp_path, algorithm, stops)
+
+
+@algorithms
+def test_sampled_units_act_once_where_one_run_ends_and_another_begins(fmu: FmuOf, algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("sampled", fmu("Counter"), sampled=True)
+        s.add("other", native_fmu("ramp", 2), period=Fraction(1, 5))
+        return s
+
+    expect_alike(build, SECOND, tmp_path, algorithm, [Fraction(1, 2), Fraction(1, 2), SECOND])
+
+
+@algorithms
+def test_units_of_measurement_on_their_way(algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        source = s.add("sine", native_fmu("sine", 2), a=40.0, w=3.0, b=20.0)
+        other, si = s.add("other", native_fmu("workshop", 3)), s.add("si", native_fmu("si", 2))
+        for name in ("angle", "length", "temperature"):
+            s.connect(source.y.y, getattr(other.u, f"{name}_in"))
+            s.connect(getattr(other.y, name), getattr(si.u, f"{name}_in"))
+        reader = s.add("reader", native_fmu("integrator", 2))
+        s.connect(source.y.y, reader.u.u, Linear(0.3, 0.7))
+        return s
+
+    expect_alike(build, 5 * SECOND, tmp_path, algorithm)
+
+
+@algorithms
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_every_kind_of_port_sampled_and_pictures(fmu: FmuOf, fmi: int, algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        counter = s.add("counter", fmu("Counter"), period=Fraction(1, 30), sampled=True)
+        echo = s.add("echo", fmu("Echo"), period=Fraction(1, 20))
+        passer = s.add("passer", native_fmu("discrete_passer", fmi), period=Fraction(1, 10))
+        for name in ("n", "odd", "light", "pair", "picture"):
+            s.connect(getattr(counter.y, name), getattr(echo.u, name))
+        s.connect(echo.y.odd_back, passer.u.truth_in)
+        s.connect(echo.y.n_back, passer.u.count_in)
+        return s
+
+    expect_alike(build, SECOND, tmp_path, algorithm)
+
+
+@algorithms
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_texts_that_become_longer(fmu: FmuOf, fmi: int, algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Diary", fmi)), s.add("b", fmu("Diary", 3), mark="bbb")
+        s.connect(a.y.text, b.u.heard)
+        s.connect(b.y.text, a.u.heard)
+        return s
+
+    ran = expect_alike(build, 2 * SECOND, tmp_path, algorithm)
+    assert len(str(ran.seen)) > 200
+
+
+@algorithms
+def test_bytes_of_native_units(algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        first = s.add("first", native_fmu("binary_passer", 3), u=b"some bytes\0, a zero among them")
+        second = s.add("second", native_fmu("binary_passer", 3), period=Fraction(1, 5))
+        s.connect(first.y.y, second.u.u)
+        return s
+
+    expect_alike(build, SECOND, tmp_path, algorithm)
+
+
+@algorithms
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_numbers_of_other_widths(fmu: FmuOf, fmi: int, algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Tally", 3), factor=-3), s.add("b", fmu("Tally", fmi), factor=2)
+        s.connect(a.y.positive, b.u.whole)
+        s.connect(a.y.third, b.u.single)
+        s.connect(a.y.single_third, b.u.double)
+        s.connect(b.y.positive, a.u.whole)
+        s.connect(b.y.third, a.u.double)
+        return s
+
+    assert expect_alike(build, 2 * SECOND, tmp_path, algorithm).failure is None
+
+
+def test_what_a_unit_gave_does_not_stay_in_its_memory():
+    s = System()
+    s.add("passer", native_fmu("binary_passer", 3), u=b"some bytes")
+    with Master(s) as master:
+        master.run(SECOND)
+        (getter,) = master.ensemble.instances["passer"].getters
+        kept = int(getter.native.arrays[0][0])
+        SignalBuffer.__call__(getter)  # without the copy that an OutputBuffer makes
+        assert int(getter.native.arrays[0][0]) != kept
+        getter.native.arrays[0][0] = kept
+        assert master.signals["passer.y"].tobytes() == b"some bytes"
