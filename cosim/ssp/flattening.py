@@ -13,11 +13,20 @@ from cosim.ssp.given_values import Given
 from cosim.ssp.parameter_set import SspValue
 from cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
 from cosim.units import UNKNOWN, Unit
+from cosim.variable import Kind
 
 _log = logging.getLogger(__name__)
 
 _GIVES = {"output", "calculatedParameter"}
 _TAKES = {"input", "parameter"}
+
+_WHOLE = (Kind.INTEGER, Kind.ENUMERATION)
+_KINDS: Mapping[str, tuple[Kind, ...]] = {
+    **dict.fromkeys(("Real", "Float32", "Float64"), (Kind.REAL,)),
+    **dict.fromkeys(("Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))), _WHOLE),
+    **{kind.value.capitalize(): (kind,) for kind in (Kind.BOOLEAN, Kind.STRING, Kind.ENUMERATION, Kind.BINARY)},
+}
+"""What a connector's type may be in an FMU."""
 
 Node = tuple[str, str]
 """A connector: the path of its element, empty for the outermost system, and its name."""
@@ -134,6 +143,9 @@ class _Flattening:
             port = found[0]
             if port.causality.value != c.kind:
                 told = f"{path}.{c.name} is an {c.kind} here and an {port.causality.value} in its FMU"
+                self.flat.faults.append(f"{c.where}{told}")
+            if c.type_name in _KINDS and port.kind not in _KINDS[c.type_name]:
+                told = f"{path}.{c.name} is of type {c.type_name} here and {port.type_name} in its FMU"
                 self.flat.faults.append(f"{c.where}{told}")
             if _differ(c.unit, port.unit):
                 told = f"{path}.{c.name} is in {c.unit.symbol} here and in {port.unit.symbol} in its FMU"

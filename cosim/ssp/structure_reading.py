@@ -50,7 +50,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
         raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")
     reader = _Reader(archive, part, read_units(part, part.root, "ssd"))
     system = reader.system(systems[0])
-    return SspStructure(part.text(part.root, "name"), part.root.get("version"), system, _stop(part))
+    return SspStructure(part.text(part.root, "name"), system, _stop(part))
 
 
 def _stop(part: SspPart) -> float | None:
