@@ -49,6 +49,13 @@ def test_an_output_clock_lets_another_tick():
     assert rows[2.0] == (21, 7)
 
 
+def test_an_output_is_reached_while_its_output_clock_ticks():
+    s = System()
+    s.add("fast", native_fmu("counter_tenths"), every=3)
+    rows = seen(s, Fraction(2), "fast.count", "fast.carried")
+    assert all(carried == count // 3 for count, carried in rows.values())
+
+
 def test_ticks_go_through_a_chain_at_one_instant():
     s = System()
     a, b, c = (

@@ -42,7 +42,7 @@ def test_clocked_ports_need_event_mode():
     s = System()
     s.add("a", native_fmu("counter_tenths", hasEventMode=False))
     s.add("b", native_fmu("counter_thirds"), sampled=True)
-    reached = "count, increment can be reached only while a clock ticks, in event mode"
+    reached = "carried, count, increment can be reached only while a clock ticks, in event mode"
     assert faults_of(s) == (
         f"a: {reached}, which its FMU does not have (hasEventMode)",
         f"b: {reached}; it cannot be placed as a sampled unit, which runs without",

@@ -1,5 +1,6 @@
 """A ball bounces: its impacts are communication points of all units."""
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -98,6 +99,22 @@ def test_a_unit_that_cannot_go_back_stays_at_the_end_of_its_step(caplog: pytest.
     told = [r.message for r in caplog.records if "fixed" in r.message]
     assert told == ["fixed cannot go back to the event at t = 0.451523641 s: it stays at the end of its step"]
     assert rows[2.0][1] == pytest.approx(2.0)
+
+
+def test_a_unit_that_varies_its_step_waits_for_an_impact_that_is_known():
+    """It need not be able to go back."""
+    s = System()
+    ball = s.add("ball", native_fmu("ball"), period=TENTH, announces=True)
+    integral = s.add("integral", native_fmu("integrator", canGetAndSetFMUState=False, canSerializeFMUState=False))
+    s.connect(ball.y.v, integral.u.u)
+    rows = seen(s, Fraction(1), "ball.v", "integral.x", options=MasterOptions(algorithm=Algorithm.JACOBI))
+    times = list(rows)
+    steps = itertools.pairwise(times)
+    expected = [0.0]
+    for begin, end in steps:
+        expected.append(expected[-1] + rows[begin][0] * (end - begin))
+    assert len(times) == 12
+    assert [x for _, x in rows.values()] == pytest.approx(expected, abs=1e-12)
 
 
 def test_each_unit_keeps_its_rate():
