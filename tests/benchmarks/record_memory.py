@@ -1,6 +1,6 @@
-"""Records a ring of 50 units: `python record_memory.py FMU`; prints how far the peak of resident memory grew, in MB.
+"""Records a ring of 50 units: `python record_memory.py FMU VALUES`; prints how far the peak of resident memory grew.
 
-From a run that is warm until the master is left and the record complete.
+In MB, from a run that is warm until the master is left and the record complete.
 """
 
 import resource
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ring_hosts import recorded
 
-UNITS, VALUES, WARM = 50, 10_000_000, 500_000
+UNITS, WARM = 50, 500_000
 
 
 def peak() -> float:
@@ -18,15 +18,15 @@ def peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
-def main(fmu: Path) -> None:
+def main(fmu: Path, values: int) -> None:
     """Measure."""
     with tempfile.TemporaryDirectory() as folder:
         with recorded(UNITS, fmu, Path(folder)) as ring:
             ring.advance(WARM // UNITS)
             before = peak()
-            ring.advance((VALUES - WARM) // UNITS)
+            ring.advance((values - WARM) // UNITS)
         print(peak() - before)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), int(sys.argv[2]))

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
@@ -40,77 +41,78 @@ HOSTS = {
 TARGET, TARGET_RECORDED = 0.05, 0.1
 """Most us of CPU per unit and macro step."""
 WIRING = 2.0
-"""Most seconds of CPU for 1,000 units and 5,000 connections, before anything is loaded."""
+"""Most seconds of CPU for 1,000 units and 5,000 connections, until they are loaded and initialised."""
 
 
-def script(name: str, environment: dict[str, str], *arguments: object) -> float:
-    """Return the number that a script of this folder prints last."""
+def script(name: str, environment: dict[str, str], *arguments: object) -> Any:
+    """Return what a script of this folder prints last."""
     command = [sys.executable, str(Path(__file__).with_name(name)), *map(str, arguments)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=170, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    return float(json.loads(done.stdout.splitlines()[-1]))
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 @pytest.mark.parametrize("n", [2, 10, 50])
 def test_ring(benchmark: BenchmarkFixture, environment: dict[str, str], native_fmu: NativeFmu, n: int) -> None:
-    spent: dict[str, float] = {}
+    spent: dict[str, dict[str, float]] = {}
 
     def measure() -> None:
         for name, host in HOSTS.items():
             spent[name] = script("ring_hosts.py", environment, host, n, native_fmu("trivial", 3 if "3" in name else 2))
 
     benchmark.pedantic(measure)
-    print(f"\nring of {n} units, us of CPU per unit and macro step")
-    for name, microseconds in spent.items():
-        print(f"  {name:24}{microseconds:8.3f}")
-    benchmark.extra_info.update(spent)
-    assert spent["ours, FMI 2"] <= TARGET
-    assert spent["ours, FMI 3"] <= TARGET
-    assert spent["ours, recorded"] <= TARGET_RECORDED
+    print(f"\nring of {n} units, us of CPU per unit and macro step: stepping; ending, files completed")
+    for name, costs in spent.items():
+        print(f"  {name:24}{costs['step']:8.3f}{costs['end']:8.3f}")
+    benchmark.extra_info.update({name: costs["step"] for name, costs in spent.items()})
+    assert spent["ours, FMI 2"]["step"] <= TARGET
+    assert spent["ours, FMI 3"]["step"] <= TARGET
+    assert spent["ours, recorded"]["step"] <= TARGET_RECORDED
 
 
 def test_memory_of_a_long_record(
     benchmark: BenchmarkFixture, environment: dict[str, str], native_fmu: NativeFmu
 ) -> None:
-    """10^7 values are 76 MB."""
-    fmu = native_fmu("trivial", 2)
-    grown: float = benchmark.pedantic(script, args=("record_memory.py", environment, fmu))  # pyright: ignore
-    print(f"\na record of 10^7 values: the peak of resident memory grew by {grown:.1f} MB")
-    assert grown < 10.0
+    """However long: 3 * 10^7 values are 229 MB. What it takes are the rows that Parquet is written of at once."""
+    fmu, grown = native_fmu("trivial", 2), dict[int, float]()
+
+    def measure() -> None:
+        grown.update({n: script("record_memory.py", environment, fmu, n) for n in (10**7, 3 * 10**7)})
+
+    benchmark.pedantic(measure)
+    told = ", ".join(f"{megabytes:.0f} MB for {n:.0e} values" for n, megabytes in grown.items())
+    print(f"\nrecording, the peak of resident memory grew by {told}")
+    benchmark.extra_info.update({f"{n:.0e} values": megabytes for n, megabytes in grown.items()})
+    assert grown[3 * 10**7] < 100.0
+
+
+def wiring(fmu: Path) -> dict[str, float]:
+    """Return what it costs to wire 1,000 units, each fed by the five before it, in seconds of CPU."""
+    marks = [time.process_time()]
+    system = System()
+    units = [system.add(f"u{i}", fmu, period=Fraction(1, 100)) for i in range(1000)]
+    for i, unit in enumerate(units):
+        for j in range(5):
+            system.connect(units[i - 1 - j].y.y, getattr(unit.u, f"u{j + 1}"))
+    marks.append(time.process_time())
+    system.check()
+    marks.append(time.process_time())
+    Schedule(system)
+    marks.append(time.process_time())
+    with Master(system) as master:
+        marks.append(time.process_time())
+        master.run(Fraction(1, 100))
+        assert [float(master.signals[f"u{i}.y"]) for i in range(7)] == [1, 2, 4, 8, 16, 32, 63]
+    stages = ("adding and connecting", "checking", "schedule", "checked and scheduled again, loaded, initialised")
+    return {what: after - before for what, before, after in zip(stages, marks[:-1], marks[1:], strict=True)}
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_wiring(benchmark: BenchmarkFixture, native_fmu: NativeFmu, fmi: int) -> None:
-    """1,000 units, each fed by the five before it."""
-    spent: dict[str, float] = {}
-    began = time.process_time()
-
-    def note(what: str) -> None:
-        nonlocal began
-        ended = time.process_time()
-        spent[what] = ended - began
-        began = ended
-
-    def wire() -> None:
-        fmu = native_fmu("hub", fmi)
-        note("building the FMU")
-        system = System()
-        units = [system.add(f"u{i}", fmu, period=Fraction(1, 100)) for i in range(1000)]
-        for i, unit in enumerate(units):
-            for j in range(5):
-                system.connect(units[i - 1 - j].y.y, getattr(unit.u, f"u{j + 1}"))
-        note("adding and connecting")
-        system.check()
-        note("checking")
-        Schedule(system)
-        note("schedule")
-        with Master(system) as master:
-            note("loading, initialising")
-            master.run(Fraction(1, 100))
-            assert [float(master.signals[f"u{i}.y"]) for i in range(7)] == [1, 2, 4, 8, 16, 32, 63]
-
-    benchmark.pedantic(wire)
+    runs: list[dict[str, float]] = []
+    benchmark.pedantic(lambda: runs.append(wiring(native_fmu("hub", fmi))), rounds=3)
+    spent = min(runs, key=lambda run: sum(run.values()))
     told = ", ".join(f"{what} {seconds:.2f}" for what, seconds in spent.items())
     print(f"\n1,000 units, 5,000 connections, FMI {fmi}, s of CPU: {told}")
     benchmark.extra_info.update(spent)
-    assert sum(spent[what] for what in ("adding and connecting", "checking", "schedule")) < WIRING
+    assert sum(spent.values()) < WIRING

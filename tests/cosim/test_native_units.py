@@ -98,6 +98,29 @@ def test_two_masses_swing_against_each_other(started: Started, fmi: int) -> None
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("name", "given", "outputs"),
+    [
+        ("sum", {"u1": 2.0, "u2": 3.0, "a1": 2.0, "a2": -1.0, "b": 0.5}, {"y": 1.5}),
+        ("integrator", {"u": 2.0, "x0": 1.0}, {"x": 2.0}),
+        ("sine", {"a": 2.0, "w": 3.0, "phase": 0.1, "b": 1.0}, {"y": 2.0 * math.sin(1.6) + 1.0}),
+        ("ramp", {"slope": 2.0, "b": 1.0}, {"y": 2.0}),
+        ("spring", {"x2": 0.5, "v1": 1.0, "k": 4.0, "d": 0.5}, {"f1": 1.5, "f2": -1.5}),
+        ("workshop", {"angle_in": 90.0, "temperature_in": 20.0}, {"angle": 90.0, "temperature": 20.0}),
+        ("si", {"length_in": 0.5}, {"length": 0.5}),
+        ("trivial", {"u": 2.0}, {"y": 3.0}),
+        ("hub", {f"u{i}": float(i) for i in range(1, 6)}, {"y": 16.0}),
+    ],
+)
+def test_outputs_after_half_a_second(
+    started: Started, name: str, given: dict[str, float], outputs: dict[str, float], fmi: int
+) -> None:
+    unit = started(name, fmi, **given)
+    unit.step(0.0, 0.5)
+    assert {y: unit[y] for y in outputs} == pytest.approx(outputs)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
 def test_a_gain_answers_at_once(started: Started, fmi: int) -> None:
     unit = started("gain", fmi, a=3.0, b=1.0)
     unit["u"] = 2.0
