@@ -116,18 +116,28 @@ def write_checkpoint(path: Path, c: Checkpoint) -> None:
         OSError: it cannot be written; the former one stays.
     """
     head = {"format": _FORMAT, "time": c.time, "rows": c.rows, "stepper": c.stepper, "units": list(c.units)}
-    unfinished = path.with_name(path.name + ".part")
-    with open(unfinished, "wb") as file:
-        with zipfile.ZipFile(file, "w") as archive:
-            archive.writestr("checkpoint.json", json.dumps(head))
-            for i, name in enumerate(c.units):
-                archive.writestr(f"{i}.state", c.units[name])
-                archive.writestr(f"{i}.contents", pickle.dumps(c.contents[name]))
-                archive.writestr(f"{i}.cpu", c.cpu[name])
-            archive.writestr("kept", c.kept)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(unfinished, path)
+    unfinished = _unfinished(path)
+    try:
+        with open(unfinished, "wb") as file:
+            with zipfile.ZipFile(file, "w") as archive:
+                archive.writestr("checkpoint.json", json.dumps(head))
+                for i, name in enumerate(c.units):
+                    archive.writestr(f"{i}.state", c.units[name])
+                    archive.writestr(f"{i}.contents", pickle.dumps(c.contents[name]))
+                    archive.writestr(f"{i}.cpu", c.cpu[name])
+                archive.writestr("kept", c.kept)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, path)
+    except OSError:
+        unfinished.unlink(missing_ok=True)
+        raise
+
+
+def remove_checkpoint(path: Path) -> None:
+    """Remove a checkpoint, and what a process left that died as it wrote one."""
+    path.unlink(missing_ok=True)
+    _unfinished(path).unlink(missing_ok=True)
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -157,3 +167,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise
     except Exception as e:  # whatever the readers of archive, JSON and pickle make of damaged bytes
         raise BadCheckpoint(path, f"the checkpoint is damaged: {one_line(e)}") from e
+
+
+def _unfinished(path: Path) -> Path:
+    return path.with_name(path.name + ".part")

@@ -1,5 +1,6 @@
 """Writes checkpoints while a run goes on."""
 
+import logging
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -9,6 +10,8 @@ from cosim.checkpoint import take_checkpoint, write_checkpoint
 from cosim.master import Master, Observer
 from cosim.recorder import Recorder
 from cosim.signals import Signals
+
+_log = logging.getLogger(__name__)
 
 
 def nothing() -> bytes:
@@ -40,15 +43,23 @@ class Checkpointer:
         """Write a checkpoint if one is due.
 
         Raises:
-            UnitFailure: a unit does not give its state. OSError: it cannot be written.
+            UnitFailure: a unit does not give its state. RecordNotWritten: the record cannot be written.
         """
         if t >= self._next:
             self.write()
             self._next = self._after(t)
 
     def write(self) -> None:
-        """Write a checkpoint of the communication point that observers saw last; raises as by calling."""
-        write_checkpoint(self.path, take_checkpoint(self._master, self._recorder.sync(), self._keep()))
+        """Write a checkpoint of the communication point that observers saw last; raises as by calling.
+
+        Where it cannot be written, the log says so, the former one stays, and the run goes on.
+        """
+        checkpoint = take_checkpoint(self._master, self._recorder.sync(), self._keep())
+        try:
+            write_checkpoint(self.path, checkpoint)
+        except OSError as e:
+            told = e.strerror or e
+            _log.warning("%s cannot be written at t = %g s, the former one stays: %s", self.path, checkpoint.time, told)
 
     def _after(self, t: float) -> float:
         count = math.floor(Fraction(t) / self._every)

@@ -1,7 +1,7 @@
 """What an algorithm does to the units that are due at a communication point."""
 
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
 from cosim.schedule import Slot
 
@@ -19,4 +19,12 @@ class Coupling(Protocol):
 
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
         """Step the units that are due, from t."""
+        ...
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return what a run that goes on from here must know besides the units' states; JSON can hold it."""
+        ...
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to where `get_state` was called."""
         ...

@@ -79,8 +79,12 @@ class Ensemble:
         ports = {n: u.description.outputs for n, u in self.system.units.items()}
         return Signals({n: i.y for n, i in self.instances.items()}, ports, self)
 
-    def initialize(self, slots: Sequence[Slot]) -> None:
-        """Take all units through initialisation mode, in the order given.
+    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
+        """Take all units through initialisation mode.
+
+        Args:
+            slots: in the order in which they leave it.
+            work_out: is called in between, to set inputs and get outputs in whatever order.
 
         Raises:
             UnitFailure: a unit does not accept its start values or does not initialise.
@@ -88,11 +92,7 @@ class Ensemble:
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
-        known: set[str] = set()
-        for slot in slots:
-            self._feed_known(slot.unit, known)
-            self.publish(slot.unit)
-            known.add(slot.unit)
+        work_out()
         for slot in slots:
             self.feed(slot.unit, 0.0)
             self.instances[slot.unit].exit_initialization()
@@ -109,7 +109,7 @@ class Ensemble:
         Raises:
             UnitFailure: the unit does not take them.
         """
-        self._copy(unit, t)
+        self.gather(unit, t)
         if self.lines is not None and dt is not None:
             self.lines.feed(unit, t, dt)
         self.instances[unit].set_inputs()
@@ -117,6 +117,37 @@ class Ensemble:
     def feeding(self, unit: str) -> Feeding:
         """Return what `feed` does before it sets a unit's inputs, where none are extrapolated."""
         return Feeding(self._narrowings[unit], self._copies[unit], self._scaled[unit])
+
+    def feed_known(self, unit: str, known: Collection[str]) -> None:
+        """Set only the inputs whose sources are units that are known; the others keep what they have.
+
+        Raises:
+            UnitFailure: the unit does not take them.
+        """
+        self.gather(unit, 0.0)
+        self.set_known(unit, known)
+
+    def set_known(self, unit: str, known: Collection[str]) -> None:
+        """Hand over, of the inputs that were gathered, only those whose sources are units that are known.
+
+        Raises:
+            UnitFailure: the unit does not take them.
+        """
+        sources = self.system.sources_of(unit)
+        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
+
+    def gather(self, unit: str, t: float) -> None:
+        """Copy to a unit's buffers what its sources give; it is told by `set_inputs`.
+
+        Raises:
+            UnitFailure: a number does not fit its input.
+        """
+        for narrowing in self._narrowings[unit]:
+            narrowing.check(t)
+        for target, source in self._copies[unit]:
+            target[...] = source
+        for scaled in self._scaled[unit]:
+            scaled()
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt.
@@ -176,25 +207,11 @@ class Ensemble:
 
         yield charge
 
-    def _copy(self, unit: str, t: float) -> None:
-        for narrowing in self._narrowings[unit]:
-            narrowing.check(t)
-        for target, source in self._copies[unit]:
-            target[...] = source
-        for scaled in self._scaled[unit]:
-            scaled()
-
-    def _feed_known(self, unit: str, known: Collection[str]) -> None:
-        """Set only inputs whose sources are known already; the others keep their start values."""
-        self._copy(unit, 0.0)
-        sources = self.system.sources_of(unit)
-        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
-
     def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
         self._endings.add(temporary.cleanup)
         folder = Path(temporary.name)
-        self.heartbeat.tell(scratch=temporary.name)
+        self.heartbeat.tell_scratch(temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description

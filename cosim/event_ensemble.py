@@ -36,19 +36,15 @@ class EventEnsemble(Ensemble):
         self._staying = [u.name for u in system.units.values() if not u.sampled and not can_go_back(u)]
         self._told: set[str] = set()
 
-    def initialize(self, slots: Sequence[Slot]) -> None:
+    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
         """Take all units through initialisation mode; those with events are in event mode after that."""
-        super().initialize(slots)
+        super().initialize(slots, work_out)
         self._endings.add(self._forget_begins)
 
     @property
     def event_units(self) -> dict[str, EventInstance]:
         """The units that run in event mode."""
         return {n: i for n, i in self.instances.items() if isinstance(i, EventInstance)}
-
-    def refresh_inputs(self, unit: str, t: float) -> None:
-        """Fetch a unit's inputs from their sources, without setting them."""
-        self._copy(unit, t)
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt, or as far as it goes; `ends` tells.

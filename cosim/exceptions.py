@@ -74,6 +74,14 @@ class NotExportable(CosimError):
         self.faults = tuple(faults)
 
 
+class RecordNotWritten(CosimError):
+    """A run's record cannot be written, as on a full disk; the rows until then are kept beside it."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"{path} cannot be written: {fault}")
+        self.path, self.fault = path, fault
+
+
 class WiringError(CosimError):
     """A system is wired wrongly; `faults` lists everything that is wrong with it."""
 
@@ -144,3 +152,11 @@ class UnitRefused(CosimError):
     def __init__(self, failure: UnitFailure) -> None:
         super().__init__(f"{failure.unit} does not start: {failure.told}")
         self.failure = failure
+
+
+class BadOptions(CosimError, ValueError):
+    """Options of a master that make no sense; `faults` lists everything that is wrong with them."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("; ".join(faults))
+        self.faults = tuple(faults)

@@ -93,6 +93,11 @@ class UnitEnded(UnitFailure):
     def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = ()) -> None:
         super().__init__(unit, call, t, "a request to end the simulation", log)
 
+    @property
+    def what(self) -> str:
+        """What happened."""
+        return "asked to end the simulation"
+
 
 class UnitHung(UnitFailure):
     """A call did not return within the time limit; the unit is left where it is and never called again.

@@ -1,7 +1,6 @@
 """The typed edge to FMPy: loading and instantiating FMUs of both standards."""
 
 import ctypes
-import inspect
 import itertools
 import os
 import weakref
@@ -12,9 +11,9 @@ from typing import Any
 
 import fmpy
 import fmpy.fmi2
-import fmpy.fmi3
 
 from cosim.exceptions import InvalidFmu, one_line
+from cosim.fmpy_slaves import FMU2Unit, FMU3Unit
 
 Logger = Callable[[int, str], None]
 """Takes an FMI status and a message."""
@@ -52,9 +51,7 @@ def load_fmi3(
 
     with _loading(path):
         begins(LOADING)
-        fmu = fmpy.fmi3.FMU3Slave(
-            guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
-        )
+        fmu = FMU3Unit(guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance)
         with _unloading(fmu):
             begins("fmi3InstantiateCoSimulation")
             fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
@@ -76,9 +73,7 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
     fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
     with _loading(path):
         begins(LOADING)
-        fmu = fmpy.fmi2.FMU2Slave(
-            guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance
-        )
+        fmu = FMU2Unit(guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance)
         _loggers[place] = log
         weakref.finalize(fmu, _loggers.pop, place, None)
         with _unloading(fmu):
@@ -86,19 +81,6 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
             fmu.instantiate(callbacks=callbacks, loggingOn=True)
         return fmu
 
-
-def _keep_signatures(slave: type) -> None:
-    """Let FMPy find its functions' signatures ready: it reads all of them anew for each instance that it makes.
-
-    That is half of what loading a small unit costs.
-    """
-    for name, function in inspect.getmembers(slave, inspect.isfunction):
-        if name.startswith("fmi"):
-            vars(function)["__signature__"] = inspect.signature(function)
-
-
-_keep_signatures(fmpy.fmi2.FMU2Slave)
-_keep_signatures(fmpy.fmi3.FMU3Slave)
 
 _places = itertools.count(1)
 _loggers: dict[int, Logger] = {}

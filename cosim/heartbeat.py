@@ -129,6 +129,10 @@ class Heartbeat:
         self._notes.clear()
         self._notes.append(text)
 
+    def tell_scratch(self, folder: str) -> None:
+        """Keep the place of a folder that is to be removed if this process dies."""
+        self.tell(scratch=[*self.facts.get("scratch", []), folder])
+
     @property
     def facts(self) -> dict[str, Any]:
         """What was told, by name."""

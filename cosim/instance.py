@@ -3,9 +3,10 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from cosim.event_failures import StepDiscarded
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
@@ -13,6 +14,8 @@ from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
+from cosim.magnitudes import Floats
+from cosim.native_step import NativeStep
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
@@ -25,16 +28,6 @@ State = ctypes.c_void_p
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
-
-
-@dataclass(frozen=True)
-class NativeStep:
-    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
-
-    fmi: int
-    function: int
-    component: int
-    flags: tuple[int, ...]
 
 
 class Instance:
@@ -137,11 +130,7 @@ class Instance:
         self.time = t + dt
 
     def try_step(self, t: float, dt: float) -> StepEnd:
-        """Advance from t by dt, or as far as the unit goes.
-
-        Raises:
-            UnitFailure: the unit answered anything but OK, a warning or a discard, or ended the simulation.
-        """
+        """Advance from t by dt, or as far as the unit goes; raise as `step`, but for a discard."""
         self.time = t
         self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
@@ -152,8 +141,7 @@ class Instance:
         early = self._fmi == 3 and self._early.value and self._last_time.value < t + dt
         self.time = self._last_time.value if early else t + dt
         if not self.time >= t:
-            told = f"a return at t = {self.time:.9g} s, which is before the step's begin"
-            raise UnitFailure(self.name, self._step_call, t, told, tuple(self.log))
+            raise UnitFailure(self.name, self._step_call, t, f"a return at t = {self.time:.9g} s", tuple(self.log))
         return StepEnd(self.time, early, self._fmi == 3 and self._event.value)
 
     def discarded(self, reached: float, reason: str) -> StepDiscarded:
@@ -200,6 +188,30 @@ class Instance:
         function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
         flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
         return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
+
+    def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return how outputs change with inputs at this instant, the unit's state being as it is.
+
+        Args:
+            outputs: names of real outputs.
+            inputs: a direction: how fast each of some real inputs changes, all its entries in row-major order.
+
+        Returns:
+            How fast the outputs change then, by name.
+
+        Raises:
+            UnitFailure: it does not tell.
+        """
+        d = self.description
+        unknowns, knowns = [d.outputs[y] for y in outputs], [d.inputs[u] for u in inputs]
+        seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
+        found = np.zeros(sum(p.size for p in unknowns))
+        references = (_references(unknowns), _references(knowns))
+        lengths = ((), ()) if self._fmi == 2 else ((len(seed),), (len(found),))
+        vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
+        self._call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
+        ends = np.cumsum([p.size for p in unknowns])[:-1]
+        return dict(zip(outputs, np.split(found, ends), strict=True))
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -301,14 +313,8 @@ class Instance:
         return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
 
     def _reached(self) -> float:
-        """Return how far a step came that was discarded: FMI 2 tells, in FMI 3 the unit stays where it was.
-
-        Raises:
-            UnitEnded: it was because the unit wants to end the simulation.
-        """
-        if self._fmi == 3:
-            return self.time
-        reached, ended = discarded_step(self._function, self._component, self.time)
+        """Return how far a step came that was discarded; raise if that was because the unit wants to end."""
+        reached, ended = discarded_step(self._function, self._component, self.time, self._fmi)
         if ended:
             raise UnitEnded(self.name, self._step_call, reached, tuple(self.log))
         return reached
@@ -384,3 +390,12 @@ class Instance:
             line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
             self.log.append(line)
             self._heartbeat.log(self.name, line)
+
+
+def _references(ports: Sequence[FmuPort]) -> Any:
+    references = [r for p in ports for r in p.references]
+    return (ctypes.c_uint * len(references))(*references)
+
+
+def _doubles(values: Floats) -> Any:
+    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

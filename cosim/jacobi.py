@@ -1,13 +1,17 @@
 """All units step at once from the values at a communication point."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from cosim.ensemble import Ensemble
 from cosim.schedule import Slot
 
 
 class Jacobi:
-    """A step's results count from the time where it ends, for sampled units too."""
+    """A step's results count from the time where it ends, for sampled units too.
+
+    Whatever acts at once acts a step later here, so there is no algebraic loop to solve but at the start.
+    """
 
     def __init__(self, ensemble: Ensemble) -> None:
         self._ensemble = ensemble
@@ -28,3 +32,10 @@ class Jacobi:
             for slot in due:
                 self._ensemble.step(slot.unit, t, slot.period)
                 charge(slot.unit)
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return nothing: all is in the units' states; see `Coupling`."""
+        return {}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Do nothing; see `Coupling`."""

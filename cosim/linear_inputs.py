@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from cosim.instance import Instance
@@ -15,22 +16,31 @@ from cosim.trace import Moments, Trace
 Memory = Mapping[str, Any]
 """What is remembered of one unit: the tick at which it is, and its outputs' moments by port."""
 
+_NONE: Mapping[str, NDArray[np.float64]] = {}
+
 
 @dataclass(frozen=True, kw_only=True)
 class _Line:
     """An input, the trace of its source, and where in the step the input is evaluated, in halves of the step."""
 
+    port: str
     trace: Trace
     target: NDArray[Any]
     change: Linear
     halves: int
     rate: NDArray[Any] | None = None
 
-    def feed(self, half_ticks: int, tick: float) -> None:
+    def follow(self, half_ticks: int, tick: float) -> None:
         factor, offset = self.change.factor, self.change.offset
         self.target[...] = self.trace.at(half_ticks) * factor + offset
         if self.rate is not None:
             self.rate[...] = self.trace.rate(tick) * factor
+
+    def lead_to(self, end: NDArray[np.float64], dt: float) -> None:
+        begin = self.trace.last * self.change.factor + self.change.offset
+        self.target[...] = begin + (end - begin) * (self.halves / 2)
+        if self.rate is not None:
+            self.rate[...] = (end - begin) / dt
 
 
 class LinearInputs:
@@ -46,6 +56,9 @@ class LinearInputs:
       out to second order in the step.
     - the one at its end, for an input that is declared to act at once on an output that feeds another unit: the output
       counts for the end of the step, and so must what it follows. States of such a unit come out to first order.
+
+    Where units iterate, an input that leads back in a circle follows the line from what its source gave last to what
+    it is presumed to be at the end of the step.
 
     Only real values that change between instants follow lines. What is discrete, or comes from or goes to a unit that
     acts at instants, is held.
@@ -65,11 +78,14 @@ class LinearInputs:
         for c in followed:
             self._lines[c.target.unit].append(self._line(system, c))
 
-    def feed(self, unit: str, t: float, dt: float) -> None:
-        """Write the inputs that follow lines, for a step from t to t + dt."""
+    def feed(self, unit: str, t: float, dt: float, ends: Mapping[str, NDArray[np.float64]] = _NONE) -> None:
+        """Write the inputs that follow lines, for a step from t to t + dt; `ends` are presumed values, by port."""
         at, long = 2 * self._ticks(t), self._ticks(dt)
         for line in self._lines[unit]:
-            line.feed(at + line.halves * long, self._tick)
+            if line.port in ends:
+                line.lead_to(ends[line.port], dt)
+            else:
+                line.follow(at + line.halves * long, self._tick)
 
     def step(self, unit: str) -> None:
         """Take note that a unit has gone on."""
@@ -109,6 +125,7 @@ class LinearInputs:
         values = self._instances[c.source.unit].y[c.source.port][0]
         rate = target.du.get(c.target.port)
         return _Line(
+            port=c.target.port,
             trace=traces.setdefault(c.source.port, Trace(values)),
             target=target.u[c.target.port][0],
             change=system.change_by(c) or Linear(),

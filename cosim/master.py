@@ -6,24 +6,35 @@ from fractions import Fraction
 from types import TracebackType
 from typing import TypeVar
 
+from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from cosim.coupling import Coupling
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
 from cosim.event_ensemble import EventEnsemble
+from cosim.event_options import has_events, refuse_off_grid
 from cosim.event_stepper import EventStepper
-from cosim.exceptions import ScheduleError, UnitFailure, UnitRefused
+from cosim.exceptions import UnitFailure, UnitRefused
 from cosim.extrapolation import Extrapolation
 from cosim.failures import UnitHung
+from cosim.fixed_point import FixedPoint
 from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
+from cosim.group import Group, groups_of_data_flow
 from cosim.heartbeat import Abandoned, Heartbeat
+from cosim.initial_values import InitialValues
+from cosim.interface import Interface
+from cosim.interface_newton import InterfaceNewton
+from cosim.interface_solver import InterfaceSolver
+from cosim.iteration_count import IterationCount
 from cosim.jacobi import Jacobi
+from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.pacing import Pacer
 from cosim.plan.choice import plan_stepper
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
+from cosim.step_statistics import StepStatistics
 from cosim.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
@@ -31,10 +42,6 @@ from cosim.watchdog import Watchdog
 T = TypeVar("T")
 
 _PLAIN = MasterOptions()
-_OFF_GRID = (
-    "inputs can follow lines only where all steps lie on one grid, and steps may end off it {}: let inputs be held "
-    "(extrapolation)"
-)
 
 Observer = Callable[[float, Signals], None]
 """Called at every communication point with the time and the signals that hold at that time."""
@@ -51,8 +58,8 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`; or
-            inputs are to be extrapolated though steps may end anywhere.
+        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`,
+            `check_control` and `refuse_off_grid`, or units make circles that cannot be solved.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -61,9 +68,11 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
-        if self.has_events and options.extrapolation is Extrapolation.LINEAR:
-            eventful = ", ".join(n for n, u in system.units.items() if u.uses_events)
-            raise ScheduleError(_OFF_GRID.format(f"at events ({eventful})" if eventful else "when one is discarded"))
+        refuse_off_grid(system, options)
+        if options.adaptive is not None:
+            check_control(system)
+        self._continuous = self._groups()
+        refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
         self.pacer = Pacer(options.pace) if options.pace is not None else None
         """What keeps the run in step with the wall clock, if it is to."""
@@ -71,6 +80,7 @@ class Master:
         self._endings = Endings()
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
+        self._coupling: Coupling | None = None
 
     def __enter__(self) -> "Master":
         try:
@@ -96,7 +106,7 @@ class Master:
     @property
     def has_events(self) -> bool:
         """Whether steps may end off the schedule's grid; without, a run is a plain sequence of fixed steps."""
-        return self.system.has_events or self.options.repeat_discarded
+        return has_events(self.system, self.options)
 
     @property
     def ensemble(self) -> Ensemble:
@@ -111,6 +121,22 @@ class Master:
         if self._stepper is None:
             raise RuntimeError("enter the master first: `with Master(system) as master:`")
         return self._stepper
+
+    @property
+    def iterations(self) -> IterationCount:
+        """How much work iterating was."""
+        return self._coupling.count if isinstance(self._coupling, GaussSeidel) else IterationCount()
+
+    @property
+    def iterates(self) -> bool:
+        """Whether units go over steps again; the steps of others are plain."""
+        going_back = self.options.algorithm is not Algorithm.JACOBI
+        return going_back and any(g.circle for g in (*self.schedule.sampled_groups, *self._continuous))
+
+    @property
+    def steps(self) -> StepStatistics | None:
+        """What became of steps that follow their error; None where steps are fixed."""
+        return self._stepper.statistics if isinstance(self._stepper, AdaptiveStepper) else None
 
     @property
     def time(self) -> float:
@@ -155,11 +181,10 @@ class Master:
     def _start(self) -> None:
         load = EventEnsemble if self.has_events else Ensemble
         ensemble = load(self.system, self.heartbeat, self._endings)
-        ensemble.initialize(self.schedule.slots)
-        if self.options.extrapolation is Extrapolation.LINEAR:
-            ensemble.extrapolate(self.schedule.tick)
         ensemble.measures_cpu = self.options.cpu_times
-        self._stepper = self._make_stepper(ensemble)
+        ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
+        self._coupling = self._couple(ensemble)
+        self._stepper = self._stepper_of(ensemble, self._coupling)
         self._ensemble = ensemble
 
     def _end(self) -> UnitHung | None:
@@ -205,12 +230,33 @@ class Master:
 
         return pause
 
-    def _make_stepper(self, ensemble: Ensemble) -> Stepper:
+    def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         if isinstance(ensemble, EventEnsemble):
-            return EventStepper(self.schedule, ensemble, self._coupling(ensemble))
-        plan = plan_stepper(self.schedule, ensemble, self.options)
-        return plan or GridStepper(self.schedule, self._coupling(ensemble), ensemble.lines)
+            return EventStepper(self.schedule, ensemble, coupling)
+        control = self.options.adaptive
+        if self.options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
+        if control is None:
+            plan = plan_stepper(self.schedule, ensemble, coupling, self.options, iterates=self.iterates)
+            return plan or GridStepper(self.schedule, coupling, ensemble.lines)
+        return AdaptiveStepper(self.schedule, coupling, ensemble, control, self.options.order)
 
-    def _coupling(self, ensemble: Ensemble) -> Coupling:
-        kinds = {Algorithm.JACOBI: Jacobi, Algorithm.GAUSS_SEIDEL: GaussSeidel}
-        return kinds[self.options.algorithm](ensemble)
+    def _groups(self) -> Sequence[Group]:
+        """Return the units that are not sampled, those together that have to agree at each step."""
+        if not self.options.algorithm.iterates:
+            return self.schedule.continuous_groups
+        groups = groups_of_data_flow(self.system, [s.unit for s in self.schedule.continuous], self.schedule.loops)
+        refuse_circles(self.system, groups)
+        return groups
+
+    def _initial_values(self, ensemble: Ensemble) -> InitialValues:
+        return InitialValues(ensemble, self.schedule.groups, self.schedule.initial_passes, self._solver)
+
+    def _couple(self, ensemble: Ensemble) -> Coupling:
+        if self.options.algorithm is Algorithm.JACOBI:
+            return Jacobi(ensemble)
+        return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
+
+    def _solver(self, interface: Interface) -> InterfaceSolver:
+        kind = FixedPoint if self.options.algorithm is Algorithm.FIXED_POINT else InterfaceNewton
+        return kind(interface.magnitudes(self.options.tolerance), self.options.most_iterations)

@@ -2,19 +2,34 @@
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from typing import Any
 
+from cosim.adaptive_step import AdaptiveStep
+from cosim.exceptions import BadOptions
 from cosim.extrapolation import Extrapolation
 
 
 class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs.
 
-    JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values.
+    JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values; the units of
+    an algebraic loop go over the step again until they agree. FIXED_POINT and NEWTON: the same for all units that are
+    connected in a circle (iterated, strong or implicit coupling), with inputs of the end of the step, by relaxed
+    fixed-point iteration or by Newton's method. Sampled units act one after another but in loops. The loops of all but
+    FIXED_POINT, and those at the start, are solved by Newton's method.
     """
 
     JACOBI = "jacobi"
     GAUSS_SEIDEL = "gauss-seidel"
+    FIXED_POINT = "fixed-point"
+    NEWTON = "newton"
+
+    @property
+    def iterates(self) -> bool:
+        """Whether all units that are connected in a circle go over steps again."""
+        return self in (Algorithm.FIXED_POINT, Algorithm.NEWTON)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,17 +38,26 @@ class MasterOptions:
 
     Attributes:
         algorithm: see `Algorithm`.
+        tolerance: the largest difference, relative to a signal's magnitude, at which iterated signals agree.
+        most_iterations: after so many iterations of a step, the run fails.
         extrapolation: what inputs are between communication points; see `Extrapolation`.
+        adaptive: how the step follows the error; None for fixed steps.
         cpu_times: whether `Master.cpu` has the CPU time of every step; to take it costs 0.2 us a step.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
         repeat_discarded: whether a step that a unit discards is repeated shorter, by all units. They then save their
             states at every step; else a discarded step ends the run. Systems with events do so anyway.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
+
+    Raises:
+        BadOptions: with every number that makes no sense.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
+    tolerance: float = 1e-8
+    most_iterations: int = 100
     extrapolation: Extrapolation = Extrapolation.HOLD
+    adaptive: AdaptiveStep | None = None
     cpu_times: bool = False
     compiled: bool = True
     repeat_discarded: bool = False
@@ -41,7 +65,30 @@ class MasterOptions:
     pace: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("call_limit", "pace"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise ValueError(f"{name} = {value}: a finite number above 0 is right")
+        faults = [
+            f"{name} = {value}: a finite number above 0 is right"
+            for name in ("tolerance", "call_limit", "pace")
+            if (value := getattr(self, name)) is not None and not 0 < value < math.inf
+        ]
+        if self.most_iterations < 1:
+            faults.append(f"most_iterations = {self.most_iterations}: a whole number from 1 on is right")
+        if faults:
+            raise BadOptions(faults)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return what decides on a run's signals, as JSON can hold it; exact numbers of seconds are texts."""
+        control = None if self.adaptive is None else asdict(self.adaptive)
+        if control is not None:
+            control = {name: str(value) if isinstance(value, Fraction) else value for name, value in control.items()}
+        return {
+            "algorithm": self.algorithm.value,
+            "tolerance": self.tolerance,
+            "iterations": self.most_iterations,
+            "extrapolation": self.extrapolation.value,
+            "adaptive": control,
+        }
+
+    @property
+    def order(self) -> int:
+        """The power of the step with which the error of a run goes: see `Extrapolation`."""
+        return 2 if self.extrapolation is Extrapolation.LINEAR else 1

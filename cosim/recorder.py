@@ -1,11 +1,12 @@
 """Records the scalar signals of a run, one column a signal, so that no row is lost however the process ends."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 
 from cosim.complete_record import finish_record, rewind_stream, stream_of, tail_of
+from cosim.exceptions import RecordNotWritten
 from cosim.record_block import RecordBlock
 from cosim.record_columns import RecordColumns, record_columns
 from cosim.record_stream import RecordStream, stream_batches
@@ -52,8 +53,9 @@ class Recorder:
         finally:
             self._file.close()
             self._block.close()
-        finish_record(self.path, self._formats, lambda: stream_batches(self.stream))
-        self.tail.unlink(missing_ok=True)
+        with self._told():
+            finish_record(self.path, self._formats, lambda: stream_batches(self.stream))
+            self.tail.unlink(missing_ok=True)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Record one row."""
@@ -66,19 +68,18 @@ class Recorder:
         """Begin the files; the first row does it where nobody has.
 
         Raises:
-            OSError: they cannot be made, or another process records into them.
+            RecordNotWritten: they cannot be made, or another process records into them.
         """
         columns, sources = record_columns(signals.columns())
         about = {"places": columns.places, "formats": self._formats}
-        block = RecordBlock.create(self.tail, sources, about)
-        try:
+        with self._told(), contextlib.ExitStack() as undo:
+            block = RecordBlock.create(self.tail, sources, about)
+            undo.callback(block.close)
             size = rewind_stream(self.path, columns.schema, self._after) if self._after else 0
             self._file = RecordStream(self.stream, columns.schema, size)
             block.clear(self._after)
-        except BaseException:
-            block.close()
-            raise
-        self._block, self._columns = block, columns
+            undo.pop_all()
+            self._block, self._columns = block, columns
 
     @property
     def is_open(self) -> bool:
@@ -94,29 +95,37 @@ class Recorder:
 
     @property
     def rows(self) -> int:
-        """Rows recorded."""
-        return 0 if self._block is None else self._block.rows
+        """Rows recorded, those before `after` included."""
+        return self._after if self._block is None else self._block.rows
 
     def flush(self) -> None:
         """Write the block's rows to the stream and empty it.
 
         Raises:
-            OSError: they cannot be written; they stay in the block.
+            RecordNotWritten: they cannot be written; they stay in the block.
         """
         if self._block is None or self._columns is None or self._file is None or not self._block.filled:
             return
         rows = self._block.rows
-        self._file.write(self._columns.batch(self._block))
+        with self._told():
+            self._file.write(self._columns.batch(self._block))
         self._block.clear(rows)
 
     def sync(self) -> int:
         """Flush, wait until all rows are on the disk, and return their number.
 
         Raises:
-            OSError: as by `flush`.
+            RecordNotWritten: as by `flush`.
         """
         self.flush()
         if self._file is not None:
             with contextlib.suppress(OSError):  # file systems without it
                 self._file.sync()
         return self.rows
+
+    @contextlib.contextmanager
+    def _told(self) -> Generator[None, None, None]:
+        try:
+            yield
+        except OSError as e:
+            raise RecordNotWritten(self.path, e.strerror or str(e)) from e

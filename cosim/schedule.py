@@ -6,7 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from cosim.algebraic_loop import AlgebraicLoop, algebraic_loops
 from cosim.exceptions import ScheduleError
+from cosim.group import Group, groups_of_loops, in_order
 from cosim.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
@@ -30,19 +32,41 @@ class Schedule:
     A tick is the greatest common divisor of the units' periods; times are tick counts, so they do not drift. Sampled
     units stand in `sampled`: at a communication point t they turn the values at t into further values at t. The others
     stand in `continuous`: they go from t to t + period. A command therefore acts in the step that follows the picture
-    it was made from. Within each group a unit comes after those whose outputs act on its own at once (direct
-    feedthrough), else units keep the order in which they were added. Feedthrough that an FMU does not declare is
-    presumed, but where presumed feedthrough would close a loop it is left out of account, with a line in the log.
+    it was made from.
+
+    Within each of the two a unit comes after those whose outputs act on its own at once (direct feedthrough), else
+    units keep the order in which they were added. Units in an algebraic loop make a `Group` and stand side by side; an
+    algorithm may solve it. Feedthrough that an FMU does not declare is presumed, but where presumed feedthrough would
+    close a loop it is left out of account. Units may need each other's outputs in a circle that is no loop, as each
+    output can be worked out after others: one of them then gets former values. Both are told in the log.
+
+    Attributes:
+        loops: the algebraic loops.
+        initial_passes: how often to go through all units in order until all values at the start are worked out.
 
     Raises:
-        ScheduleError: units depend on each other at once in a loop, or their periods fit no common grid.
+        ScheduleError: periods fit no common grid.
     """
 
     def __init__(self, system: System) -> None:
         units = list(system.units.values())
         self.tick = _common_divisor(units)
-        self.sampled = self._slots(system, [u for u in units if u.sampled])
-        self.continuous = self._slots(system, [u for u in units if not u.sampled])
+        self.loops: list[AlgebraicLoop] = []
+        self.initial_passes = 1
+        self.sampled_groups = self._groups(system, [u for u in units if u.sampled])
+        self.continuous_groups = self._groups(system, [u for u in units if not u.sampled])
+        self.sampled = self._slots(system, self.sampled_groups)
+        self.continuous = self._slots(system, self.continuous_groups)
+
+    @property
+    def has_loops(self) -> bool:
+        """Whether there are algebraic loops; a system without any can be stepped unit by unit."""
+        return bool(self.loops)
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """All units in the order of `slots`, those of algebraic loops together."""
+        return self.continuous_groups + self.sampled_groups
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -57,11 +81,35 @@ class Schedule:
         """Return the number of whole ticks in a duration, rounded up."""
         return math.ceil(duration / self.tick)
 
-    def _slots(self, system: System, units: Sequence[PlacedUnit]) -> tuple[Slot, ...]:
-        declared = {u.name: _sources(system, u, u.description.feedthrough) for u in units}
-        presumed = {u.name: _sources(system, u, u.description.presumed_feedthrough) for u in units}
-        periods = {u.name: u.period for u in units}
-        return tuple(Slot(n, int(periods[n] / self.tick), float(periods[n])) for n in _ordered(declared, presumed))
+    def _groups(self, system: System, units: Sequence[PlacedUnit]) -> tuple[Group, ...]:
+        names = [u.name for u in units]
+        loops = algebraic_loops(system, names)
+        self.loops += loops
+        sources = _sources(system)
+        declared = {u.name: _acting(sources[u.name], u.description.feedthrough) for u in units}
+        presumed = {u.name: _acting(sources[u.name], u.description.presumed_feedthrough) for u in units}
+        groups = groups_of_loops(names, loops)
+
+        def units_of(waits: set[int], needed: Mapping[str, set[str]], group: int) -> str:
+            needs = {n for name in groups[group].units for n in needed[name]}
+            return ", ".join(sorted(n for i in waits for n in groups[i].units if n in needs))
+
+        def told_presumed(group: int, waits: set[int]) -> None:
+            names, others = ", ".join(groups[group].units), units_of(waits, presumed, group)
+            _log.warning("%s does not declare what acts at once; it gets the former values of %s", names, others)
+
+        def told_declared(group: int, waits: set[int]) -> None:
+            self.initial_passes += 1
+            names, others = ", ".join(groups[group].units), units_of(waits, declared, group)
+            _log.warning(
+                "%s steps first where units wait for each other; it gets the former values of %s", names, others
+            )
+
+        return tuple(in_order(groups, declared, presumed, told_presumed, told_declared))
+
+    def _slots(self, system: System, groups: Sequence[Group]) -> tuple[Slot, ...]:
+        periods = {n: system.units[n].period for group in groups for n in group.units}
+        return tuple(Slot(n, int(period / self.tick), float(period)) for n, period in periods.items())
 
 
 def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
@@ -75,35 +123,15 @@ def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
     return tick
 
 
-def _sources(system: System, unit: PlacedUnit, feedthrough: Mapping[str, Collection[str]]) -> set[str]:
+def _sources(system: System) -> dict[str, dict[str, str]]:
+    """Return, by unit and input, the unit that feeds it."""
+    sources: dict[str, dict[str, str]] = {name: {} for name in system.units}
+    for c in system.connections:
+        sources[c.target.unit][c.target.port] = c.source.unit
+    return sources
+
+
+def _acting(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:
+    """Return the units that feed inputs which act on outputs at once."""
     acting = {u for us in feedthrough.values() for u in us}
-    return {source.unit for port, source in system.sources_of(unit.name).items() if port in acting}
-
-
-def _ordered(declared: Mapping[str, set[str]], presumed: Mapping[str, set[str]]) -> list[str]:
-    """Order units so that each follows those it depends on; as given where nothing is said."""
-    left = list(declared)
-    order: list[str] = []
-    while left:
-        ahead = set(left)
-        free = next((n for n in left if not (declared[n] | presumed[n]) & ahead), None)
-        if free is None:
-            free = next((n for n in left if not declared[n] & ahead), None)
-            if free is not None:
-                others = ", ".join(sorted(presumed[free] & ahead))
-                _log.warning("%s does not declare what acts at once; it gets the former values of %s", free, others)
-        if free is None:
-            loop = " -> ".join(_loop(left, declared))
-            raise ScheduleError(f"these units depend on each other at once (algebraic loop): {loop}")
-        order.append(free)
-        left.remove(free)
-    return order
-
-
-def _loop(names: Sequence[str], direct: Mapping[str, set[str]]) -> list[str]:
-    path = [names[0]]
-    while True:
-        source = min(direct[path[-1]] & set(names))
-        if source in path:
-            return [source, *reversed(path[path.index(source) :])]
-        path.append(source)
+    return {unit for port, unit in sources.items() if port in acting}

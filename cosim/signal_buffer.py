@@ -53,9 +53,7 @@ class SignalBuffer:
     port, in row-major order; a connection copies one port's views into another's.
     """
 
-    def __init__(
-        self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
-    ) -> None:
+    def __init__(self, name: str, function: Any, component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
         self.name = name
         first = ports[0].fmi_type
         references = [r for p in ports for r in p.references]
@@ -102,9 +100,7 @@ class OutputBuffer(SignalBuffer):
 
     kept_elsewhere: object = None
 
-    def __init__(
-        self, name: str, function: Callable[..., int], component: Any, fmi: int, ports: Sequence[FmuPort]
-    ) -> None:
+    def __init__(self, name: str, function: Any, component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
         super().__init__(name, function, component, fmi, ports)
         self._is_text = ports[0].fmi_type == "String"
         self._kept: list[Any] = [ctypes.create_string_buffer(1) for _ in range(len(self._arrays[0]))]

@@ -21,6 +21,11 @@ class Trace:
         here = np.array(values, dtype=np.float64)
         self.moments: Moments = (0, here, 0, here)
 
+    @property
+    def last(self) -> NDArray[np.float64]:
+        """The values of the last point."""
+        return self.moments[3]
+
     def record(self, tick: int) -> None:
         """Take the values as those of a tick: of the last one once more, or of a later one."""
         before, was, last, is_ = self.moments

@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -24,6 +25,7 @@ from scenarios.export_command import export_command
 from scenarios.interruption import Interruption
 from scenarios.limit_arguments import limit_options, limits
 from scenarios.listing import print_catalog, print_scenario, print_unit
+from scenarios.master_arguments import coupling_of, master_options
 from scenarios.parameters import parse_parameters
 from scenarios.progress import progress_bar
 from scenarios.resume_command import resume
@@ -114,6 +116,7 @@ main.add_command(vsl_train)
     metavar="SECONDS",
     help="Write a checkpoint every so many simulated seconds, for `handover resume`.",
 )
+@master_options
 @limit_options
 @click.option("--out", type=_PATH, help="Folder for the results [default: a new one in runs/].")
 def run_(
@@ -128,6 +131,7 @@ def run_(
     call_limit: float,
     pace: float | None,
     out: Path | None,
+    **coupling: Any,
 ) -> None:
     """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 
@@ -140,6 +144,7 @@ def run_(
     elif stop is not None or step is not None:
         raise BadCall("--stop and --step are for an SSP; a scenario has its own")
     with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
+        options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace))
         if is_ssp(scenario):
             experiment, values = open_experiment(Path(scenario), stop, step, opened), NoParameters()
             source = source_of(Path(scenario), experiment.stop_time(values), step)
@@ -158,7 +163,7 @@ def run_(
             formats=formats,
             every=every,
             source=source,
-            options=MasterOptions(**limits(call_limit, pace)),
+            options=options,
         )
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption)

@@ -33,8 +33,8 @@ def tell_death(heartbeat: Heartbeat, number: int | None, status: int, wall: floa
         hung: whether it was ended because a unit's call did not return.
     """
     facts = heartbeat.facts
-    if "scratch" in facts:
-        shutil.rmtree(facts["scratch"], ignore_errors=True)
+    for folder in facts.get("scratch", []):
+        shutil.rmtree(folder, ignore_errors=True)
     call = heartbeat.under_way
     failure = _failure(heartbeat, call, number, status, hung=hung)
     told = _how_it_ended(call, heartbeat.time, number, status) if failure is None else str(failure)

@@ -59,6 +59,7 @@ class LeftRun:
                 formats=tuple(told["formats"]),
                 every=None if every is None else Fraction(every),
                 source=told["source"],
+                options=self.resumption.options,
             )
         except BadRunFolder:
             raise

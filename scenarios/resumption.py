@@ -9,6 +9,7 @@ from typing import Any
 
 from cosim.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
 from cosim.exceptions import one_line
+from cosim.master_options import MasterOptions
 from scenarios.experiment import Watch
 
 
@@ -32,12 +33,13 @@ class Resumption:
     checkpoint: Checkpoint
     watch: Watch
     parameters: Any
+    options: MasterOptions
     spent: Spent
 
 
-def pack(watch: Watch, parameters: Any, spent: Spent) -> bytes:
+def pack(watch: Watch, parameters: Any, options: MasterOptions, spent: Spent) -> bytes:
     """Return what a checkpoint keeps besides the units' states."""
-    return pickle.dumps((watch, parameters, spent))
+    return pickle.dumps((watch, parameters, options, spent))
 
 
 def unpack(path: Path) -> Resumption:
@@ -48,7 +50,7 @@ def unpack(path: Path) -> Resumption:
     """
     checkpoint = read_checkpoint(path)
     try:
-        watch, parameters, spent = pickle.loads(checkpoint.kept)
+        watch, parameters, options, spent = pickle.loads(checkpoint.kept)
     except Exception as e:  # unpickling raises what it likes
         raise BadCheckpoint(path, f"what it keeps of the scenario cannot be read: {one_line(e)}") from e
-    return Resumption(checkpoint=checkpoint, watch=watch, parameters=parameters, spent=spent)
+    return Resumption(checkpoint=checkpoint, watch=watch, parameters=parameters, options=options, spent=spent)

@@ -4,17 +4,18 @@ import math
 import statistics
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.checkpoint import check_states
+from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
+from cosim.iteration_count import IterationCount
 from cosim.master import Master, Observer
 from cosim.master_options import MasterOptions
 from cosim.recorder import Recorder
@@ -106,7 +107,7 @@ def carry_out(
     if failure is not None:
         task.folder.add_to_run(failure=failure.as_data())
     if complete:
-        task.folder.checkpoint.unlink(missing_ok=True)
+        remove_checkpoint(task.folder.checkpoint)
     _present(task, watch, summary, system_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
@@ -122,11 +123,10 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     """Make the run's folder, and tell what has to be known of the run if this process dies."""
     if resumption is None:
         task.folder.make()
-        configuration = {**_configuration(task), **_options(task)}
-        fmus = {n: u.description.path for n, u in master.system.units.items()}
-        task.folder.write_run(configuration, fmus)
+    fmus = {n: u.description.path for n, u in master.system.units.items()}
+    task.folder.write_run({**_configuration(task), **_options(task)}, fmus)
     master.heartbeat.tell(
-        folder=str(task.folder.path.absolute()),
+        folder=str(task.folder.path),
         configuration=_configuration(task),
         title=task.experiment.title,
         parameters=_parameter_rows(task),
@@ -141,7 +141,7 @@ def _run(
     stop, interruption = task.experiment.stop_time(task.parameters), around.interruption
     rows = 0 if resumption is None else resumption.checkpoint.rows
     with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
-        checkpoints = _checkpoints(task, master, recorder, lambda: pack(watch, task.parameters, around.clock()))
+        checkpoints = _checkpoints(task, master, recorder, watch, around.clock)
 
         def tell(t: float, _signals: Signals) -> None:
             around.progress(t, float(stop))
@@ -167,9 +167,15 @@ def _trouble(failure: UnitFailure | None, master: Master) -> dict[str, Any]:
     return {"failure": None if failure is None else failure.as_data(), **paced}
 
 
-def _checkpoints(task: Task, master: Master, recorder: Recorder, keep: Callable[[], bytes]) -> list[Checkpointer]:
+def _checkpoints(
+    task: Task, master: Master, recorder: Recorder, watch: Watch, clock: Callable[[], Spent]
+) -> list[Checkpointer]:
     if task.every is None:
         return []
+
+    def keep() -> bytes:
+        return pack(watch, task.parameters, task.options, clock())
+
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
@@ -204,9 +210,20 @@ def _speed(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
     for name, spent in master.cpu.items():
         total = float(np.sum(spent))
         metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
-        simulated = len(spent) * float(master.system.units[name].period)
+        unit = master.system.units[name]  # its own period says nothing of steps that follow their error
+        simulated = master.time if master.steps and not unit.sampled else len(spent) * float(unit.period)
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
-    return metrics
+    return {**metrics, **_iterations(master.iterations)}
+
+
+def _iterations(count: IterationCount) -> dict[str, Metric]:
+    if not count.steps:
+        return {}
+    told = f"mean number of iterations of a step that was iterated, {count.most} at most"
+    return {
+        "iterations": Metric(count.iterations / count.steps, "1", told),
+        "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
+    }
 
 
 def _peak_memory() -> float | None:
@@ -220,7 +237,7 @@ def _peak_memory() -> float | None:
 
 def _configuration(task: Task) -> dict[str, Any]:
     values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
-    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed}
+    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed, "master": task.options.as_data()}
 
 
 def _options(task: Task) -> dict[str, Any]:
@@ -238,6 +255,7 @@ def _summary(
         "reason": outcome.reason,
         "metrics": {k: _metric(m) for k, m in metrics.items()},
         "simulated_seconds": master.time,
+        **({} if master.steps is None else {"steps": asdict(master.steps)}),
         "wall_seconds": spent.wall,
         "cpu_seconds": spent.cpu,
     }

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from cosim.ssp.ssp_file import SspFile
+from scenarios import supervisor
 from scenarios.bad_call import BadCall
 from scenarios.experiment import Experiment
 from scenarios.run_folder import sha256_of
@@ -62,6 +63,7 @@ def open_experiment(
         InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
     """
     ssp = opened.enter_context(SspFile(path, step))
+    supervisor.heartbeat.tell_scratch(str(ssp.folder))
     until = stop or ssp.stop
     if until is None:
         raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")

@@ -2,10 +2,12 @@
 
 import logging
 
+from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
 from cosim.extrapolation import Extrapolation
-from cosim.master_options import MasterOptions
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.plan.memory import loop
+from cosim.plan.plan_maker import PlanMaker
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 
@@ -15,9 +17,14 @@ _WIDEST = 2**63
 """Above the numerators and denominators that the loop counts with."""
 
 
-def plan_stepper(schedule: Schedule, ensemble: Ensemble, options: MasterOptions) -> PlanStepper | None:
-    """Return what runs a system as a plan; None, with a line in the log, where the general path has to."""
-    reason = _obstacle(schedule, options)
+def plan_stepper(
+    schedule: Schedule, ensemble: Ensemble, coupling: Coupling, options: MasterOptions, *, iterates: bool
+) -> PlanStepper | None:
+    """Return what runs a system of fixed steps as a plan; None, with a line in the log, where the general path has to.
+
+    `coupling` does the same on the general path; `iterates` tells that units go over steps again.
+    """
+    reason = _obstacle(schedule, options, iterates)
     if reason is not None:
         _log.info("no compiled plan: %s", reason)
         return None
@@ -25,12 +32,15 @@ def plan_stepper(schedule: Schedule, ensemble: Ensemble, options: MasterOptions)
     if library is None:
         _log.info("no compiled plan: its library is not compiled for this machine")
         return None
-    return PlanStepper(schedule, ensemble, options.algorithm, library, clock=options.cpu_times)
+    made = PlanMaker(ensemble, schedule, options.algorithm, library, clock=options.cpu_times)
+    return PlanStepper(schedule, ensemble, coupling, made)
 
 
-def _obstacle(schedule: Schedule, options: MasterOptions) -> str | None:
+def _obstacle(schedule: Schedule, options: MasterOptions, iterates: bool) -> str | None:
     if not options.compiled:
         return "the options ask for none"
+    if iterates or options.algorithm not in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL):
+        return f"the coupling is {options.algorithm.value}" if options.algorithm.iterates else "units make a loop"
     if options.extrapolation is not Extrapolation.HOLD:
         return "inputs are extrapolated"
     if max(schedule.tick.numerator, schedule.tick.denominator) >= _WIDEST:

@@ -28,17 +28,19 @@ class PlanMaker:
         judges: for each operation that can stop the plan, what tells why.
         arrive, depart: the operations at a communication point before and after observers look.
         groups: by group, the units that are always due together.
+        library: the functions of the loop.
+        has_clock: whether CPU time is taken of steps.
     """
 
     def __init__(
-        self, ensemble: Ensemble, schedule: Schedule, algorithm: Algorithm, library: CDLL, clock: bool
+        self, ensemble: Ensemble, schedule: Schedule, algorithm: Algorithm, library: CDLL, *, clock: bool
     ) -> None:
         self.judges: dict[int, Judge] = {}
         self.groups: dict[tuple[int, bool], list[str]] = {}
         self.arrive: list[Segment] = []
         self.depart: list[Segment] = []
         self._packed: list[bytes] = []
-        self._ensemble, self._library, self._clock = ensemble, library, clock
+        self._ensemble, self.library, self.has_clock = ensemble, library, clock
         self._units = {name: i for i, name in enumerate(ensemble.instances)}
         for slots, sampled in ((schedule.sampled, True), (schedule.continuous, False)):
             for slot in slots:
@@ -69,7 +71,7 @@ class PlanMaker:
             self._close(phase, self._group_of[slot.unit], first)
 
     def _start_clock(self, phase: list[Segment]) -> None:
-        if self._clock:
+        if self.has_clock:
             self._note(operations.start_clock())
             self._close(phase, ALWAYS, len(self._packed) - 1)
 
@@ -111,7 +113,7 @@ class PlanMaker:
             arrays = buffer.native.arrays
             self._access(slot.unit, buffer, arrays)
             if isinstance(buffer, OutputBuffer):
-                kept = KeptMemory(self._library, len(arrays[0]))
+                kept = KeptMemory(self.library, len(arrays[0]))
                 buffer.kept_elsewhere = kept
                 self._note(operations.keep(self._units[slot.unit], arrays, kept.address), _out_of_memory)
         check = self._ensemble.finite_check(slot.unit)
@@ -119,7 +121,7 @@ class PlanMaker:
             self._note(operations.finite(self._units[slot.unit], block), self._judge_numbers(slot.unit, check))
 
     def _charge(self, slot: Slot) -> None:
-        if self._clock:
+        if self.has_clock:
             self._note(operations.charge(self._units[slot.unit]))
 
     def _access(self, unit: str, buffer: SignalBuffer, arrays: Views) -> None:

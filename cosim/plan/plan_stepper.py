@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
 from cosim.heartbeat import Abandoned
-from cosim.master_options import Algorithm
 from cosim.plan import memory
 from cosim.plan.plan_maker import PlanMaker
 from cosim.record_block import RecordBlock
@@ -29,13 +29,14 @@ class PlanStepper:
     """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
 
     Its states are those of `GridStepper`: either goes on from the other's.
+
+    Attributes:
+        coupling: what does the same as the plan on the general path.
     """
 
-    def __init__(
-        self, schedule: Schedule, ensemble: Ensemble, algorithm: Algorithm, library: ctypes.CDLL, *, clock: bool
-    ) -> None:
-        self._schedule, self._ensemble, self._library = schedule, ensemble, library
-        made = PlanMaker(ensemble, schedule, algorithm, library, clock)
+    def __init__(self, schedule: Schedule, ensemble: Ensemble, coupling: Coupling, made: PlanMaker) -> None:
+        self._schedule, self._ensemble, self.coupling = schedule, ensemble, coupling
+        self._library, self._clock = made.library, made.has_clock
         self._judges, self._units = made.judges, list(ensemble.instances)
         self._members = list(made.groups.values())
         n = len(self._units)
@@ -46,9 +47,8 @@ class PlanStepper:
         self._arrive = (memory.Segment * len(made.arrive))(*made.arrive)
         self._depart = (memory.Segment * len(made.depart))(*made.depart)
         self._times = (ctypes.c_double * n)()
-        self._spent = (ctypes.c_double * (n * _LONGEST if clock else 0))()
+        self._spent = (ctypes.c_double * (n * _LONGEST if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
-        self._clock = clock
         self._plan = memory.Plan(
             operations=ctypes.addressof(self._operations),
             arrive=self._arrive,
@@ -121,6 +121,7 @@ class PlanStepper:
             "tick": self._plan.tick,
             "due": {unit: due[unit] for unit in order},
             "acted": {slot.unit: acted[slot.unit] for slot in self._schedule.sampled},
+            "coupling": self.coupling.get_state(),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -128,6 +129,7 @@ class PlanStepper:
         for units, group in zip(self._members, self._groups, strict=True):
             group.due = state["due"][units[0]]
             group.acted = state["acted"].get(units[0], -1)
+        self.coupling.set_state(state["coupling"])
         self._plan.tick = state["tick"]
         self._plan.time = self._schedule.time(state["tick"])
         self._hear_times()

@@ -56,6 +56,11 @@ class SspFile:
             self.close()
             raise
 
+    @property
+    def folder(self) -> Path:
+        """Where its FMUs are unpacked until it is closed."""
+        return Path(self._folder.name)
+
     def close(self) -> None:
         """Remove the unpacked FMUs."""
         self._folder.cleanup()

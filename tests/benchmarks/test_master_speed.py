@@ -41,7 +41,7 @@ HOSTS = {
 TARGET, TARGET_RECORDED = 0.05, 0.1
 """Most us of CPU per unit and macro step."""
 WIRING = 2.0
-"""Most seconds of CPU for 1,000 units and 5,000 connections, before anything is loaded."""
+"""Most seconds of CPU for 1,000 units and 5,000 connections, until they are loaded and initialised."""
 
 
 def script(name: str, environment: dict[str, str], *arguments: object) -> Any:
@@ -86,38 +86,33 @@ def test_memory_of_a_long_record(
     assert grown[3 * 10**7] < 100.0
 
 
+def wiring(fmu: Path) -> dict[str, float]:
+    """Return what it costs to wire 1,000 units, each fed by the five before it, in seconds of CPU."""
+    marks = [time.process_time()]
+    system = System()
+    units = [system.add(f"u{i}", fmu, period=Fraction(1, 100)) for i in range(1000)]
+    for i, unit in enumerate(units):
+        for j in range(5):
+            system.connect(units[i - 1 - j].y.y, getattr(unit.u, f"u{j + 1}"))
+    marks.append(time.process_time())
+    system.check()
+    marks.append(time.process_time())
+    Schedule(system)
+    marks.append(time.process_time())
+    with Master(system) as master:
+        marks.append(time.process_time())
+        master.run(Fraction(1, 100))
+        assert [float(master.signals[f"u{i}.y"]) for i in range(7)] == [1, 2, 4, 8, 16, 32, 63]
+    stages = ("adding and connecting", "checking", "schedule", "checked and scheduled again, loaded, initialised")
+    return {what: after - before for what, before, after in zip(stages, marks[:-1], marks[1:], strict=True)}
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_wiring(benchmark: BenchmarkFixture, native_fmu: NativeFmu, fmi: int) -> None:
-    """1,000 units, each fed by the five before it."""
-    spent: dict[str, float] = {}
-    began = time.process_time()
-
-    def note(what: str) -> None:
-        nonlocal began
-        ended = time.process_time()
-        spent[what] = ended - began
-        began = ended
-
-    def wire() -> None:
-        fmu = native_fmu("hub", fmi)
-        note("building the FMU")
-        system = System()
-        units = [system.add(f"u{i}", fmu, period=Fraction(1, 100)) for i in range(1000)]
-        for i, unit in enumerate(units):
-            for j in range(5):
-                system.connect(units[i - 1 - j].y.y, getattr(unit.u, f"u{j + 1}"))
-        note("adding and connecting")
-        system.check()
-        note("checking")
-        Schedule(system)
-        note("schedule")
-        with Master(system) as master:
-            note("loading, initialising")
-            master.run(Fraction(1, 100))
-            assert [float(master.signals[f"u{i}.y"]) for i in range(7)] == [1, 2, 4, 8, 16, 32, 63]
-
-    benchmark.pedantic(wire)
+    runs: list[dict[str, float]] = []
+    benchmark.pedantic(lambda: runs.append(wiring(native_fmu("hub", fmi))), rounds=3)
+    spent = min(runs, key=lambda run: sum(run.values()))
     told = ", ".join(f"{what} {seconds:.2f}" for what, seconds in spent.items())
     print(f"\n1,000 units, 5,000 connections, FMI {fmi}, s of CPU: {told}")
     benchmark.extra_info.update(spent)
-    assert sum(spent[what] for what in ("adding and connecting", "checking", "schedule")) < WIRING
+    assert sum(spent.values()) < WIRING

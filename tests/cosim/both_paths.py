@@ -16,6 +16,9 @@ from cosim.variable import Kind
 
 Build = Callable[[], System]
 
+PLAIN = (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL)
+"""The algorithms that a plan knows."""
+
 
 @dataclass(frozen=True)
 class Ran:

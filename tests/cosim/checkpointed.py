@@ -1,7 +1,6 @@
 """Runs of native units that are cut off and go on."""
 
 import sys
-from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,15 +9,14 @@ from native_units import native_fmu
 from cosim.checkpoint import read_checkpoint
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.master import Master, Observer
-from cosim.master_options import Algorithm, MasterOptions
 from cosim.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
 
-STOP, EVERY = Fraction(40), Fraction(7, 2)
-PASSED = 20.0
+STOP, EVERY = Fraction(20), Fraction(7, 2)
+PASSED = 10.0
 """When a run tells that it may be killed, s."""
-WAITS = 20.9
+WAITS = 10.4
 """When it waits for that, before its next checkpoint, s."""
 
 
@@ -47,17 +45,17 @@ def oscillator() -> System:
     return s
 
 
-def run(folder: Path, options: MasterOptions, *others: Observer) -> None:
+def run(folder: Path, *others: Observer) -> None:
     """Run from the start, with checkpoints."""
-    with Master(oscillator(), options) as master, Recorder(record_of(folder), ["csv"]) as recorder:
+    with Master(oscillator()) as master, Recorder(record_of(folder), ["csv"]) as recorder:
         write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
         master.run(STOP, [recorder, *others, write])
 
 
-def go_on(folder: Path, options: MasterOptions) -> float:
+def go_on(folder: Path) -> float:
     """Go on from the checkpoint, with more of them; return its time."""
     c = read_checkpoint(checkpoint_of(folder))
-    with Master(oscillator(), options) as master:
+    with Master(oscillator()) as master:
         c.restore(master)
         with Recorder(record_of(folder), ["csv"], after=c.rows) as recorder:
             write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
@@ -74,11 +72,5 @@ def stop_to_be_killed(t: float, signals: Signals) -> None:  # noqa: ARG001
         sys.stdin.read()
 
 
-def main(arguments: Sequence[str]) -> None:
-    """Run in a folder by an algorithm, until killed."""
-    folder, algorithm = arguments
-    run(Path(folder), MasterOptions(algorithm=Algorithm(algorithm)), stop_to_be_killed)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run(Path(sys.argv[1]), stop_to_be_killed)

@@ -11,6 +11,7 @@ from native_units import native_fmu
 from cosim.exceptions import WiringError
 from cosim.linear import Linear
 from cosim.master import Master
+from cosim.master_options import MasterOptions
 from cosim.scaled_copy import ScaledCopy
 from cosim.system import PlacedUnit, System
 
@@ -23,12 +24,13 @@ def pair(fmi: int, **start: Any) -> tuple[System, PlacedUnit, PlacedUnit]:
     return s, s.add("a", native_fmu("workshop", fmi), **start), s.add("b", native_fmu("si", fmi))
 
 
+@pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_degrees_millimetres_and_celsius_arrive_in_si_units(fmi: int, caplog: pytest.LogCaptureFixture):
+def test_degrees_millimetres_and_celsius_arrive_in_si_units(fmi: int, compiled: bool, caplog: pytest.LogCaptureFixture):
     s, a, b = pair(fmi, angle_in=30.0, length_in=125.0, temperature_in=20.0)
     for name in QUANTITIES:
         s.connect(getattr(a.y, name), getattr(b.u, f"{name}_in"))
-    with caplog.at_level(logging.INFO, "cosim"), Master(s) as master:
+    with caplog.at_level(logging.INFO, "cosim.ensemble"), Master(s, MasterOptions(compiled=compiled)) as master:
         at_start = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]
         master.run(Fraction(1))
         at_end = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]

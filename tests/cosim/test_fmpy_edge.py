@@ -20,7 +20,10 @@ def test_a_log_line_goes_to_the_unit_that_wrote_it_however_many_are_loaded(
     logs: list[list[str]] = [[], []]
 
     def loaded(log: list[str]) -> Any:
-        return load(d.path, tmp_path, d.identifier, d.token, "mass", lambda _status, message: log.append(message))
+        def take(_status: int, message: str) -> None:
+            log.append(message)
+
+        return load(d.path, tmp_path, d.identifier, d.token, "mass", take, lambda _what: None)
 
     units = [loaded(log) for log in logs]
     with pytest.raises(FMICallException):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from native_units import native_fmu
-from oscillator import STATES, three_units
+from oscillator import PLAIN, STATES
 
 from cosim.extrapolation import Extrapolation
 from cosim.linear import Linear
@@ -70,7 +70,7 @@ def test_input_derivatives_are_used_where_a_unit_of_fmi2_interpolates(interpolat
 
 
 def test_a_run_goes_on_bit_by_bit_from_a_state():
-    with Master(three_units(Fraction(1, 100), 2), LINEAR) as master:
+    with Master(PLAIN.three_units(Fraction(1, 100), 2), LINEAR) as master:
         master.run(Fraction(1, 2))
         state = json.loads(json.dumps(master.stepper.get_state()))
         units = dict(master.ensemble.save(master.ensemble.instances))

@@ -10,7 +10,7 @@ from native_units import native_fmu
 from cosim.extrapolation import Extrapolation
 from cosim.grid_stepper import GridStepper
 from cosim.master import Master
-from cosim.master_options import MasterOptions
+from cosim.master_options import Algorithm, MasterOptions
 from cosim.native_libraries import CompilationError
 from cosim.plan import choice, memory
 from cosim.plan.plan_stepper import PlanStepper
@@ -41,12 +41,25 @@ def test_a_plain_system_is_compiled(caplog: pytest.LogCaptureFixture):
     [
         (MasterOptions(compiled=False), Fraction(1, 10), "the options ask for none"),
         (MasterOptions(extrapolation=Extrapolation.LINEAR), Fraction(1, 10), "inputs are extrapolated"),
+        (MasterOptions(algorithm=Algorithm.NEWTON), Fraction(1, 10), "the coupling is newton"),
         (MasterOptions(), Fraction(2**64, 2**65 + 1), "a tick of 18446744073709551616/36893488147419103233 s is too"),
     ],
 )
 def test_what_a_plan_cannot_do(options: MasterOptions, period: Fraction, why: str, caplog: pytest.LogCaptureFixture):
     (line,) = told(options, caplog, period)
     assert line.startswith(f"no compiled plan: {why}")
+
+
+def test_a_loop_that_is_gone_over_again(caplog: pytest.LogCaptureFixture):
+    s = System()
+    a, b = s.add("a", native_fmu("gain", 2), a=0.5), s.add("b", native_fmu("gain", 3), a=0.5, b=1.0)
+    s.connect(a.y.y, b.u.u)
+    s.connect(b.y.y, a.u.u)
+    with caplog.at_level(logging.INFO, "cosim.plan"), Master(s) as master:
+        assert isinstance(master.stepper, GridStepper)
+    assert [r.getMessage() for r in caplog.records] == ["no compiled plan: units make a loop"]
+    with Master(s, MasterOptions(algorithm=Algorithm.JACOBI)) as master:
+        assert isinstance(master.stepper, PlanStepper)
 
 
 def test_without_its_library(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture):

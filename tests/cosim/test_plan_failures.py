@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from both_paths import expect_alike, recorded
+from both_paths import PLAIN, expect_alike, recorded
 from fmu_of import FmuOf
 from native_units import native_fmu
 
@@ -15,7 +15,7 @@ from cosim.master_options import Algorithm
 from cosim.system import System
 
 
-@pytest.mark.parametrize("algorithm", list(Algorithm))
+@pytest.mark.parametrize("algorithm", PLAIN)
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize(
     ("unit", "failure"),
@@ -71,7 +71,7 @@ def test_an_exception_in_a_block_is_told_with_its_log(fmu: FmuOf, tmp_path: Path
 
 
 @pytest.mark.parametrize("factor", [3, -3])
-@pytest.mark.parametrize("algorithm", list(Algorithm))
+@pytest.mark.parametrize("algorithm", PLAIN)
 def test_a_number_that_has_become_too_large_for_its_reader(
     fmu: FmuOf, factor: int, algorithm: Algorithm, tmp_path: Path
 ):

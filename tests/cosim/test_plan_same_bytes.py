@@ -4,15 +4,18 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from both_paths import expect_alike
+from both_paths import PLAIN, expect_alike
 from fmu_of import FmuOf
 from native_units import native_fmu
 
+from cosim.linear import Linear
+from cosim.master import Master
 from cosim.master_options import Algorithm
+from cosim.signal_buffer import SignalBuffer
 from cosim.system import System
 
 SECOND = Fraction(1)
-algorithms = pytest.mark.parametrize("algorithm", list(Algorithm))
+algorithms = pytest.mark.parametrize("algorithm", PLAIN)
 
 
 def two_masses(fmi: tuple[int, int], *, slower: int = 1, step: Fraction = Fraction(1, 64)) -> System:
@@ -60,6 +63,17 @@ def test_a_second_run_goes_on_where_the_first_ended(algorithm: Algorithm, tmp_pa
 
 
 @algorithms
+def test_sampled_units_act_once_where_one_run_ends_and_another_begins(fmu: FmuOf, algorithm: Algorithm, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("sampled", fmu("Counter"), sampled=True)
+        s.add("other", native_fmu("ramp", 2), period=Fraction(1, 5))
+        return s
+
+    expect_alike(build, SECOND, tmp_path, algorithm, [Fraction(1, 2), Fraction(1, 2), SECOND])
+
+
+@algorithms
 def test_units_of_measurement_on_their_way(algorithm: Algorithm, tmp_path: Path):
     def build() -> System:
         s = System()
@@ -68,6 +82,8 @@ def test_units_of_measurement_on_their_way(algorithm: Algorithm, tmp_path: Path)
         for name in ("angle", "length", "temperature"):
             s.connect(source.y.y, getattr(other.u, f"{name}_in"))
             s.connect(getattr(other.y, name), getattr(si.u, f"{name}_in"))
+        reader = s.add("reader", native_fmu("integrator", 2))
+        s.connect(source.y.y, reader.u.u, Linear(0.3, 0.7))
         return s
 
     expect_alike(build, 5 * SECOND, tmp_path, algorithm)
@@ -130,3 +146,16 @@ def test_numbers_of_other_widths(fmu: FmuOf, fmi: int, algorithm: Algorithm, tmp
         return s
 
     assert expect_alike(build, 2 * SECOND, tmp_path, algorithm).failure is None
+
+
+def test_what_a_unit_gave_does_not_stay_in_its_memory():
+    s = System()
+    s.add("passer", native_fmu("binary_passer", 3), u=b"some bytes")
+    with Master(s) as master:
+        master.run(SECOND)
+        (getter,) = master.ensemble.instances["passer"].getters
+        kept = int(getter.native.arrays[0][0])
+        SignalBuffer.__call__(getter)  # without the copy that an OutputBuffer makes
+        assert int(getter.native.arrays[0][0]) != kept
+        getter.native.arrays[0][0] = kept
+        assert master.signals["passer.y"].tobytes() == b"some bytes"

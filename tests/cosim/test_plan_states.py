@@ -6,7 +6,6 @@ import pytest
 from fmu_of import FmuOf
 from native_units import native_fmu
 
-from cosim.gauss_seidel import GaussSeidel
 from cosim.grid_stepper import GridStepper
 from cosim.linear import Linear
 from cosim.master import Master
@@ -38,8 +37,8 @@ def test_each_goes_on_from_the_others_state(fmu: FmuOf, order: str):
         expected = [whole.signals[name].tobytes() for name in ("mass.x", "mass.v", "eye.brightness")]
     with Master(build(fmu)) as master:
         plan = master.stepper
-        general = GridStepper(master.schedule, GaussSeidel(master.ensemble))
         assert isinstance(plan, PlanStepper)
+        general = GridStepper(master.schedule, plan.coupling)
         first, second = (plan, general) if order == "plan first" else (general, plan)
         last = master.schedule.ticks(Fraction(2))
         go(first, 37, last)

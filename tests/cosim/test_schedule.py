@@ -1,3 +1,4 @@
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -84,13 +85,30 @@ def test_units_that_do_not_depend_on_each_other_keep_their_order():
     assert [x.unit for x in Schedule(s).slots] == ["z", "y", "x", "n", "m"]
 
 
-def test_an_algebraic_loop_is_spelled_out():
+def test_units_of_a_loop_stand_together_between_those_before_and_after():
+    s = system("after b c a", plain="plant")
+    connect(s, "a>b", "b>c", "c>a", "b>after")
+    schedule = Schedule(s)
+    assert schedule.has_loops
+    assert [g.units for g in schedule.groups] == [("b", "c", "a"), ("after",), ("plant",)]
+    assert schedule.groups[0].told.startswith("b.y -> c.u, c.u acts on c.y at once, c.y -> a.u")
+    assert [str(c.source) for c in schedule.groups[0].back(["a", "b", "c"])] == ["a.y"]
+    assert [str(c.source) for c in schedule.groups[0].back(["a", "b"])] == ["a.y"]
+    assert schedule.groups[0].back(["b", "c"]) == []
+
+
+def test_loops_that_share_a_unit_are_one_group():
     s = system("a b c")
-    connect(s, "a>b", "b>c", "c>a")
-    with pytest.raises(ScheduleError) as caught:
-        Schedule(s)
-    loops = ("a -> b -> c -> a", "b -> c -> a -> b", "c -> a -> b -> c")
-    assert str(caught.value).endswith(loops)
+    d = description(feedthrough=True, presumed=False, sampled=False)
+    inputs = {n: replace(d.inputs["u"], name=n) for n in ("u", "w")}
+    two = replace(d, inputs=inputs, feedthrough={"y": ("u", "w")})
+    s.units["b"] = replace(s.units["b"], description=two)
+    connect(s, "a>b", "b>a", "b>c")
+    s.connect(PortName("c", "y"), PortName("b", "w"))
+    (group,) = Schedule(s).groups
+    assert set(group.units) == {"a", "b", "c"}
+    assert len(group.circle) == 4
+    assert "(and 2 more connections between these outputs and inputs)" in group.told
 
 
 def test_a_loop_through_a_plant_is_no_algebraic_loop():

@@ -1,5 +1,6 @@
 import fcntl
 import json
+import pickle
 import shutil
 import signal
 import sys
@@ -11,8 +12,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fmus.build import cached
+from scenarios.catalog import SCENARIOS
 from scenarios.command import main
+from scenarios.parameters import parse_parameters
 from scenarios.record import Record
+from scenarios.run_folder import RunFolder
 
 sys.path.insert(0, str(Path(__file__).parent))  # killed_run
 
@@ -33,10 +37,13 @@ def summary_of(folder: Path) -> dict[str, Any]:
 
 
 def assert_same(joined: Path, whole: Path) -> None:
-    assert (joined / "signals.parquet").read_bytes() == (whole / "signals.parquet").read_bytes()
+    for record in whole.glob("signals.*"):
+        assert (joined / record.name).read_bytes() == record.read_bytes(), record.name
     assert summary_of(joined) == summary_of(whole)
     names = {str(p.relative_to(whole)) for p in whole.rglob("*")}
     assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
+    told, wanted = (json.loads((folder / "run.json").read_text()) for folder in (joined, whole))
+    assert told | {"checkpoint": None} == wanted
 
 
 def slow(*values: Any) -> Any:
@@ -46,7 +53,8 @@ def slow(*values: Any) -> Any:
 @pytest.mark.parametrize(
     ("scenario", "every", "passed", "number"),
     [
-        ("ir_grasp", 3, 7, signal.SIGKILL),
+        ("ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat", 0.7, 1.6, signal.SIGKILL),
+        slow("ir_grasp", 3, 7, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGINT),
         slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
         slow("vsl_hybrid", 0.5, 1.2, signal.SIGKILL),
@@ -58,10 +66,12 @@ def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
 ):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     waits = passed + every / 3
-    arguments = ("run", scenario, "--seed", "3", "--out")
+    arguments = ("run", *scenario.split(), "--seed", "3", "--out")
     ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
     assert ended in (-signal.SIGKILL, 1)
     assert call(*arguments, whole).exit_code == 0
+    (killed / "checkpoint.zip.part").write_text("of a process that died as it wrote one")
+    RunFolder.left_at(killed).add_to_run(failure={"kind": "killed"})  # as whoever completes the folder of a dead run
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
@@ -84,6 +94,14 @@ def test_a_run_of_an_ssp_goes_on(tmp_path: Path):
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_what_judges_a_run_can_be_kept(name: str):
+    experiment = SCENARIOS[name]()
+    watch = experiment.watch(parse_parameters(SCENARIOS[name], []))
+    kept = pickle.loads(pickle.dumps(watch))
+    assert vars(kept).keys() == vars(watch).keys()
 
 
 @pytest.fixture(scope="module")

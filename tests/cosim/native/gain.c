@@ -1,4 +1,4 @@
-/* y = a u + b, and y = a1 u1 + a2 u2 + b: direct feedthrough, for algebraic loops and chains. */
+/* y = a u + b, y = a1 u1 + a2 u2 + b, and y1 = a1 u1, y2 = a2 u2: direct feedthrough, for algebraic loops and chains. */
 #include "frame/unit.h"
 
 typedef struct {
@@ -20,6 +20,25 @@ static const Variable two[] = {
     {"b", PARAMETER, REAL, offsetof(Gain, b)},
 };
 
+typedef struct {
+    double u1, u2, y1, y2, a1, a2;
+} TwoGains;
+
+static const Variable apart[] = {
+    {"u1", INPUT, REAL, offsetof(TwoGains, u1)},
+    {"u2", INPUT, REAL, offsetof(TwoGains, u2)},
+    {"y1", OUTPUT, REAL, offsetof(TwoGains, y1), .depends = "u1"},
+    {"y2", OUTPUT, REAL, offsetof(TwoGains, y2), .depends = "u2"},
+    {"a1", PARAMETER, REAL, offsetof(TwoGains, a1), .start = 1},
+    {"a2", PARAMETER, REAL, offsetof(TwoGains, a2), .start = 1},
+};
+
+static void outputs_apart(Unit *unit) {
+    SELF(TwoGains);
+    self->y1 = self->a1 * self->u1;
+    self->y2 = self->a2 * self->u2;
+}
+
 static void outputs(Unit *unit) {
     SELF(Gain);
     self->y = self->a1 * self->u1 + self->a2 * self->u2 + self->b;
@@ -29,3 +48,7 @@ static const Model gain = {"gain", one, COUNT(one), 0.1, DERIVATIVES, sizeof(Gai
 static const Model sum = {"sum", two, COUNT(two), 0.1, DERIVATIVES, sizeof(Gain), .outputs = outputs};
 UNIT(gain)
 UNIT(sum)
+static const Model two_gains = {
+    "two_gains", apart, COUNT(apart), 0.1, DERIVATIVES, sizeof(TwoGains), .outputs = outputs_apart,
+};
+UNIT(two_gains)

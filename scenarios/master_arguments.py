@@ -1,0 +1,128 @@
+"""Options of commands that run units: how the master couples them and chooses their steps."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import click
+
+from cosim.adaptive_step import AdaptiveStep
+from cosim.extrapolation import Extrapolation
+from cosim.master_options import Algorithm, MasterOptions
+from scenarios.bad_call import BadCall
+from scenarios.ssp_call import Seconds
+
+_PLAIN = MasterOptions()
+_CONTROL = AdaptiveStep()
+
+
+class _Above0(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+    """A positive finite number; `click.FloatRange` lets infinity and not-a-number through."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not 0 < number < math.inf:
+            self.fail(f"{value!r} is not a finite number above 0, such as 1e-4", param, ctx)
+        return number
+
+
+def _choice(values: type[Algorithm] | type[Extrapolation]) -> click.Choice[str]:
+    return click.Choice([v.value for v in values])
+
+
+_OPTIONS = (
+    click.option(
+        "--algorithm",
+        type=_choice(Algorithm),
+        default=_PLAIN.algorithm.value,
+        help="Which values units step from: all from those of one time, each from the newest, or, with rollback, from"
+        " those at the end of the step, iterated to a fixed point or by Newton's method.",
+    ),
+    click.option(
+        "--tolerance",
+        type=_Above0(),
+        default=_PLAIN.tolerance,
+        help="What iterated signals may differ by, relative to their magnitude.",
+    ),
+    click.option(
+        "--iterations",
+        type=click.IntRange(min=1),
+        default=_PLAIN.most_iterations,
+        help="After so many iterations of one step, the run fails.",
+    ),
+    click.option(
+        "--extrapolation",
+        type=_choice(Extrapolation),
+        default=_PLAIN.extrapolation.value,
+        help="What inputs are during a step: held, or on a line through the last two values.",
+    ),
+    click.option(
+        "--adaptive",
+        type=_Above0(),
+        metavar="ERROR",
+        help="Let the step follow its error, with rollback: what a step may be wrong by, relative to a signal's"
+        " magnitude, such as 1e-4.  [default: fixed steps]",
+    ),
+    click.option(
+        "--adaptive-absolute",
+        type=_Above0(),
+        metavar="ERROR",
+        help="With --adaptive: what a step may be wrong by besides, relative to a signal's nominal value."
+        f"  [default: {_CONTROL.absolute:g}]",
+    ),
+    click.option(
+        "--first-step",
+        type=Seconds(),
+        metavar="SECONDS",
+        help="With --adaptive: the step to try first.  [default: the shortest that units take]",
+    ),
+    click.option(
+        "--smallest-step",
+        type=Seconds(),
+        metavar="SECONDS",
+        help="With --adaptive: the run fails where a shorter step were needed."
+        f"  [default: {float(_CONTROL.smallest):g}]",
+    ),
+    click.option(
+        "--largest-step", type=Seconds(), metavar="SECONDS", help="With --adaptive: the longest step.  [default: any]"
+    ),
+)
+_CONTROL_FIELDS: Mapping[str, str] = {
+    "adaptive_absolute": "absolute",
+    "first_step": "initial",
+    "smallest_step": "smallest",
+    "largest_step": "largest",
+}
+
+
+def master_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options; they fit `MasterOptions` by `coupling_of`."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options as those of `MasterOptions`; `given` has their values by name, and no others.
+
+    Raises:
+        BadCall: options of the control of the step are given without it. BadOptions: they contradict each other.
+    """
+    limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] is not None}
+    if given["adaptive"] is None and limits:
+        told = ", ".join("--" + name.replace("_", "-") for name in limits)
+        raise BadCall(f"{told}: with --adaptive only; without it, steps are fixed")
+    control = {_CONTROL_FIELDS[name]: value for name, value in limits.items()}
+    return {
+        "algorithm": Algorithm(given["algorithm"]),
+        "tolerance": given["tolerance"],
+        "most_iterations": given["iterations"],
+        "extrapolation": Extrapolation(given["extrapolation"]),
+        "adaptive": None if given["adaptive"] is None else AdaptiveStep(relative=given["adaptive"], **control),
+    }

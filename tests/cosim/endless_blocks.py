@@ -1,0 +1,31 @@
+"""Blocks that do not return: in a step, or as they are made, until a file appears that they are told the place of."""
+
+import os
+from pathlib import Path
+
+from master_blocks import Counter, CounterInputs, CounterOutputs, CounterParams
+
+GO_ON = "ENDLESS_BLOCKS_GO_ON"
+"""Environment variable: the file whose appearance lets them go on."""
+
+
+def _wait() -> None:
+    while not Path(os.environ[GO_ON]).exists():
+        pass
+
+
+class HangsInStep(Counter):
+    """Counts until its fourth step."""
+
+    def step(self, t: float, dt: float, u: CounterInputs) -> CounterOutputs:
+        if t > 0.29:
+            _wait()
+        return super().step(t, dt, u)
+
+
+class HangsAtOnce(Counter):
+    """Never starts."""
+
+    def __init__(self, params: CounterParams) -> None:
+        _wait()
+        super().__init__(params)

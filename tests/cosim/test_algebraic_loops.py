@@ -1,0 +1,206 @@
+"""Algebraic loops are found at ports, solved at the start and at each step, or refused with the loop spelled out."""
+
+import logging
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from native_units import native_fmu
+
+from cosim.algebraic_loop import algebraic_loops
+from cosim.exceptions import ScheduleError, UnitRefused
+from cosim.instance import Instance
+from cosim.linear import Linear
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.not_converged import NotConverged
+from cosim.schedule import Schedule
+from cosim.signals import Signals
+from cosim.system import System
+
+CIRCLE = (-2.0, 0.5, 3.0)
+every = pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT, Algorithm.NEWTON])
+
+
+def circle(gains: tuple[float, ...] = CIRCLE, fmi: int = 3, **flags: Any) -> System:
+    """Return units y = a u + 1, each of which feeds the next, the last one the first."""
+    s = System()
+    units = [s.add(f"u{i}", native_fmu("gain", fmi, **flags), a=a, b=1.0) for i, a in enumerate(gains)]
+    for source, target in zip(units, [*units[1:], units[0]], strict=True):
+        s.connect(source.y.y, target.u.u)
+    return s
+
+
+def solution(gains: tuple[float, ...] = CIRCLE) -> list[float]:
+    A = np.zeros((len(gains), len(gains)))
+    for i, a in enumerate(gains):
+        A[i, i - 1] = a
+    return np.linalg.solve(np.eye(len(gains)) - A, np.ones(len(gains))).tolist()
+
+
+@every
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_loop_of_three_units_is_solved_at_the_start(algorithm: Algorithm, fmi: int):
+    with Master(circle(fmi=fmi), MasterOptions(algorithm=algorithm)) as master:
+        assert [float(master.signals[f"u{i}.y"]) for i in range(3)] == pytest.approx(solution(), rel=1e-7)
+
+
+def test_jacobi_solves_loops_at_the_start_alone():
+    seen: list[float] = []
+    with Master(circle(), MasterOptions(algorithm=Algorithm.JACOBI)) as master:
+        master.run(Fraction(1, 10), [lambda _t, y: seen.append(float(y["u0.y"]))])
+    assert seen == pytest.approx([solution()[0]] * 2, rel=1e-7)
+    assert not master.iterates
+
+
+def driven(sampled: bool = False, **flags: Any) -> System:
+    """Return x' = 1 and y = x - 2 z, z = 3 y + 1: a loop of two units whose solution moves with time."""
+    s = System()
+    ramp = s.add("ramp", native_fmu("integrator"), u=1.0, period=Fraction(1, 10))
+    y = s.add("y", native_fmu("sum", **flags), a1=1.0, a2=-2.0, sampled=sampled)
+    z = s.add("z", native_fmu("gain", **flags), a=3.0, b=1.0, sampled=sampled)
+    s.connect(ramp.y.x, y.u.u1)
+    s.connect(z.y.y, y.u.u2)
+    s.connect(y.y.y, z.u.u)
+    return s
+
+
+@every
+@pytest.mark.parametrize("sampled", [False, True])
+def test_a_loop_is_solved_at_each_step(algorithm: Algorithm, sampled: bool):
+    seen: list[tuple[float, float, float]] = []
+
+    def observe(t: float, y: Signals) -> None:  # noqa: ARG001
+        seen.append((float(y["ramp.x"]), float(y["y.y"]), float(y["z.y"])))
+
+    with Master(driven(sampled), MasterOptions(algorithm=algorithm)) as master:
+        master.run(Fraction(1), [observe])
+    assert master.iterates
+    assert master.iterations.steps >= 10
+    for x, y, z in seen:
+        assert (y, z) == pytest.approx(((x - 2.0) / 7.0, (3.0 * x + 1.0) / 7.0), rel=1e-6, abs=1e-9)
+    assert seen[-1][0] == pytest.approx(1.0)
+
+
+def test_of_a_loop_of_several_rates_those_iterate_that_are_due():
+    s = System()
+    fast = s.add("fast", native_fmu("gain"), a=-2.0, b=1.0, period=Fraction(1, 10), sampled=True)
+    slow = s.add("slow", native_fmu("gain"), a=0.5, b=1.0, period=Fraction(1, 5), sampled=True)
+    s.connect(fast.y.y, slow.u.u)
+    s.connect(slow.y.y, fast.u.u)
+    with Master(s) as master:
+        master.run(Fraction(1, 2))
+        y = [float(master.signals[name]) for name in ("fast.y", "slow.y")]
+        assert master.iterations.steps == 3  # at 0, 0.2 and 0.4 s
+    assert y == pytest.approx([-0.5, 0.75], rel=1e-7)
+
+
+def test_a_circle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCaptureFixture):
+    s = System()
+    both = s.add("both", native_fmu("discrete_passer"), count_in=7)
+    other = s.add("other", native_fmu("discrete_passer"))
+    # truth of one acts on truth of the other alone; counts go the other way
+    s.connect(both.y.count, other.u.count_in)
+    s.connect(other.y.truth, both.u.truth_in)
+    schedule = Schedule(s)
+    assert not schedule.has_loops
+    assert [g.units for g in schedule.groups] == [("both",), ("other",)]
+    assert "both steps first where units wait for each other; it gets the former values of other" in caplog.text
+    with Master(s) as master:
+        assert int(master.signals["other.count"]) == 7
+
+
+def test_a_chain_is_worked_out_at_the_start_though_it_comes_back_to_a_unit():
+    s = System()
+    both = s.add("both", native_fmu("two_gains"), u1=5.0)
+    between = s.add("between", native_fmu("gain"), a=10.0)
+    after = s.add("after", native_fmu("gain"), a=10.0)
+    s.connect(both.y.y1, between.u.u)
+    s.connect(between.y.y, both.u.u2)
+    s.connect(both.y.y2, after.u.u)
+    with Master(s) as master:
+        assert float(master.signals["after.y"]) == 500.0
+
+
+def test_loops_are_found_with_their_ports():
+    (loop,) = algebraic_loops(driven(), ["ramp", "y", "z"])
+    assert set(loop.units) == {"y", "z"}
+    assert {str(c.source) for c in loop.connections} == {"y.y", "z.y"}
+    assert loop.told == "y.y -> z.u, z.u acts on z.y at once, z.y -> y.u2, y.u2 acts on y.y at once"
+
+
+def test_a_unit_that_feeds_itself_is_a_loop():
+    s = System()
+    a = s.add("a", native_fmu("gain"), a=-1.0, b=1.0)
+    s.connect(a.y.y, a.u.u)
+    with Master(s) as master:
+        master.run(Fraction(1, 2))
+        assert float(master.signals["a.y"]) == pytest.approx(0.5)
+
+
+def test_a_loop_whose_units_save_no_state_is_refused_and_spelled_out():
+    with pytest.raises(ScheduleError) as caught:
+        Master(driven(canGetAndSetFMUState=False))
+    told = str(caught.value)
+    assert "1 algebraic loop cannot be solved" in told
+    assert "y.y -> z.u, z.u acts on z.y at once, z.y -> y.u2, y.u2 acts on y.y at once: y, z do not save" in told
+    assert "jacobi" in told
+    with Master(driven(canGetAndSetFMUState=False), MasterOptions(algorithm=Algorithm.JACOBI)) as master:
+        assert float(master.signals["z.y"]) == pytest.approx(1.0 / 7.0, rel=1e-6)
+
+
+def test_a_loop_of_values_that_are_not_real_is_refused():
+    s = System()
+    a = s.add("a", native_fmu("discrete_passer"))
+    s.connect(a.y.count, a.u.count_in)
+    for algorithm in Algorithm:
+        with pytest.raises(ScheduleError, match=r"a\.count -> a\.count_in, .* at once: .* a\.count is integer"):
+            Master(s, MasterOptions(algorithm=algorithm))
+
+
+@every
+def test_a_loop_without_a_solution_fails_with_its_name(algorithm: Algorithm):
+    with (
+        pytest.raises(UnitRefused) as caught,
+        Master(circle((1.0, 2.0, 0.5)), MasterOptions(algorithm=algorithm, most_iterations=20)),
+    ):
+        pass
+    failure = caught.value.failure
+    assert isinstance(failure, NotConverged)
+    assert set(failure.units) == {"u0", "u1", "u2"}
+    assert "u0.y -> u1.u, u1.u acts on u1.y at once" in str(failure)
+    (name, by), *_ = failure.moving
+    assert name == "u2.y -> u0.u"
+    assert abs(by) > 0.1
+    assert "u2.y -> u0.u still moves by" in failure.told
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_directional_derivatives_give_what_differences_give(
+    fmi: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    asked: list[str] = []
+    told = Instance.directional_derivative
+
+    def spy(self: Instance, *arguments: Any) -> Any:
+        asked.append(self.name)
+        return told(self, *arguments)
+
+    monkeypatch.setattr(Instance, "directional_derivative", spy)
+    flag = "providesDirectionalDerivative" + ("" if fmi == 2 else "s")
+    for given in (True, False):
+        s = circle(CIRCLE, fmi, **{flag: given})
+        s.connections[1] = type(s.connections[1])(s.connections[1].source, s.connections[1].target, Linear(100.0, 1.0))
+        with caplog.at_level(logging.ERROR), Master(s) as master:
+            y = [float(master.signals[f"u{i}.y"]) for i in range(3)]
+        assert y == pytest.approx(converted(), rel=1e-6)
+    assert sorted(set(asked)) == ["u0", "u1", "u2"]
+    assert len(asked) == 3
+
+
+def converted() -> list[float]:
+    """The circle with y1 times 100, plus 1, at u2."""
+    a, b, c = CIRCLE
+    A = np.array([[0, 0, a], [b, 0, 0], [0, 100.0 * c, 0]])
+    return np.linalg.solve(np.eye(3) - A, [1.0, 1.0, 1.0 + c]).tolist()

@@ -1,0 +1,101 @@
+"""A unit that does not return within the limit fails the run; the others are ended, and it is left alone."""
+
+import threading
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from called import Called, fed_by
+from endless_blocks import GO_ON
+from native_units import native_fmu
+
+from cosim.failures import UnitHung
+from cosim.master import Master
+from cosim.master_options import MasterOptions
+from cosim.recorder import Recorder
+from cosim.system import System
+from fmus.build import build_block
+from scenarios.record import Record
+
+LIMIT = 1.0  # s: a unit in Python may take a while to be loaded beside other tests
+
+
+@pytest.fixture
+def endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
+    """Lets endless blocks go on, and waits until the threads that were left in them have ended."""
+    before = set(threading.enumerate())
+    file = tmp_path / "go on"
+    monkeypatch.setenv(GO_ON, str(file))
+
+    def go_on() -> None:
+        file.touch()
+        for thread in set(threading.enumerate()) - before:
+            thread.join(60)
+            assert not thread.is_alive()
+
+    yield go_on
+    go_on()
+
+
+def block(name: str, folder: Path) -> Path:
+    return build_block(f"endless_blocks:{name}", 3, folder, step=Fraction(1, 10))
+
+
+@pytest.mark.parametrize("compiled", [False, True], ids=["general", "compiled"])
+def test_a_unit_that_hangs_in_a_step_is_left_and_the_others_are_ended(
+    compiled: bool, endless: Callable[[], None], tmp_path: Path
+):
+    s, called, record = System(), Called(), tmp_path / "r.parquet"
+    s.add("steady", native_fmu("trivial"), period=Fraction(1, 10))
+    s.add("endless", block("HangsInStep", tmp_path))
+    s.add("later", native_fmu("trivial"), period=Fraction(1, 10))
+    with pytest.raises(UnitHung) as caught:  # noqa: SIM117
+        with Master(s, MasterOptions(call_limit=LIMIT, compiled=compiled), called) as master:
+            with Recorder(record) as recorder:
+                master.run(Fraction(1), [recorder])
+    assert str(caught.value) == "endless: fmi3DoStep at t = 0.3 s did not return within 1 s"
+    assert caught.value.as_data()["kind"] == "hang"
+    assert Record(record).time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    ends = [call for call in called.calls if call[1].endswith(("Terminate", "FreeInstance"))]
+    assert sorted(ends) == sorted((u, f"fmi3{c}") for u in ("later", "steady") for c in ("FreeInstance", "Terminate"))
+    number = len(called.calls)
+    endless()
+    assert called.calls[number:] == []  # the thread came back and touched no unit
+
+
+def test_a_unit_that_hangs_as_it_is_initialised(endless: Callable[[], None], tmp_path: Path):
+    s, called = System(), Called()
+    s.add("first", native_fmu("trivial"))
+    s.add("endless", block("HangsAtOnce", tmp_path))
+    with pytest.raises(UnitHung, match=r"endless: fmi3\w+ at t = 0 s did not return"):  # noqa: SIM117
+        with Master(s, MasterOptions(call_limit=LIMIT), called):
+            pass
+    assert ("first", "fmi3FreeInstance") in called.calls
+    assert ("endless", "fmi3FreeInstance") not in called.calls
+    endless()
+
+
+def test_units_that_return_are_called_from_one_thread_and_nothing_is_left_of_it():
+    before = set(threading.enumerate())
+    seen: list[str] = []
+    with Master(fed_by(native_fmu("gain"), 3), MasterOptions(call_limit=60.0)) as master:
+        master.run(Fraction(1, 2), [lambda *_: seen.append(threading.current_thread().name)])
+        master.run(Fraction(1), [lambda *_: seen.append(threading.current_thread().name)])
+    for thread in set(threading.enumerate()) - before:
+        thread.join(60)
+    assert set(seen) == {"units"}
+    assert set(threading.enumerate()) <= before
+
+
+def test_without_a_limit_there_is_no_other_thread():
+    seen: list[threading.Thread] = []
+    with Master(fed_by(native_fmu("gain"), 3)) as master:
+        master.run(Fraction(1), [lambda *_: seen.append(threading.current_thread())])
+    assert set(seen) == {threading.current_thread()}
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_limit_that_is_none_is_refused(limit: float):
+    with pytest.raises(ValueError, match="above 0 is right"):
+        MasterOptions(call_limit=limit)

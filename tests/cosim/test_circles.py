@@ -1,0 +1,134 @@
+"""Which units iterate: those in a circle, that are due together; the others step once in the order of the data."""
+
+import json
+from collections import Counter
+from fractions import Fraction
+
+import pytest
+from native_units import native_fmu
+from two_masses import TwoMasses
+
+from cosim.exceptions import ScheduleError
+from cosim.instance import Instance
+from cosim.master import Master, Observer
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.not_converged import NotConverged
+from cosim.system import System
+
+both = pytest.mark.parametrize("algorithm", [Algorithm.FIXED_POINT, Algorithm.NEWTON])
+PERIOD = Fraction(1, 10)
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    """Count the steps of each unit."""
+    counted: Counter[str] = Counter()
+    step = Instance.step
+
+    def counting(self: Instance, t: float, dt: float) -> None:
+        counted[self.name] += 1
+        step(self, t, dt)
+
+    monkeypatch.setattr(Instance, "step", counting)
+    return counted
+
+
+def test_units_off_the_circle_step_once(steps: Counter[str]):
+    s = System()
+    after = s.add("after", native_fmu("gain"), period=PERIOD)
+    ramp = s.add("ramp", native_fmu("integrator"), u=1.0, period=PERIOD)
+    a = s.add("a", native_fmu("sum"), a2=-3.0, period=PERIOD)
+    b = s.add("b", native_fmu("integrator"), period=PERIOD)
+    s.connect(ramp.y.x, a.u.u1)
+    s.connect(b.y.x, a.u.u2)
+    s.connect(a.y.y, b.u.u)
+    s.connect(b.y.x, after.u.u)
+    with Master(s, MasterOptions(algorithm=Algorithm.NEWTON)) as master:
+        master.run(Fraction(1, 2))
+        x = [float(master.signals[name]) for name in ("b.x", "after.y")]
+        count = master.iterations
+    assert steps["ramp"] == steps["after"] == 5
+    assert steps["a"] == steps["b"] == 5 + count.rollbacks > 5
+    assert x[0] == x[1]
+    expected = 0.0
+    for k in range(1, 6):  # implicit Euler of x' = t - 3 x
+        expected = (expected + 0.1 * 0.1 * k) / 1.3
+    assert x[0] == pytest.approx(expected, rel=1e-7)
+    assert [len(master.cpu[name]) for name in ("a", "b", "ramp")] == [5, 5, 5]
+
+
+@both
+def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorithm: Algorithm):
+    with pytest.raises(ScheduleError) as caught:
+        Master(TwoMasses(k_c=1.0).system(PERIOD, canGetAndSetFMUState=False), MasterOptions(algorithm=algorithm))
+    assert "a, b (connected in a circle: a, b)" in str(caught.value)
+    s = System()
+    first, second = (s.add(n, native_fmu("gain", canGetAndSetFMUState=False)) for n in ("first", "second"))
+    s.connect(first.y.y, second.u.u)
+    with Master(s, MasterOptions(algorithm=algorithm)) as master:
+        master.run(Fraction(1))
+        assert not master.iterates
+        assert str(master.iterations) == "no step was iterated"
+
+
+@both
+def test_what_does_not_converge_is_told_with_signals_time_and_iterations(algorithm: Algorithm):
+    system = TwoMasses(k_c=4000.0).system(PERIOD)
+    options = MasterOptions(algorithm=algorithm, tolerance=1e-15, most_iterations=2)
+    with pytest.raises(NotConverged) as caught, Master(system, options) as master:
+        master.run(Fraction(1))
+    e = caught.value
+    assert e.t == 0.0
+    assert e.iterations == 2
+    assert [name for name, _ in e.moving] == ["b.f -> a.f"]
+    assert "a, b: iterating at t = 0 s came to no solution in 2 iterations" in str(e)
+    assert "b.f -> a.f still moves by" in str(e)
+    assert json.loads(json.dumps(e.as_data()))["moving"].keys() == {"b.f -> a.f"}
+
+
+@both
+def test_units_of_several_rates_iterate_with_those_of_their_own(algorithm: Algorithm):
+    s = TwoMasses(k_c=100.0).system(PERIOD)
+    slow = s.add("slow", native_fmu("integrator"), period=Fraction(1, 5))
+    back = s.add("back", native_fmu("gain"), a=-0.5, b=1.0, period=Fraction(1, 5))
+    s.connect(slow.y.x, back.u.u)
+    s.connect(back.y.y, slow.u.u)
+    with Master(s, MasterOptions(algorithm=algorithm)) as master:
+        master.run(Fraction(1))
+        assert float(master.signals["slow.x"]) == pytest.approx(2.0 * (1.0 - 1.1**-5))  # implicit Euler of 1 - x/2
+        assert master.iterations.steps == 10 + 5
+
+
+@both
+def test_a_circle_may_hold_signals_that_are_not_real(algorithm: Algorithm):
+    s = System()
+    a, b = s.add("a", native_fmu("discrete_passer"), count_in=3), s.add("b", native_fmu("discrete_passer"))
+    s.connect(a.y.count, b.u.count_in)
+    s.connect(b.y.truth, a.u.truth_in)
+    with Master(s, MasterOptions(algorithm=algorithm)) as master:
+        master.run(Fraction(1, 2))
+        assert int(master.signals["b.count"]) == 3
+        assert master.iterations.steps == 0
+
+
+@both
+def test_a_run_goes_on_from_saved_states_to_the_same_bits(algorithm: Algorithm):
+    def record(seen: list[float]) -> Observer:
+        return lambda _t, y: seen.append(float(y["a.x"]))
+
+    whole: list[float] = []
+    rest: list[float] = []
+    options = MasterOptions(algorithm=algorithm)
+    with Master(TwoMasses(k_c=100.0).system(PERIOD), options) as master:
+        master.run(Fraction(1), [record(whole)])
+        state = json.loads(json.dumps(master.stepper.get_state()))
+        saved = master.ensemble.save(["a", "b"])
+        master.run(Fraction(2), [record(whole)])
+        count = str(master.iterations)
+        master.ensemble.restore(saved)
+        master.stepper.set_state(state)
+        master.run(Fraction(2), [record(rest)])
+        assert str(master.iterations) == count
+        master.ensemble.forget(saved)
+    assert rest == whole[-len(rest) :]
+    assert len(rest) == 11
