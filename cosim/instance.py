@@ -146,7 +146,6 @@ class Instance:
 
     def discarded(self, reached: float, reason: str) -> StepDiscarded:
         """Return the failure of a step that the unit discarded and that is not repeated, for a reason."""
-        self._failed = _DISCARD
         return StepDiscarded(self.name, self._step_call, self.time, reached, reason, tuple(self.log))
 
     def judge_step(self, status: int) -> None:
