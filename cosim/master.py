@@ -149,6 +149,8 @@ class Master:
 
         With Gauss-Seidel, setting inputs and getting outputs are included.
         """
+        if isinstance(self._stepper, PlanStepper):
+            self._stepper.tell_cpu()
         return self.ensemble.cpu
 
     @property

@@ -44,7 +44,7 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
     contents = {f"resources/{file}": fmu.read_bytes() for fmu, file in files.items()}
     bound = {n: u for n, u in system.units.items() if bound_values(u)}
     sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
-    contents |= {sets[n]: parameter_set(u, version) for n, u in bound.items()}
+    contents |= {sets[n]: parameter_set(u, version, name) for n, u in bound.items()}
     contents[STRUCTURE] = _Structure(system, version, files, sets).described(name, stop)
     return write_archive(path, contents)
 
