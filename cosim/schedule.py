@@ -85,7 +85,7 @@ class Schedule:
         names = [u.name for u in units]
         loops = algebraic_loops(system, names)
         self.loops += loops
-        sources = _sources(system)
+        sources = {n: {port: source.unit for port, source in system.sources_of(n).items()} for n in names}
         declared = {u.name: _acting(sources[u.name], u.description.feedthrough) for u in units}
         presumed = {u.name: _acting(sources[u.name], u.description.presumed_feedthrough) for u in units}
         groups = groups_of_loops(names, loops)
@@ -123,14 +123,6 @@ def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
         told = ", ".join(f"{u.name} {u.period} s" for u in units)
         raise ScheduleError(f"the communication steps of these units fit no common grid: {told}")
     return tick
-
-
-def _sources(system: System) -> dict[str, dict[str, str]]:
-    """Return, by unit and input, the unit that feeds it."""
-    sources: dict[str, dict[str, str]] = {name: {} for name in system.units}
-    for c in system.connections:
-        sources[c.target.unit][c.target.port] = c.source.unit
-    return sources
 
 
 def _acting_ports(unit: PlacedUnit) -> set[str]:
