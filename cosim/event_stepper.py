@@ -101,11 +101,12 @@ class EventStepper:
             course.reached = Fraction(end.reached) if end.early and end.reached < float(target) else target
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the times, and the states to which units that are ahead may have to go back; see `Stepper`."""
+        """Return times, what the coupling keeps, and states to which units ahead may have to go back; see `Stepper`."""
         ahead = [n for n, c in self._courses.items() if float(c.reached) > self.time]
         return {
             "coupling": self._coupling.get_state(),
             "begins": self._ensemble.get_begins(ahead),
+            "coupling": self._coupling.get_state(),
             "now": str(self._now),
             "due": {n: str(t) for n, t in self._due.items()},
             "acted": {n: str(t) for n, t in self._acted.items()},
