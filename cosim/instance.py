@@ -25,6 +25,7 @@ State = ctypes.c_void_p
 
 _LOG_LINES = 30
 _DISCARD, _FATAL = 2, 4
+_FMI2_TERMINATED = 3
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,15 @@ class Instance:
         Raises:
             UnitFailure: anything but OK or a warning, or the wish to end the simulation.
         """
-        self.judge(f"{self._prefix}DoStep", status)
-        if self._fmi == 3 and self._terminate.value:
-            raise UnitEnded(self.name, "fmi3DoStep", self.time, tuple(self.log))
+        if self._terminate.value if self._fmi == 3 else status == _DISCARD and self._wants_end():
+            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
+        self.judge(self._step_call, status)
+
+    def _wants_end(self) -> bool:
+        """Return whether an FMI 2 unit discarded its step because it wants the simulation to end."""
+        told = ctypes.c_int()
+        status = self._function("GetBooleanStatus")(self._component, _FMI2_TERMINATED, ctypes.byref(told))
+        return status <= 1 and bool(told.value)
 
     def judge(self, call: str, status: int) -> None:
         """Look at what a call answered at `time`.

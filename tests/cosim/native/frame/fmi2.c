@@ -74,7 +74,9 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_rollback) {
     StepEnd end;
-    return (fmi2Status)do_step(c, t, h, &end);
+    enum status status = do_step(c, t, h, &end);
+    ((Unit *)c)->wants_end = status == OK && end.terminate;
+    return ((Unit *)c)->wants_end ? fmi2Discard : (fmi2Status)status;
 }
 
 #define ACCESS(Type, kind, Field)                                                                                      \
@@ -157,7 +159,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
     if (kind != fmi2Terminated)
         return fmi2Discard;
-    *value = fmi2False;
+    *value = ((Unit *)c)->wants_end;
     return fmi2OK;
 }
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) { return fmi2Discard; }

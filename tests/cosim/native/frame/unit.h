@@ -77,6 +77,7 @@ struct Unit {
     int fmi;     /* the standard's version, 2 or 3 */
     void *owner; /* of the standard's side: how to log */
     bool event_mode, early_return;
+    bool wants_end; /* the last step of FMI 2 was discarded to end the simulation */
     char name[128];
     void (*log)(Unit *, enum status, const char *message);
     void *environment;
