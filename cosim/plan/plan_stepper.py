@@ -19,6 +19,9 @@ from cosim.signals import Signals
 _STRETCH = 0.05
 """Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""
 _LONGEST = 4096
+"""Communication points at most until then."""
+_ROOM = 2 * _LONGEST
+"""CPU times of a unit that the loop can take before they are told."""
 _LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
 _FARTHEST = 2**62
 
@@ -47,8 +50,9 @@ class PlanStepper:
         self._arrive = (memory.Segment * len(made.arrive))(*made.arrive)
         self._depart = (memory.Segment * len(made.depart))(*made.depart)
         self._times = (ctypes.c_double * n)()
-        self._spent = (ctypes.c_double * (n * _LONGEST if self._clock else 0))()
+        self._spent = (ctypes.c_double * (n * _ROOM if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
+        self._untold = 0  # communication points at which CPU times were taken that the ensemble does not know
         self._plan = memory.Plan(
             operations=ctypes.addressof(self._operations),
             arrive=self._arrive,
@@ -62,7 +66,7 @@ class PlanStepper:
             unit_times=self._times,
             spent=self._spent,
             n_spent=self._n_spent,
-            spent_capacity=_LONGEST,
+            spent_capacity=_ROOM,
             heartbeat=ensemble.heartbeat.address,
         )
         self._hear_times()
@@ -74,6 +78,7 @@ class PlanStepper:
 
     def arrive(self, last: int) -> bool:
         """Go to the next tick at which a unit is due; see `Stepper`."""
+        self._make_room(1)
         return self._concluded(self._library.plan_arrive(self._plan, min(last, _FARTHEST))) == _LAST_REACHED
 
     def depart(self) -> None:
@@ -95,6 +100,7 @@ class PlanStepper:
         watched = bool(watching) or until is not None or pause is not None
         points, leave = 1, False
         while True:
+            self._make_room(points)
             began = time.perf_counter()
             outcome = self._library.plan_run(self._plan, min(last, _FARTHEST), points, leave, rows)
             self._concluded(outcome)
@@ -106,9 +112,19 @@ class PlanStepper:
                 observe(self.time, signals)
             if outcome == _LAST_REACHED or (until is not None and until()):
                 break
+            if self._ensemble.heartbeat.stopped:
+                raise Abandoned
             leave = True
             if not watched:
                 points = min(2 * points, _LONGEST) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
+
+    def tell_cpu(self) -> None:
+        """Have the ensemble know the CPU times that the loop has taken."""
+        for i, unit in enumerate(self._units):
+            spent = array.array("d", self._spent[i * _ROOM : i * _ROOM + self._n_spent[i]])
+            self._ensemble.cpu[unit].extend(spent)
+            self._n_spent[i] = 0
+        self._untold = 0
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks; see `Stepper`."""
@@ -117,11 +133,12 @@ class PlanStepper:
         due = {unit: group.due for units, group in grouped for unit in units}
         acted = {unit: group.acted for units, group in grouped for unit in units if group.sampled}
         order = [slot.unit for slot in self._schedule.slots]
+        coupling = {"coupling": kept} if (kept := self.coupling.get_state()) else {}
         return {
             "tick": self._plan.tick,
             "due": {unit: due[unit] for unit in order},
             "acted": {slot.unit: acted[slot.unit] for slot in self._schedule.sampled},
-            "coupling": self.coupling.get_state(),
+            **coupling,
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -129,14 +146,19 @@ class PlanStepper:
         for units, group in zip(self._members, self._groups, strict=True):
             group.due = state["due"][units[0]]
             group.acted = state["acted"].get(units[0], -1)
-        self.coupling.set_state(state["coupling"])
+        self.coupling.set_state(state.get("coupling", {}))
         self._plan.tick = state["tick"]
         self._plan.time = self._schedule.time(state["tick"])
         self._hear_times()
 
-    def _concluded(self, outcome: int) -> int:
+    def _make_room(self, points: int) -> None:
+        """See to it that the CPU times of so many communication points have a place."""
         if self._clock:
-            self._collect_cpu()
+            if self._untold + points > _ROOM:
+                self.tell_cpu()
+            self._untold += points
+
+    def _concluded(self, outcome: int) -> int:
         if outcome == _ABANDONED:
             raise Abandoned
         if outcome == _STOPPED:
@@ -144,12 +166,6 @@ class PlanStepper:
             self._judges[self._plan.stopped_at](self._plan.status, self.time)
             raise RuntimeError(f"operation {self._plan.stopped_at} of the plan stopped it without a reason")
         return outcome
-
-    def _collect_cpu(self) -> None:
-        for i, unit in enumerate(self._units):
-            spent = array.array("d", self._spent[i * _LONGEST : i * _LONGEST + self._n_spent[i]])
-            self._ensemble.cpu[unit].extend(spent)
-            self._n_spent[i] = 0
 
     def _tell_times(self) -> None:
         for instance, t in zip(self._ensemble.instances.values(), self._times, strict=True):

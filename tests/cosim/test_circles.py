@@ -43,7 +43,7 @@ def test_units_off_the_circle_step_once(steps: Counter[str]):
     s.connect(b.y.x, a.u.u2)
     s.connect(a.y.y, b.u.u)
     s.connect(b.y.x, after.u.u)
-    with Master(s, MasterOptions(algorithm=Algorithm.NEWTON)) as master:
+    with Master(s, MasterOptions(algorithm=Algorithm.NEWTON, cpu_times=True)) as master:
         master.run(Fraction(1, 2))
         x = [float(master.signals[name]) for name in ("b.x", "after.y")]
         count = master.iterations
