@@ -155,7 +155,7 @@ class Instance:
             UnitFailure: anything but OK or a warning, or the wish to end the simulation.
         """
         if status == _DISCARD:
-            raise self.discarded(self._reached(), "steps are repeated shorter only if the master is told to")
+            raise self.discarded(self._reached(), "steps are repeated shorter only with repeat_discarded")
         if status == _PENDING:  # the standard knows steps that go on by themselves; nothing here would go on meanwhile
             self._function("CancelStep")(self._component)
         self.judge(self._step_call, status)
