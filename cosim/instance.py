@@ -315,7 +315,7 @@ class Instance:
         """Return how far a step came that was discarded; raise if that was because the unit wants to end."""
         reached, ended = discarded_step(self._function, self._component, self.time, self._fmi)
         if ended:
-            raise UnitEnded(self.name, self._step_call, reached, tuple(self.log))
+            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
         return reached
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
