@@ -106,7 +106,6 @@ class EventStepper:
         return {
             "coupling": self._coupling.get_state(),
             "begins": self._ensemble.get_begins(ahead),
-            "coupling": self._coupling.get_state(),
             "now": str(self._now),
             "due": {n: str(t) for n, t in self._due.items()},
             "acted": {n: str(t) for n, t in self._acted.items()},
