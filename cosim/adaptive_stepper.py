@@ -191,6 +191,7 @@ def check_control(system: System) -> None:
     """
     units = [u for u in system.units.values() if not u.sampled]
     faults = [f"{u.name} cannot save its state" for u in units if not u.description.capabilities.saves_state]
+    faults += [f"{u.name} has events, at which steps end" for u in units if u.uses_events]
     faults += [f"{u.name} takes fixed steps only" for u in units if not u.description.capabilities.varies_step]
     if not units:
         faults.append("all units act at instants, at fixed times")

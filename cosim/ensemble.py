@@ -218,9 +218,13 @@ class Ensemble:
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = Instance(name, d, unpacked[d.path], self.system.sources_of(name), self.heartbeat)
+            instance = self._make(name, unpacked[d.path])
             self._endings.add(functools.partial(self._free, instance))
             self.instances[name] = instance
+
+    def _make(self, name: str, folder: Path) -> Instance:
+        d = self.system.units[name].description
+        return Instance(name, d, folder, self.system.sources_of(name), self.heartbeat)
 
     def _watch_numbers(self) -> None:
         read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in self.instances}
@@ -253,16 +257,16 @@ class Ensemble:
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:
             with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
-                if not self._corrupt(instance):
+                if not self.is_corrupt(instance):
                     instance.end()
 
         self._endings.add(end)
 
     def _free(self, instance: Instance) -> None:
-        if not self._corrupt(instance):
+        if not self.is_corrupt(instance):
             instance.free()
 
-    def _corrupt(self, instance: Instance) -> bool:
+    def is_corrupt(self, instance: Instance) -> bool:
         """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
         path = instance.description.path
         return any(i.fatal for i in self.instances.values() if i.description.path == path)

@@ -1,6 +1,5 @@
 """Finds NaN and infinity in the outputs of a unit that feed others."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -40,8 +39,7 @@ class FiniteCheck:
             NotFinite: one is NaN or infinite.
         """
         for block in self.blocks:
-            # A sum of squares is finite only of finite numbers, and the quickest to compute; that of large ones is not.
-            if not math.isfinite(block.dot(block)):
+            if not np.isfinite(block).all():
                 failure = self.failure(t, log)
                 if failure is not None:
                     raise failure

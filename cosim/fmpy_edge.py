@@ -34,6 +34,7 @@ class ModelVariable(Protocol):
     max: str | None
     description: str | None
     declaredType: Any
+    clocks: list[Any] | None
 
 
 class ModelDescription(Protocol):

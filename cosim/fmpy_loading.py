@@ -26,8 +26,21 @@ LOADING = "loading of its library"
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
-def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger, begins: Begins) -> Any:
-    """Load and instantiate an FMI 3 co-simulation FMU; return FMPy's `FMU3Slave`.
+def load_fmi3(
+    path: Path,
+    folder: Path,
+    identifier: str,
+    token: str,
+    instance: str,
+    log: Logger,
+    begins: Begins,
+    *,
+    events: bool = False,
+) -> Any:
+    """Load and instantiate an FMI 3 co-simulation FMU, with event mode and early return or without.
+
+    Returns:
+        FMPy's `FMU3Slave`.
 
     Raises:
         InvalidFmu: the library does not load, lacks a function, or does not instantiate.
@@ -41,7 +54,7 @@ def load_fmi3(path: Path, folder: Path, identifier: str, token: str, instance: s
         fmu = FMU3Unit(guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance)
         with _unloading(fmu):
             begins("fmi3InstantiateCoSimulation")
-            fmu.instantiate(loggingOn=True, logMessage=log_message)
+            fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
         return fmu
 
 

@@ -1,20 +1,23 @@
 """What an FMU says of itself, in this engine's words: its ports with kind, shape and unit, whatever the FMI version.
 
 FMI 2 knows no arrays, and in FMI 3 some tools do without: scalar variables named `p[1]`, `p[2]`, ... (or `R[1,1]`, ...)
-that agree in type, causality and unit are taken together as one array port `p`, so that units of both standards and
-forms can stand in for each other.
+that agree in type, causality, unit and timing are taken together as one array port `p`, so that units of both standards
+and forms can stand in for each other.
 """
 
 import itertools
 import re
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from cosim.capabilities import Capabilities, capabilities_of
+from cosim.exceptions import InvalidFmu
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
+from cosim.fmu_clock import FmuClock, clocks_of, without_clocks
+from cosim.fmu_xml import XmlElement
 from cosim.units import UNKNOWN, BaseExponents, Unit
 from cosim.variable import Causality, Declared, Kind
 from cosim.width import Width
@@ -47,6 +50,7 @@ class FmuPort(Declared):
         references: one value reference in all, or one for each entry.
         discrete: whether it changes at events only.
         nominal: the magnitude that its values usually have, in its unit, where the FMU says.
+        clocks: those of whose ticks one must be for it to be reached; none where it can be reached always.
     """
 
     fmi_type: str
@@ -55,6 +59,7 @@ class FmuPort(Declared):
     mime: str | None = None
     discrete: bool = False
     nominal: float | None = None
+    clocks: tuple[str, ...] = ()
 
     @property
     def is_continuous(self) -> bool:
@@ -76,7 +81,10 @@ class FmuDescription:
 
     `feedthrough` names, by output, the inputs that it is declared to depend on at once; `presumed_feedthrough` likewise
     where nothing is declared, which the standards take as all inputs. `sampled` says that all outputs are discrete and
-    the step is fixed: such a unit acts at instants, on the values of the instant.
+    the step is fixed: such a unit acts at instants, on the values of the instant. It is stepped without event mode, in
+    which it ticks by itself, even where it declares a clock for hosts that have event mode: its results are the same
+    in all hosts then. That needs ports that can be reached without the clock, so a unit with clocked ports, or with
+    another clock than a constant one, is not sampled in this sense.
     """
 
     path: Path
@@ -92,13 +100,15 @@ class FmuDescription:
     presumed_feedthrough: Mapping[str, tuple[str, ...]]
     sampled: bool
     capabilities: Capabilities = Capabilities()
+    clocks: Mapping[str, FmuClock] = field(default_factory=dict[str, FmuClock])
 
 
 def describe_fmu(path: Path) -> FmuDescription:
     """Read an FMU's model description (FMI 2.0 or 3.0, co-simulation).
 
     Raises:
-        InvalidFmu: the file is missing, not an FMU, of another standard, or has no co-simulation interface.
+        InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, or a clock
+            that cannot tick.
     """
     md, root = read_description(path)
     is_fmi2 = md.fmiVersion == "2.0"
@@ -114,6 +124,9 @@ def describe_fmu(path: Path) -> FmuDescription:
     declared, presumed = _feedthrough(md, owner, by_causality[Causality.INPUT])
     outputs = [v for v in md.modelVariables if v.causality == "output"]
     capabilities = capabilities_of(root, 2 if is_fmi2 else 3)
+    clocks = _clocks(path, root)
+    is_discrete = bool(outputs) and all(v.variability == "discrete" for v in outputs)
+    is_clocked = not without_clocks(clocks) or any(p.clocks for p in grouped)
     return FmuDescription(
         path=path,
         fmi=2 if is_fmi2 else 3,
@@ -126,9 +139,17 @@ def describe_fmu(path: Path) -> FmuDescription:
         outputs=by_causality[Causality.OUTPUT],
         feedthrough=declared,
         presumed_feedthrough=presumed,
-        sampled=bool(outputs) and not capabilities.varies_step and all(v.variability == "discrete" for v in outputs),
+        sampled=is_discrete and not capabilities.varies_step and not is_clocked,
         capabilities=capabilities,
+        clocks=clocks,
     )
+
+
+def _clocks(path: Path, root: XmlElement) -> dict[str, FmuClock]:
+    try:
+        return clocks_of(root)
+    except ValueError as e:
+        raise InvalidFmu(path, str(e)) from e
 
 
 def _unit(u: Any) -> Unit:
@@ -141,7 +162,7 @@ def _unit(u: Any) -> Unit:
 
 def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = _KINDS.get(v.type)
-    if kind is None:  # clocks and whatever later standards bring
+    if kind is None:  # clocks, see `cosim.fmu_clock`, and whatever later standards bring
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)
@@ -169,6 +190,7 @@ def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str])
         nominal=float(nominal) if nominal is not None else None,
         width=_WIDTHS.get(v.type),
         description=v.description or "",
+        clocks=tuple(c.name for c in v.clocks or ()),
     )
 
 
@@ -192,7 +214,7 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         first = members[0][1]
         shape = members[-1][0]
         whole = [m[0] for m in members] == indices_of(shape)
-        alike = len({(p.fmi_type, p.causality, p.unit, p.discrete) for _, p in members}) == 1
+        alike = len({(p.fmi_type, p.causality, p.unit, p.discrete, p.clocks) for _, p in members}) == 1
         if shape and whole and alike:
             starts = [p.start for _, p in members]
             start = None if None in starts else " ".join(str(s) for s in starts)

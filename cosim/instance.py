@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.exceptions import InvalidFmu, last_line
+from cosim.event_failures import StepDiscarded
+from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
@@ -18,13 +19,15 @@ from cosim.magnitudes import Floats
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
+from cosim.step_end import StepEnd
+from cosim.step_status import discarded_step
 from cosim.variable import Kind
 
 State = ctypes.c_void_p
 """A saved state of one instance, which alone knows what it points to."""
 
 _LOG_LINES = 30
-_DISCARD, _FATAL = 2, 4
+_DISCARD, _FATAL, _PENDING = 2, 4, 5
 
 
 @dataclass(frozen=True)
@@ -59,10 +62,9 @@ class Instance:
         self._heartbeat = heartbeat or Heartbeat()
         self._codes: dict[str, int] = {}
         self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
-        load = load_fmi2 if self._fmi == 2 else load_fmi3
         d = description
         try:
-            self._fmu = load(d.path, folder, d.identifier, d.token, name, self._take_log_line, self._begins)
+            self._fmu = self._load(folder)
         except InvalidFmu as e:
             raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
         finally:
@@ -137,15 +139,44 @@ class Instance:
         self.judge_step(status)
         self.time = t + dt
 
+    def try_step(self, t: float, dt: float) -> StepEnd:
+        """Advance from t by dt, or as far as the unit goes.
+
+        Raises:
+            UnitFailure: the unit answered anything but OK, a warning or a discard, or ended the simulation.
+        """
+        self.time = t
+        self._begins(self._step_call)
+        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
+        self._returned()
+        if status == _DISCARD:
+            return StepEnd(self._reached(), early=True, discarded=True)
+        self.judge_step(status)
+        early = self._fmi == 3 and self._early.value and self._last_time.value < t + dt
+        self.time = self._last_time.value if early else t + dt
+        if not self.time >= t:
+            told = f"a return at t = {self.time:.9g} s, which is before the step's begin"
+            raise UnitFailure(self.name, self._step_call, t, told, tuple(self.log))
+        return StepEnd(self.time, early, self._fmi == 3 and self._event.value)
+
+    def discarded(self, reached: float, reason: str) -> StepDiscarded:
+        """Return the failure of a step that the unit discarded and that is not repeated, for a reason."""
+        self._failed = _DISCARD
+        return StepDiscarded(self.name, self._step_call, self.time, reached, reason, tuple(self.log))
+
     def judge_step(self, status: int) -> None:
         """Look at what a step that was taken at `time` answered.
 
         Raises:
             UnitFailure: anything but OK or a warning, or the wish to end the simulation.
         """
-        self.judge(f"{self._prefix}DoStep", status)
+        if status == _DISCARD:
+            raise self.discarded(self._reached(), "steps are repeated shorter only if the master is told to")
+        if status == _PENDING:  # the standard knows steps that go on by themselves; nothing here would go on meanwhile
+            self._function("CancelStep")(self._component)
+        self.judge(self._step_call, status)
         if self._fmi == 3 and self._terminate.value:
-            raise UnitEnded(self.name, "fmi3DoStep", self.time, tuple(self.log))
+            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
 
     def judge(self, call: str, status: int) -> None:
         """Look at what a call answered at `time`.
@@ -291,6 +322,23 @@ class Instance:
         self._heartbeat.end()
         if self._heartbeat.abandoned and self._abandoned:
             raise Abandoned
+
+    def _load(self, folder: Path) -> Any:
+        load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
+        return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
+
+    def _reached(self) -> float:
+        """Return how far a step came that was discarded: FMI 2 tells, in FMI 3 the unit stays where it was.
+
+        Raises:
+            UnitEnded: it was because the unit wants to end the simulation.
+        """
+        if self._fmi == 3:
+            return self.time
+        reached, ended = discarded_step(self._function, self._component, self.time)
+        if ended:
+            raise UnitEnded(self.name, self._step_call, reached, tuple(self.log))
+        return reached
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
         if self._fmi == 2:

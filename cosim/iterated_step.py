@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 
 from cosim.ensemble import Ensemble
-from cosim.failures import NotFinite
+from cosim.failures import NotFinite, UnitDiscarded
 from cosim.instance import State
 from cosim.interface import Interface
 from cosim.interface_solver import InterfaceSolver, Unsolved
@@ -48,7 +48,7 @@ class IteratedStep:
         states = self._ensemble.save([s.unit for s in slots])
         try:
             self._iterate(t, slots, states)
-        except (NotConverged, NotFinite):
+        except (NotConverged, NotFinite, UnitDiscarded):
             self._ensemble.forget(states)
             raise
         self._ensemble.forget(states)  # not after another failure: whether it still takes the call is not known

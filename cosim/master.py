@@ -10,7 +10,9 @@ from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from cosim.coupling import Coupling
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
-from cosim.exceptions import UnitFailure, UnitRefused
+from cosim.event_ensemble import EventEnsemble
+from cosim.event_stepper import EventStepper
+from cosim.exceptions import ScheduleError, UnitFailure, UnitRefused
 from cosim.extrapolation import Extrapolation
 from cosim.failures import UnitHung
 from cosim.fixed_point import FixedPoint
@@ -39,6 +41,10 @@ from cosim.watchdog import Watchdog
 T = TypeVar("T")
 
 _PLAIN = MasterOptions()
+_OFF_GRID = (
+    "inputs can follow lines only where all steps lie on one grid, and steps may end off it {}: let inputs be held "
+    "(extrapolation)"
+)
 
 Observer = Callable[[float, Signals], None]
 """Called at every communication point with the time and the signals that hold at that time."""
@@ -56,7 +62,8 @@ class Master:
 
     Raises:
         WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule` and
-            `check_control`, or units make circles that cannot be solved.
+            `check_control`; or units make circles that cannot be solved, or inputs are to be extrapolated though steps
+            may end anywhere.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -67,6 +74,9 @@ class Master:
         self.schedule = Schedule(system)
         if options.adaptive is not None:
             check_control(system)
+        if self.has_events and options.extrapolation is Extrapolation.LINEAR:
+            eventful = ", ".join(n for n, u in system.units.items() if u.uses_events)
+            raise ScheduleError(_OFF_GRID.format(f"at events ({eventful})" if eventful else "when one is discarded"))
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
@@ -98,6 +108,11 @@ class Master:
         hung = self._end()
         if hung is not None and error is None:
             raise hung
+
+    @property
+    def has_events(self) -> bool:
+        """Whether steps may end off the schedule's grid; without, a run is a plain sequence of fixed steps."""
+        return self.system.has_events or (self.options.repeat_discarded and self.options.adaptive is None)
 
     @property
     def ensemble(self) -> Ensemble:
@@ -172,7 +187,8 @@ class Master:
         return self._watchdog.carry_out(job)
 
     def _start(self) -> None:
-        ensemble = Ensemble(self.system, self.heartbeat, self._endings)
+        load = EventEnsemble if self.has_events else Ensemble
+        ensemble = load(self.system, self.heartbeat, self._endings)
         ensemble.measures_cpu = self.options.cpu_times
         ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
         self._coupling = self._couple(ensemble)
@@ -223,6 +239,8 @@ class Master:
         return pause
 
     def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
+        if isinstance(ensemble, EventEnsemble):
+            return EventStepper(self.schedule, ensemble, coupling)
         control = self.options.adaptive
         if self.options.extrapolation is Extrapolation.LINEAR:
             ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))

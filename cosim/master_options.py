@@ -44,6 +44,8 @@ class MasterOptions:
         adaptive: how the step follows the error; None for fixed steps.
         cpu_times: whether `Master.cpu` has the CPU time of every step; to take it costs 0.2 us a step.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
+        repeat_discarded: whether a step that a unit discards is repeated shorter, by all units. They then save their
+            states at every step; else a discarded step ends the run. Systems with events do so anyway.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
 
@@ -58,6 +60,7 @@ class MasterOptions:
     adaptive: AdaptiveStep | None = None
     cpu_times: bool = False
     compiled: bool = True
+    repeat_discarded: bool = False
     call_limit: float | None = None
     pace: float | None = None
 

@@ -46,8 +46,9 @@ class NotConverged(UnitFailure):
 
     @property
     def told(self) -> str:
-        """What happened, and the signal that moves most."""
-        return "; ".join([self.what, *(f"{name} still moves by {by:.3g}" for name, by in self.moving[:1])])
+        """What happened, the signal that moves most, and the loop."""
+        most = [f"{name} still moves by {by:.3g}" for name, by in self.moving[:1]]
+        return "; ".join([self.what, *most, *([f"algebraic loop: {self.loop}"] if self.loop else [])])
 
     def as_data(self) -> dict[str, Any]:
         """Return the failure as JSON can hold it."""

@@ -42,14 +42,18 @@ RECORD_FORMATS: Mapping[str, WriteRecord] = {"parquet": write_parquet, "csv": wr
 def _row_groups(schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> Generator["pa.Table", None, None]:
     """Cut rows into groups that depend on the number of columns alone, not on when rows were flushed."""
     rows = min(max(_VALUES // len(schema), _LEAST_ROWS), _MOST_ROWS)
-    waiting = schema.empty_table()
+    waiting: list[pa.RecordBatch] = []
+    have = 0
     for batch in batches:
-        waiting = pa.concat_tables([waiting, pa.Table.from_batches([batch])])
-        while waiting.num_rows >= rows:
-            yield waiting.slice(0, rows).combine_chunks()
-            waiting = waiting.slice(rows)
-    if waiting.num_rows:
-        yield waiting.combine_chunks()
+        waiting.append(batch)
+        have += batch.num_rows
+        while have >= rows:
+            whole = pa.Table.from_batches(waiting, schema)
+            yield whole.slice(0, rows).combine_chunks()
+            have -= rows
+            waiting = whole.slice(rows).to_batches()
+    if have:
+        yield pa.Table.from_batches(waiting, schema).combine_chunks()
 
 
 def _title(name: str, unit: str) -> str:

@@ -85,7 +85,7 @@ class Schedule:
         names = [u.name for u in units]
         loops = algebraic_loops(system, names)
         self.loops += loops
-        sources = _sources(system)
+        sources = {n: {port: source.unit for port, source in system.sources_of(n).items()} for n in names}
         declared = {u.name: _acting(sources[u.name], u.description.feedthrough) for u in units}
         presumed = {u.name: _acting(sources[u.name], u.description.presumed_feedthrough) for u in units}
         groups = groups_of_loops(names, loops)
@@ -99,7 +99,9 @@ class Schedule:
             _log.warning("%s does not declare what acts at once; it gets the former values of %s", names, others)
 
         def told_declared(group: int, waits: set[int]) -> None:
-            self.initial_passes += 1
+            late = {n for i in waits for n in groups[i].units}
+            ports = [(n, port) for n in groups[group].units for port in _acting_ports(system.units[n])]
+            self.initial_passes += sum(sources[n].get(port) in late for n, port in ports)
             names, others = ", ".join(groups[group].units), units_of(waits, declared, group)
             _log.warning(
                 "%s steps first where units wait for each other; it gets the former values of %s", names, others
@@ -123,12 +125,8 @@ def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
     return tick
 
 
-def _sources(system: System) -> dict[str, dict[str, str]]:
-    """Return, by unit and input, the unit that feeds it."""
-    sources: dict[str, dict[str, str]] = {name: {} for name in system.units}
-    for c in system.connections:
-        sources[c.target.unit][c.target.port] = c.source.unit
-    return sources
+def _acting_ports(unit: PlacedUnit) -> set[str]:
+    return {u for us in unit.description.feedthrough.values() for u in us}
 
 
 def _acting(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:

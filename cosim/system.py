@@ -7,7 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from cosim.event_wiring import clock_mismatch, event_faults, once_faults
 from cosim.exceptions import WiringError, nearest
+from cosim.fmu_clock import FmuClock
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from cosim.linear import Linear
 from cosim.start_values import fault_of
@@ -51,6 +53,14 @@ class PlacedUnit:
     start: Mapping[str, Any]
     period: Fraction
     sampled: bool
+
+    @property
+    def uses_events(self) -> bool:
+        """Whether it runs in event mode, in which clocks tick and steps end at events.
+
+        A sampled unit does without: it ticks by itself, see `FmuDescription`.
+        """
+        return self.description.capabilities.event_mode and not self.sampled
 
     @property
     def u(self) -> PortNames:
@@ -128,6 +138,8 @@ class System:
         faults = list(self._faults)
         for unit in self.units.values():
             faults += _value_faults(unit)
+            faults += event_faults(unit.name, unit.description, unit.sampled)
+        faults += once_faults((u.name, u.description) for u in self.units.values())
         fed: dict[PortName, PortName] = {}
         for c in self.connections:
             faults += self._connection_faults(c)
@@ -137,13 +149,30 @@ class System:
         if faults:
             raise WiringError(faults)
 
+    @property
+    def has_events(self) -> bool:
+        """Whether a unit runs in event mode: then steps may end anywhere, not only on the schedule's grid."""
+        return any(u.uses_events for u in self.units.values())
+
     def sources_of(self, unit: str) -> dict[str, PortName]:
-        """Return, by input's name, the outputs that feed a unit."""
-        return dict(self._sources.get(unit, {}))
+        """Return, by input's name, the outputs that feed a unit; its clocks are not among them."""
+        sources = self._sources.get(unit, {})
+        clocks = self.units[unit].description.clocks if unit in self.units else ()
+        return {port: source for port, source in sources.items() if port not in clocks}
+
+    def clock_connections(self) -> list[Connection]:
+        """Return the connections that let a clock tick with another."""
+        return [c for c in self.connections if c.target.port in self.units[c.target.unit].description.clocks]
+
+    def _clock(self, end: PortName) -> FmuClock | None:
+        unit = self.units.get(end.unit)
+        return unit.description.clocks.get(end.port) if unit else None
 
     def change_by(self, c: Connection) -> Linear | None:
-        """Return how a connection, one without faults, changes values; None where it copies them."""
+        """Return how a connection, one without faults, changes values; None where it copies them, or joins clocks."""
         change = c.transformation
+        if self._clock(c.target):
+            return None
         if change is None:
             a, b = (
                 self.units[c.source.unit].description.outputs[c.source.port],
@@ -155,6 +184,10 @@ class System:
         return None if change.is_identity else change
 
     def _connection_faults(self, c: Connection) -> list[str]:
+        clocks = self._clock(c.source), self._clock(c.target)
+        if any(clocks) and all(end.unit in self.units for end in (c.source, c.target)):
+            reason = clock_mismatch(*clocks)
+            return [f"{c.source} -> {c.target}: {reason}"] if reason else []
         a, fault_a = self._find(c.source, "output")
         b, fault_b = self._find(c.target, "input")
         if a is None or b is None:

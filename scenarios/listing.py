@@ -1,5 +1,6 @@
 """What `handover` prints: the catalog, a scenario's parameters, a run's summary."""
 
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -72,6 +73,8 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
         rows.append(("deadlines missed", str(PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"}))))
     _print_rows(console, rows)
     console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
+    if folder.checkpoint.exists():
+        console.print(f"to go on: handover resume {shlex.quote(str(folder.path))}", markup=False, soft_wrap=True)
 
 
 def _allowed(v: Variable) -> str:

@@ -1,6 +1,7 @@
 """What a call of `handover run` says of an SSP: until when, and at which step."""
 
 import contextlib
+import re
 import sys
 from collections.abc import Callable
 from fractions import Fraction
@@ -16,6 +17,9 @@ from scenarios.experiment import Experiment
 from scenarios.run_folder import sha256_of
 from scenarios.ssp_run import UntilStop, experiment_of
 
+_SECONDS = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
+"""Larger exponents would take long to reckon with."""
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
@@ -27,7 +31,7 @@ class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (g
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
         """Return the number."""
         try:
-            seconds = Fraction(value)
+            seconds = Fraction(value) if _SECONDS.fullmatch(value) else Fraction(0)
         except (ValueError, ZeroDivisionError):
             seconds = Fraction(0)
         if not sys.float_info.min <= seconds <= sys.float_info.max:

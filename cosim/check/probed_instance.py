@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
 class ProbedInstance(Instance):
     """A unit under test. Its inputs, strings and binaries aside, are held at their start values.
 
+    It runs without event mode; clocked ports, which can be reached only there, are left alone.
+
     Raises:
         InvalidFmu: as `Instance`.
     """
@@ -26,8 +29,9 @@ class ProbedInstance(Instance):
     def __init__(self, name: str, description: FmuDescription, folder: Path, journal: Journal) -> None:
         self._journal = journal
         journal.begins(f"fmi{description.fmi}Instantiate" + ("CoSimulation" if description.fmi == 3 else ""))
-        held = [p.name for p in description.inputs.values() if p.kind not in _WITHOUT_NUMBERS]
-        super().__init__(name, description, folder, held)
+        inputs, outputs = (_without_clock(ports) for ports in (description.inputs, description.outputs))
+        held = [p.name for p in inputs.values() if p.kind not in _WITHOUT_NUMBERS]
+        super().__init__(name, replace(description, inputs=inputs, outputs=outputs), folder, held)
 
     def start(self, t: float) -> None:
         """Set start values and go through initialisation mode; the outputs are read."""
@@ -156,3 +160,7 @@ def _bytes_of(port: FmuPort, views: tuple[Any, ...]) -> bytes:
         pairs = zip(views[0], views[1], strict=True)
         return b"\0".join(ctypes.string_at(int(a), int(n)) if a else b"" for a, n in pairs)
     return views[0].tobytes()
+
+
+def _without_clock(ports: Mapping[str, FmuPort]) -> dict[str, FmuPort]:
+    return {name: port for name, port in ports.items() if not port.clocks}

@@ -27,5 +27,8 @@ def converted(source: Unit, target: Unit) -> Linear | None:
         raise ValueError(f"the unit {(target if source.defined else source).symbol!r} is not defined")
     if source.base != target.base:
         raise ValueError(f"{source.symbol!r} cannot be converted to {target.symbol!r}: they differ in dimension")
-    change = conversion(source, target)
+    try:
+        change = conversion(source, target)
+    except OverflowError:
+        raise ValueError(f"{source.symbol!r} is too large or too small to be converted to {target.symbol!r}") from None
     return None if change.is_identity else change

@@ -8,16 +8,14 @@ from cosim.exceptions import nearest
 from cosim.fmu_description import FmuDescription
 from cosim.linear import Linear
 from cosim.ssp.changes import chained, converted
-from cosim.ssp.connected_ports import find_entry, ports_of, variable_names
+from cosim.ssp.connected_ports import find_entry, ports_of
+from cosim.ssp.connector_faults import GIVES, TAKES, connector_faults
 from cosim.ssp.given_values import Given
 from cosim.ssp.parameter_set import SspValue
 from cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
 from cosim.units import UNKNOWN, Unit
 
 _log = logging.getLogger(__name__)
-
-_GIVES = {"output", "calculatedParameter"}
-_TAKES = {"input", "parameter"}
 
 Node = tuple[str, str]
 """A connector: the path of its element, empty for the outermost system, and its name."""
@@ -93,7 +91,7 @@ class _Flattening:
                 self._enter(element, here)
             else:
                 self._connectors |= {(here, c.name): c for c in element.connectors.values()}
-                self._check_connectors(element, here)
+                self.flat.faults += connector_faults(element, here, self._descriptions[here])
                 self._bind(element, here)
         self._bind(system, path)
         for connection in system.connections:
@@ -119,25 +117,6 @@ class _Flattening:
                 rest = name.removeprefix(f"{child.name}.")
                 found = self._assign(child, _join(path, child.name), rest, value) or found
         return found
-
-    def _check_connectors(self, component: SspComponent, path: str) -> None:
-        d = self._descriptions[path]
-        for c in component.connectors.values():
-            if c.kind not in _TAKES | _GIVES:
-                continue
-            found = find_entry(ports_of(d), c.name)
-            if found is None:
-                if c.kind != "calculatedParameter":
-                    near = nearest(c.name, variable_names(d))
-                    self.flat.faults.append(f"{c.where}the FMU of {path!r} has no variable {c.name!r}; {near}")
-                continue
-            port = found[0]
-            if port.causality.value != c.kind:
-                told = f"{path}.{c.name} is an {c.kind} here and an {port.causality.value} in its FMU"
-                self.flat.faults.append(f"{c.where}{told}")
-            if _differ(c.unit, port.unit):
-                told = f"{path}.{c.name} is in {c.unit.symbol} here and in {port.unit.symbol} in its FMU"
-                self.flat.faults.append(f"{c.where}{told}")
 
     def _connect(self, system: SspNestedSystem, path: str, connection: SspConnection) -> None:
         ends = [(end, self._end(system, path, end, connection)) for end in (connection.start, connection.end)]
@@ -174,9 +153,9 @@ class _Flattening:
     def _gives(self, end: SspEnd, node: Node) -> bool | None:
         """Tell whether an end is a source within its system; None where it is neither that nor a sink."""
         kind = self._connectors[node].kind
-        if kind not in _GIVES | _TAKES:
+        if kind not in GIVES | TAKES:
             return None
-        return kind in (_TAKES if end.element is None else _GIVES)
+        return kind in (TAKES if end.element is None else GIVES)
 
     def _follow(self, target: Node) -> None:
         """Find what feeds a component's variable through the systems between."""
@@ -224,10 +203,3 @@ class _Flattening:
     def _unit(self, node: Node) -> Unit:
         own = self._own_unit(node)
         return self._connectors[node].unit if own == UNKNOWN else own
-
-
-def _differ(a: Unit, b: Unit) -> bool:
-    try:
-        return converted(a, b) is not None
-    except ValueError:
-        return a.defined and b.defined

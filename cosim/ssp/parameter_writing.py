@@ -26,11 +26,14 @@ def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
     }
 
 
-def parameter_set(unit: PlacedUnit, version: str) -> bytes:
-    """Return the SSV file of a unit's start values."""
+def parameter_set(unit: PlacedUnit, version: str, name: str) -> bytes:
+    """Return the SSV file of a unit's start values.
+
+    All units' sets have one name: Ecos applies the sets of the name that it is told.
+    """
     values = bound_values(unit)
     types = DescribedTypes(port for port, _ in values.values() if port.kind is not Kind.ENUMERATION)
-    root = root_element("ssv:ParameterSet", version, unit.name)
+    root = root_element("ssv:ParameterSet", version, name)
     parameters = ET.SubElement(root, "ssv:Parameters")
     for port, value in values.values():
         texts, names = _texts(port, value), entry_names(port)

@@ -74,6 +74,5 @@ class SspStructure:
     """The whole: its name, its outermost system, and the stop time of its default experiment, s."""
 
     name: str
-    version: str
     system: SspNestedSystem
     stop: float | None

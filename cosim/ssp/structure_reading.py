@@ -1,5 +1,6 @@
 """Reads SystemStructure.ssd and the parameter files that it refers to."""
 
+import re
 from collections.abc import Mapping
 from fractions import Fraction
 
@@ -30,6 +31,9 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
+_PERIOD = re.compile(r"[1-9]\d{0,11}(/[1-9]\d{0,11})?")
+"""Seconds as `write_ssp` writes them; what is longer could take long to reckon with."""
+
 _NO_TYPES = ("ConnectorGeometry", "Annotations", "Dimension", "MetaData", "Signature")
 """What a connector has besides its type."""
 
@@ -46,7 +50,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
         raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")
     reader = _Reader(archive, part, read_units(part, part.root, "ssd"))
     system = reader.system(systems[0])
-    return SspStructure(part.text(part.root, "name"), part.root.get("version"), system, _stop(part))
+    return SspStructure(part.text(part.root, "name"), system, _stop(part))
 
 
 def _stop(part: SspPart) -> float | None:
@@ -110,13 +114,10 @@ class _Reader:
             if annotation.get("type") != STEP_ANNOTATION:
                 continue
             for c in annotation.children:
-                try:
-                    period = Fraction(c.get("period"))
-                except (ValueError, ZeroDivisionError):
-                    period = Fraction(0)
-                if period <= 0:
-                    raise self._part.fault(c, f"period={c.get('period')[:80]!r} is not a positive number of seconds")
-                return period, self._part.flag(c, "sampled")
+                given = c.get("period")
+                if not _PERIOD.fullmatch(given):
+                    raise self._part.fault(c, f"period={given[:80]!r} is not a number of seconds such as 1/30")
+                return Fraction(given), self._part.flag(c, "sampled")
         return None, None
 
     def _connectors(self, e: XmlElement) -> dict[str, SspConnector]:

@@ -34,7 +34,8 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
 
     Raises:
         WiringError: the system has faults.
-        NotExportable: an array that is one variable is connected to one whose entries are variables.
+        NotExportable: an array that is one variable is connected to one whose entries are variables, or clocks are
+            connected.
         OSError: the file cannot be written.
     """
     system.check()
@@ -43,7 +44,7 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
     contents = {f"resources/{file}": fmu.read_bytes() for fmu, file in files.items()}
     bound = {n: u for n, u in system.units.items() if bound_values(u)}
     sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
-    contents |= {sets[n]: parameter_set(u, version) for n, u in bound.items()}
+    contents |= {sets[n]: parameter_set(u, version, name) for n, u in bound.items()}
     contents[STRUCTURE] = _Structure(system, version, files, sets).described(name, stop)
     return write_archive(path, contents)
 
@@ -115,10 +116,15 @@ class _Structure:
             ET.SubElement(annotation, "Step", {**told, "sampled": str(unit.sampled).lower()})
 
     def _add_connections(self, system: ET.Element) -> None:
-        connections = self._system.connections
+        connections, clocks = self._system.connections, self._system.clock_connections()
         parent = ET.SubElement(system, "ssd:Connections") if connections else system
         faults: list[str] = []
         for c in connections:
+            if c in clocks:
+                faults.append(
+                    f"{c.source} -> {c.target} lets a clock tick; this package knows connectors of values only"
+                )
+                continue
             a, b = self._ports(c)
             from_, to = entry_names(a), entry_names(b)
             if len(from_) != len(to):

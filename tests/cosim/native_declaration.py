@@ -25,6 +25,7 @@ class _Variable(ctypes.Structure):
         ("discrete", ctypes.c_int),
         ("counter", ctypes.c_int),
         ("resolution", ctypes.c_int),
+        ("timing", ctypes.c_char_p),
     )
 
 
@@ -56,6 +57,7 @@ class Variable:
     discrete: bool
     counter: int
     resolution: int
+    timing: str
 
     @property
     def is_continuous(self) -> bool:
@@ -99,7 +101,7 @@ def _declaration(model: _Model) -> Declaration:
     variables = tuple(
         Variable(
             i + 1, text(v.name), v.causality, v.type, v.length, v.start, text(v.unit), tuple(text(v.depends).split()),
-            text(v.clock), bool(v.discrete), v.counter, v.resolution,
+            text(v.clock), bool(v.discrete), v.counter, v.resolution, text(v.timing),
         )
         for i, v in enumerate(model.variables[: model.n_variables])
     )  # fmt: skip

@@ -125,7 +125,7 @@ def _add_variable3(rows: ElementTree.Element, d: Declaration, v: Variable) -> No
         row.set("resolution", str(v.resolution))
         row.set("intervalDecimal", repr(v.counter / v.resolution))
     elif v.type == CLOCK:
-        row.set("intervalVariability", "triggered")
+        row.set("intervalVariability", v.timing or "triggered")
     else:
         row.attrib.update(_start(v))
     if v.length:

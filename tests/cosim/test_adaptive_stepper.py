@@ -1,7 +1,7 @@
 """Steps that follow their error, on the two-mass oscillator and on units that cannot."""
 
-import json
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from oscillator import PLAIN, STATES, STIFF
 
 from cosim.adaptive_step import AdaptiveStep
 from cosim.adaptive_stepper import AdaptiveStepper
+from cosim.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
 from cosim.exceptions import BadOptions, ScheduleError
 from cosim.extrapolation import Extrapolation
 from cosim.master import Master
@@ -87,18 +88,22 @@ def test_instants_of_sampled_units_and_the_stop_time_are_met_exactly():
     assert all(t == float(round(t / grid) * grid) for t in seen)
 
 
-def test_a_run_goes_on_bit_by_bit_from_a_state():
-    with Master(PLAIN.three_units(H, 2), following(1e-4)) as master:
+@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL, Algorithm.NEWTON])
+def test_a_run_goes_on_bit_by_bit_from_a_checkpoint(algorithm: Algorithm, tmp_path: Path):
+    found: list[tuple[list[float], StepStatistics]] = []
+
+    def go_on(master: Master) -> None:
+        master.run(Fraction(1))
+        found.append(([float(master.signals[s]) for s in STATES], statistics(master)))
+
+    system, options = PLAIN.three_units(H, 2), following(1e-4, algorithm)
+    with Master(system, options) as master:
         master.run(Fraction(1, 2))
-        state = json.loads(json.dumps(master.stepper.get_state()))
-        units = dict(master.ensemble.save(master.ensemble.instances))
-        found: list[tuple[list[float], StepStatistics]] = []
-        for _ in range(2):
-            master.run(Fraction(1))
-            found.append(([float(master.signals[s]) for s in STATES], statistics(master)))
-            master.ensemble.restore(units)
-            master.stepper.set_state(state)
-        master.ensemble.forget(units)
+        write_checkpoint(tmp_path / "checkpoint", take_checkpoint(master, rows=0))
+        go_on(master)
+    with Master(system, options) as master:
+        read_checkpoint(tmp_path / "checkpoint").restore(master)
+        go_on(master)
     assert found[0] == found[1]
 
 
@@ -124,10 +129,12 @@ def test_units_that_cannot_be_rolled_back_or_vary_their_step_are_all_named():
     s.add("good", native_fmu("mass"))
     s.add("forgetful", native_fmu("mass", canGetAndSetFMUState=False))
     s.add("rigid", native_fmu("fixed_step"))
+    s.add("ball", native_fmu("ball"))
     with pytest.raises(ScheduleError) as caught:
         Master(s, following(1e-3))
     told = str(caught.value)
-    assert told == "the step cannot follow the error: forgetful cannot save its state; rigid takes fixed steps only"
+    faults = ("forgetful cannot save its state", "ball has events, at which steps end", "rigid takes fixed steps only")
+    assert told == f"the step cannot follow the error: {'; '.join(faults)}"
 
 
 def test_nothing_to_control_is_refused():

@@ -14,6 +14,7 @@ from cosim.failures import UnitHung
 from cosim.master import Master
 from cosim.master_options import MasterOptions
 from cosim.recorder import Recorder
+from cosim.signals import Signals
 from cosim.system import System
 from fmus.build import build_block
 from scenarios.record import Record
@@ -50,10 +51,9 @@ def test_a_unit_that_hangs_in_a_step_is_left_and_the_others_are_ended(
     s.add("steady", native_fmu("trivial"), period=Fraction(1, 10))
     s.add("endless", block("HangsInStep", tmp_path))
     s.add("later", native_fmu("trivial"), period=Fraction(1, 10))
-    with pytest.raises(UnitHung) as caught:  # noqa: SIM117
-        with Master(s, MasterOptions(call_limit=LIMIT, compiled=compiled), called) as master:
-            with Recorder(record) as recorder:
-                master.run(Fraction(1), [recorder])
+    options = MasterOptions(call_limit=LIMIT, compiled=compiled)
+    with pytest.raises(UnitHung) as caught, Master(s, options, called) as master, Recorder(record) as recorder:
+        master.run(Fraction(1), [recorder])
     assert str(caught.value) == "endless: fmi3DoStep at t = 0.3 s did not return within 1 s"
     assert caught.value.as_data()["kind"] == "hang"
     assert Record(record).time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
@@ -68,9 +68,9 @@ def test_a_unit_that_hangs_as_it_is_initialised(endless: Callable[[], None], tmp
     s, called = System(), Called()
     s.add("first", native_fmu("trivial"))
     s.add("endless", block("HangsAtOnce", tmp_path))
-    with pytest.raises(UnitHung, match=r"endless: fmi3\w+ at t = 0 s did not return"):  # noqa: SIM117
-        with Master(s, MasterOptions(call_limit=LIMIT), called):
-            pass
+    hangs = pytest.raises(UnitHung, match=r"endless: fmi3\w+ at t = 0 s did not return")
+    with hangs, Master(s, MasterOptions(call_limit=LIMIT), called):
+        pass
     assert ("first", "fmi3FreeInstance") in called.calls
     assert ("endless", "fmi3FreeInstance") not in called.calls
     endless()
@@ -78,20 +78,29 @@ def test_a_unit_that_hangs_as_it_is_initialised(endless: Callable[[], None], tmp
 
 def test_units_that_return_are_called_from_one_thread_and_nothing_is_left_of_it():
     before = set(threading.enumerate())
-    seen: list[str] = []
+    seen: list[threading.Thread] = []
+
+    def observe(_t: float, _signals: Signals) -> None:
+        seen.append(threading.current_thread())
+
     with Master(fed_by(native_fmu("gain"), 3), MasterOptions(call_limit=60.0)) as master:
-        master.run(Fraction(1, 2), [lambda *_: seen.append(threading.current_thread().name)])
-        master.run(Fraction(1), [lambda *_: seen.append(threading.current_thread().name)])
+        master.run(Fraction(1, 2), [observe])
+        master.run(Fraction(1), [observe])
     for thread in set(threading.enumerate()) - before:
         thread.join(60)
-    assert set(seen) == {"units"}
+    assert {t.name for t in seen} == {"units"}
+    assert len(set(seen)) == 1
     assert set(threading.enumerate()) <= before
 
 
 def test_without_a_limit_there_is_no_other_thread():
     seen: list[threading.Thread] = []
+
+    def observe(_t: float, _signals: Signals) -> None:
+        seen.append(threading.current_thread())
+
     with Master(fed_by(native_fmu("gain"), 3)) as master:
-        master.run(Fraction(1), [lambda *_: seen.append(threading.current_thread())])
+        master.run(Fraction(1), [observe])
     assert set(seen) == {threading.current_thread()}
 
 

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from native_units import native_fmu
 
+from cosim.adaptive_step import AdaptiveStep
 from cosim.checkpoint import (
     BadCheckpoint,
     Checkpoint,
@@ -24,6 +25,7 @@ from cosim.checkpoint import (
     write_checkpoint,
 )
 from cosim.complete_record import complete_record
+from cosim.extrapolation import Extrapolation
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.recorder import Recorder
@@ -74,14 +76,21 @@ def test_a_checkpoint_that_cannot_be_written_is_told_and_the_run_goes_on(
     assert "checkpoint.zip cannot be written at t = 1 s, the former one stays: Is a directory" in caplog.text
 
 
-@pytest.mark.parametrize("algorithm", Algorithm)
-def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, algorithm: Algorithm):
-    options = MasterOptions(algorithm=algorithm, cpu_times=True)
+@pytest.mark.parametrize(
+    "options",
+    [
+        *(MasterOptions(algorithm=algorithm, cpu_times=True) for algorithm in Algorithm),
+        MasterOptions(compiled=False, extrapolation=Extrapolation.LINEAR, cpu_times=True),
+        MasterOptions(adaptive=AdaptiveStep(), extrapolation=Extrapolation.LINEAR, cpu_times=True),
+    ],
+    ids=[*(algorithm.value for algorithm in Algorithm), "linear", "adaptive"],
+)
+def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, options: MasterOptions):
     points: list[Checkpoint] = []
     with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "whole.parquet") as recorder:
         master.run(Fraction(1, 5), [recorder, lambda _t, _s: points.append(take_checkpoint(master, recorder.rows))])
     whole = Record(tmp_path / "whole.parquet")
-    for c in points[:-1]:
+    for c in points[:-1:2]:
         with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "rest.parquet") as recorder:
             c.restore(master)
             assert len(master.cpu["a"]) == len(c.cpu["a"]) // 8

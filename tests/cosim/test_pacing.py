@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
+from cosim.exceptions import BadOptions
 from cosim.master import Master
 from cosim.master_options import MasterOptions
 from cosim.pacing import Pacer, PaceReport
@@ -90,5 +91,5 @@ def test_the_master_lets_each_communication_point_wait():
 
 @pytest.mark.parametrize("pace", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_pace_that_is_none_is_refused(pace: float):
-    with pytest.raises(ValueError, match="above 0 is right"):
+    with pytest.raises(BadOptions, match="above 0 is right"):
         MasterOptions(pace=pace)

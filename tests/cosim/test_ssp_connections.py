@@ -1,6 +1,7 @@
 """What connections of an SSP become: whole arrays or entries, converted or transformed, through systems or not."""
 
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from pathlib import Path
 
 import decay
@@ -38,8 +39,8 @@ def opened(tmp_path: Path) -> Open:
         ),
     )
 
-    def open_(elements: str, connections: str = "", more: str = "", before: str = "", version: str = "1.0") -> SspFile:
-        description = described(system(elements, connections, before=before), more, version)
+    def open_(elements: str, connections: str = "", more: str = "", version: str = "1.0") -> SspFile:
+        description = described(system(elements, connections), more, version)
         with SspFile(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": fmu})) as ssp:
             return ssp
 
@@ -85,6 +86,13 @@ def test_entries_that_make_up_a_whole_are_connected_as_a_whole(opened: Open):
     elements = component("a", ENTRIES) + component("b", ENTRIES)
     each = "".join(connection(f"a.q[{k}]", f"b.p[{k}]") for k in (3, 1, 2))
     assert wires(opened(elements, each)) == {"a.q -> b.p": None}
+
+
+def test_an_array_of_scalars_can_be_named_as_a_whole(opened: Open):
+    elements = component("a", connectors(q="output")) + component("b", connectors(p="input"))
+    assert wires(opened(elements, connection("a.q", "b.p"))) == {"a.q -> b.p": None}
+    entry = component("a", connectors(q="output")) + component("b", ENTRIES)
+    assert "a whole array and a single entry" in refusal(lambda: opened(entry, connection("a.q", "b.p[1]")))
 
 
 def test_entries_in_another_order_are_connected_one_by_one(opened: Open):
@@ -151,8 +159,9 @@ def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: O
     ("inside", "told"),
     [
         (connectors(z="output"), "the FMU of 'a' has no variable 'z'; "),
-        (connectors(y="input"), "a.y is an input here and an output in its FMU"),
+        (connectors(y="input"), "a.y is of kind input here and of causality output in its FMU"),
         (connectors(y="output mm"), "a.y is in mm here and in m in its FMU"),
+        (connectors(y="output").replace("Real", "Integer"), "a.y is of type Integer here and real in its FMU"),
         (connectors(u="input") * 2, "Element 'ssd:Connectors'"),
     ],
 )
@@ -187,3 +196,19 @@ def test_the_stop_time_is_the_default_experiment_s(opened: Open, start: str, sto
 def test_an_experiment_that_cannot_be_run_is_refused(opened: Open, start: str, stop: str, told: str):
     more = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
     assert told in refusal(lambda: opened(TWO, more=more))
+
+
+def test_an_fmu_that_proposes_no_step_needs_one(tmp_path: Path):
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited((' stepSize="0.1"', "")))
+    file = pack_ssp(tmp_path / "a.ssp", described(system(component("a"))), {"resources/unit.fmu": fmu})
+    assert "a: its FMU proposes no communication step; give one" in refusal(lambda: SspFile(file))
+    with SspFile(file, Fraction(1, 30)) as ssp:
+        assert ssp.system.units["a"].period == Fraction(1, 30)
+
+
+@pytest.mark.parametrize("period", ["0", "-1/30", "1e999999999", "1/0", "", "0.1"])
+def test_an_annotated_step_is_a_fraction(opened: Open, period: str):
+    step = f'<Step xmlns="urn:handover:communication" period="{period}" sampled="true"/>'
+    annotated = f'<ssc:Annotation type="handover.communication">{step}</ssc:Annotation>'
+    told = refusal(lambda: opened(component("a", f"<ssd:Annotations>{annotated}</ssd:Annotations>")))
+    assert f"period={period!r} is not a number of seconds such as 1/30" in told

@@ -23,11 +23,9 @@ COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "c
 
 
 def failed(bad: str, fmi: int, record: Path, *, compiled: bool) -> tuple[UnitFailure, Called]:
-    called = Called()
-    with pytest.raises(UnitFailure) as caught:  # noqa: SIM117
-        with Master(fed_by(native_fmu(bad, fmi), fmi), MasterOptions(compiled=compiled), called) as master:
-            with Recorder(record) as recorder:
-                master.run(Fraction(1), [recorder])
+    called, system, options = Called(), fed_by(native_fmu(bad, fmi), fmi), MasterOptions(compiled=compiled)
+    with pytest.raises(UnitFailure) as caught, Master(system, options, called) as master, Recorder(record) as recorder:
+        master.run(Fraction(1), [recorder])
     return caught.value, called
 
 

@@ -22,18 +22,18 @@ def main(job_file: str, result_file: str) -> None:
     log_output_level(CosimLogLevel.ERROR)
     execution = CosimExecution.from_ssp_file(job["ssp"], job["step"]) if job["ssp"] else assembled(job)
     slaves = {info.name.decode(): info.index for info in execution.slave_infos()}
-    numbers = [slaves[unit["name"]] for unit in job["units"]]
+    places = [slaves[unit["name"]] for unit in job["units"]]
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     check(execution.add_observer(observer))
     check(execution.add_manipulator(manipulator))
     rows: list[Any] = []
     for k in range(job["steps"]):
-        for i, unit in zip(numbers, job["units"], strict=True):
+        for i, unit in zip(places, job["units"], strict=True):
             for kind, values in unit["driven"][k].items():
                 references, numbers = zip(*values, strict=True)
                 check(getattr(manipulator, f"slave_{kind}_values")(i, list(references), list(numbers)))
         check(execution.step())
-        rows.append([read(observer, i, unit["outputs"]) for i, unit in zip(numbers, job["units"], strict=True)])
+        rows.append([read(observer, i, unit["outputs"]) for i, unit in zip(places, job["units"], strict=True)])
     Path(result_file).write_text(json.dumps(rows))
 
 

@@ -1,37 +1,22 @@
 """A scenario that was exported as an SSP, in libcosim and in our own master."""
 
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from libcosim_job import Job, known
 from own_master import Placed
+from ssp_rows import STEP, STEPS, exported, own_rows
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
 from cosim.ssp.ssp_file import SspFile
-from scenarios.command import main
-
-STEP, STEPS = Fraction(2, 125), 100
 
 
 @pytest.mark.slow
 def test_an_exported_scenario_in_libcosim_is_the_same_as_in_our_own_master(tmp_path: Path):
-    file = tmp_path / "flyer.ssp"
-    done = CliRunner().invoke(main, ["export", "flyer_impedance", "--ssp", str(file), "--seed", "3"])
-    assert done.exit_code == 0, done.output
-    wanted: list[dict[str, float]] = []
-
-    def observe(t: float, signals: Signals) -> None:  # noqa: ARG001
-        wanted.append({c.name: float(c.values[c.index]) for c in signals.columns()})
-
+    file = exported(tmp_path)
     with SspFile(file, STEP) as ssp:
+        wanted = own_rows(ssp)
         units = {name: Placed(unit.description.path) for name, unit in ssp.system.units.items()}
-        with Master(ssp.system, MasterOptions(algorithm=Algorithm.JACOBI)) as master:
-            master.run(STEPS * STEP, [observe])
         job = Job(units, STEP, STEPS, ssp=file)
         found = job.run(tmp_path)
         names = [f"{unit}.{port.name}" for unit in units for port in known(job.description(unit).outputs)]

@@ -14,9 +14,12 @@ from click.testing import CliRunner, Result
 from fmus.build import cached
 from scenarios.catalog import SCENARIOS
 from scenarios.command import main
+from scenarios.experiment import Outcome
+from scenarios.listing import print_summary
 from scenarios.parameters import parse_parameters
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
+from scenarios.runner import Ended
 
 sys.path.insert(0, str(Path(__file__).parent))  # killed_run
 
@@ -120,6 +123,23 @@ def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def copy(left: Path, tmp_path: Path) -> Path:
     """Copy it."""
     return Path(shutil.copytree(left, tmp_path / "run"))
+
+
+def test_a_run_that_can_go_on_is_told_how(copy: Path, capsys: pytest.CaptureFixture[str]):
+    summary: dict[str, Any] = {
+        "scenario": "ir_grasp",
+        "success": False,
+        "reason": "interrupted",
+        "metrics": {},
+        "simulated_seconds": 0.3,
+        "wall_seconds": 1.0,
+    }
+    ended = Ended(outcome=Outcome(success=False, reason="interrupted"), summary=summary)
+    print_summary(ended, (), RunFolder.left_at(copy))
+    assert f"to go on: handover resume {copy}\n" in capsys.readouterr().out
+    (copy / "checkpoint.zip").unlink()
+    print_summary(ended, (), RunFolder.left_at(copy))
+    assert "to go on" not in capsys.readouterr().out
 
 
 def assert_refused(folder: Path, told: str) -> None:

@@ -1,5 +1,6 @@
 """`handover run FILE.ssp`: what it leaves, and how it answers what it cannot run."""
 
+import hashlib
 import json
 import sys
 import zipfile
@@ -46,7 +47,10 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
     assert record["left.x"][-1] == 4.0
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["success"], summary["simulated_seconds"]) == (True, 2.0)
-    units = json.loads((out / "run.json").read_text())["units"]
+    told = json.loads((out / "run.json").read_text())
+    sha256 = hashlib.sha256((tmp_path / "springs.ssp").read_bytes()).hexdigest()
+    assert (told["source"]["sha256"], told["source"]["stop"]) == (sha256, "2")
+    units = told["units"]
     assert {u: told["fmu"] for u, told in units.items()} == dict.fromkeys(("left", "right"), "TearingSpring.fmi2.fmu")
     page = (out / "report.html").read_text()
     assert "two springs" in page

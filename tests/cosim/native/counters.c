@@ -1,10 +1,11 @@
-/* Counts the ticks of its Clock by an increment; at each `every`-th count its output Clock `carry` ticks.
+/* Counts the ticks of its Clock by an increment; at each `every`-th count its output Clock `carry`
+ * ticks, and `carried` is by one more.
  *
  * Three have a periodic Clock, of 1/10, 1/4 and 1/3 s; one is triggered, by another's `carry`. */
 #include "frame/unit.h"
 
 typedef struct {
-    int32_t tick, carry, increment, count, before, every;
+    int32_t tick, carry, increment, count, before, every, carried, carried_before;
 } Counter;
 
 #define VARIABLES(...)                                                                                                 \
@@ -14,6 +15,7 @@ typedef struct {
         {"increment", INPUT, INTEGER, offsetof(Counter, increment), .start = 1, .clock = "tick"},                      \
         {"count", OUTPUT, INTEGER, offsetof(Counter, count), .clock = "tick", .depends = "increment"},                 \
         {"every", PARAMETER, INTEGER, offsetof(Counter, every), .start = 2},                                           \
+        {"carried", OUTPUT, INTEGER, offsetof(Counter, carried), .clock = "carry"},                                    \
     }
 static const Variable of_tenths[] = VARIABLES(.counter = 1, .resolution = 10);
 static const Variable of_quarters[] = VARIABLES(.counter = 1, .resolution = 4);
@@ -26,11 +28,13 @@ static void outputs(Unit *unit) {
         return;
     self->count = self->before + self->increment;
     self->carry = self->every > 0 && self->count % self->every == 0;
+    self->carried = self->carried_before + self->carry;
 }
 
 static void update(Unit *unit, Update *update) {
     SELF(Counter);
     self->before = self->count;
+    self->carried_before = self->carried;
 }
 
 #define COUNTER(name, table)                                                                                           \

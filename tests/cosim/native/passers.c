@@ -1,4 +1,6 @@
-/* y = u at once, for an array, bytes, an integer and a truth value; FMI 3 alone has the first two. */
+/* y = u at once, for an array, bytes, an integer and a truth value; FMI 3 alone has the first two.
+ *
+ * bytes_keeper: y = u too, but at events, as u is discrete. */
 #include "frame/unit.h"
 
 typedef struct {
@@ -26,6 +28,11 @@ static const Variable discrete[] = {
     {"truth", OUTPUT, BOOLEAN, offsetof(DiscretePasser, truth), .depends = "truth_in"},
 };
 
+static const Variable kept_bytes[] = {
+    {"u", INPUT, BINARY, offsetof(BinaryPasser, u)},
+    {"y", OUTPUT, BINARY, offsetof(BinaryPasser, y)},
+};
+
 static void pass_array(Unit *unit) {
     SELF(ArrayPasser);
     for (int i = 0; i < 3; i++)
@@ -41,6 +48,11 @@ static void pass_discrete(Unit *unit) {
     self->truth = self->truth_in;
 }
 
+static void keep_bytes(Unit *unit, Update *update) {
+    SELF(BinaryPasser);
+    self->y = self->u;
+}
+
 static const Model array_passer = {
     "array_passer", of_arrays, COUNT(of_arrays), 0.1, 0, sizeof(ArrayPasser), .outputs = pass_array,
 };
@@ -50,6 +62,10 @@ static const Model binary_passer = {
 static const Model discrete_passer = {
     "discrete_passer", discrete, COUNT(discrete), 0.1, 0, sizeof(DiscretePasser), .outputs = pass_discrete,
 };
+static const Model bytes_keeper = {
+    "bytes_keeper", kept_bytes, COUNT(kept_bytes), 0.1, EVENTS, sizeof(BinaryPasser), .update = keep_bytes,
+};
 UNIT(array_passer)
 UNIT(binary_passer)
 UNIT(discrete_passer)
+UNIT(bytes_keeper)

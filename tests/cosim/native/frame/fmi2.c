@@ -74,7 +74,8 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_rollback) {
     StepEnd end;
-    return (fmi2Status)do_step(c, t, h, &end);
+    fmi2Status status = (fmi2Status)do_step(c, t, h, &end);
+    return status == fmi2OK && end.terminate ? fmi2Discard : status;
 }
 
 #define ACCESS(Type, kind, Field)                                                                                      \
@@ -157,7 +158,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
     if (kind != fmi2Terminated)
         return fmi2Discard;
-    *value = fmi2False;
+    *value = ((Unit *)c)->kept->terminated;
     return fmi2OK;
 }
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) { return fmi2Discard; }

@@ -200,8 +200,14 @@ fmi3Status fmi3GetIntervalFraction(REFERENCES, fmi3UInt64 counters[], fmi3UInt64
     return fmi3OK;
 }
 fmi3Status fmi3GetIntervalDecimal(REFERENCES, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]) {
+    Unit *unit = c;
     for (size_t i = 0; i < n; i++) {
         fmi3UInt64 counter, resolution;
+        const Variable *v = variable(unit, vr[i], CLOCK, false, "fmi3GetIntervalDecimal");
+        if (v && v->timing && allowed(unit, INITIALIZATION | EVENT, "fmi3GetIntervalDecimal")) {
+            qualifiers[i] = (fmi3IntervalQualifier)unit->model->interval(unit, intervals + i);
+            continue;
+        }
         if (fmi3GetIntervalFraction(c, vr + i, 1, &counter, &resolution, qualifiers + i) != fmi3OK)
             return fmi3Error;
         intervals[i] = (fmi3Float64)counter / (fmi3Float64)resolution;

@@ -64,6 +64,28 @@ bool allowed(Unit *unit, int modes, const char *call) {
 
 void *place(Unit *unit, const Variable *v) { return unit->kept->data + v->offset; }
 
+static const Variable *named(Unit *unit, const char *name) {
+    for (size_t i = 0; i < unit->model->n_variables; i++)
+        if (!strcmp(unit->model->variables[i].name, name))
+            return &unit->model->variables[i];
+    return NULL;
+}
+
+/* Clocked variables are there while their Clock ticks; discrete inputs wait for Event Mode, if that is used. */
+static bool reachable(Unit *unit, const Variable *v, bool to_set, const char *call) {
+    int mode = unit->kept->mode;
+    const Variable *clock = v->clock ? named(unit, v->clock) : NULL;
+    if (clock && mode & (STEP | EVENT) && !*(int32_t *)place(unit, clock)) {
+        say(unit, ERROR, "%s: %s is reached only while %s ticks", call, v->name, v->clock);
+        return false;
+    }
+    if (to_set && unit->event_mode && mode == STEP && v->type != CLOCK && (v->discrete || v->type != REAL)) {
+        say(unit, ERROR, "%s: %s is discrete, it is set in event mode", call, v->name);
+        return false;
+    }
+    return true;
+}
+
 const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to_set, const char *call) {
     const Variable *v = reference - 1u < unit->model->n_variables ? &unit->model->variables[reference - 1] : NULL;
     if (!v || v->type != (int)type || (to_set && v->causality == OUTPUT)) {
@@ -71,6 +93,8 @@ const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to
         return NULL;
     }
     if (to_set && v->causality == PARAMETER && !allowed(unit, INSTANTIATED | INITIALIZATION, call))
+        return NULL;
+    if (!reachable(unit, v, to_set, call))
         return NULL;
     if (to_set)
         unit->kept->stale = true;
@@ -112,6 +136,7 @@ enum status do_step(Unit *unit, double t, double h, StepEnd *end) {
         memcpy(kept->data + model->size, kept->data, model->size);
     enum status status = model->step ? model->step(unit, t, h, end) : OK;
     kept->last_time = end->last_time;
+    kept->terminated = end->terminate;
     if (status <= DISCARD) {
         kept->time = end->last_time;
         kept->last_step = end->last_time - t;

@@ -32,6 +32,7 @@ typedef struct {
     const char *clock;      /* the clock that a clocked variable belongs to */
     int discrete;           /* a real that changes at events or steps only */
     int counter, resolution; /* of a clock: its constant interval is counter/resolution s; without, it is triggered */
+    const char *timing;      /* of a clock: its intervalVariability, if the model tells its intervals */
 } Variable;
 
 typedef struct Unit Unit;
@@ -62,12 +63,14 @@ typedef struct {
     void (*outputs)(Unit *);                                     /* outputs from states and inputs */
     enum status (*step)(Unit *, double t, double h, StepEnd *);
     void (*update)(Unit *, Update *);                            /* discrete states, at an event */
+    int (*interval)(Unit *, double *);                           /* of its clock that has a `timing`: what
+                                                                    fmi3IntervalQualifier it is */
 } Model;
 
 /* All of it that a saved state holds lies in one block, `kept`. */
 typedef struct {
     double time, last_time, last_step;
-    int32_t mode, stale; /* stale: inputs were set since outputs were computed */
+    int32_t mode, terminated, stale; /* stale: inputs were set since outputs were computed */
     double rates[MAX_VARIABLES][MAX_ORDER];
     _Alignas(16) unsigned char data[]; /* the unit's struct, and again as it was before the last step */
 } Kept;

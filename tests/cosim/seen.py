@@ -1,0 +1,28 @@
+"""What observers of a run see."""
+
+from fractions import Fraction
+
+from cosim.master import Master
+from cosim.master_options import MasterOptions
+from cosim.signals import Signals
+from cosim.system import System
+
+Rows = dict[float, tuple[float, ...]]
+
+
+def seen(system: System, stop: Fraction, *names: str, options: MasterOptions | None = None) -> Rows:
+    """Run a system; return the values of signals by time, which must increase."""
+    rows: Rows = {}
+
+    def observe(t: float, y: Signals) -> None:
+        assert not rows or t > max(rows)
+        rows[t] = tuple(float(y[n]) for n in names)
+
+    with Master(system, options or MasterOptions()) as master:
+        master.run(stop, [observe])
+    return rows
+
+
+def grid(n: int, stop: int = 1) -> list[float]:
+    """The times k / n up to `stop`."""
+    return [k / n for k in range(stop * n + 1)]

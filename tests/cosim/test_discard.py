@@ -1,0 +1,100 @@
+"""A unit discards a step: it is repeated shorter by all, or the run ends and says so."""
+
+from fractions import Fraction
+
+import pytest
+from native_units import native_fmu
+from seen import grid, seen
+
+from cosim.event_failures import StepDiscarded
+from cosim.exceptions import UnitFailure
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.system import System
+
+ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
+REPEATING = MasterOptions(repeat_discarded=True)
+
+
+def system(fmi: int, other: str = "integrator", **flags: bool) -> System:
+    """A unit that takes no steps above 0.04 s, in steps of 0.1 s beside another one."""
+    s = System()
+    s.add("short", native_fmu("discards", fmi, **flags))
+    s.add("other", native_fmu(other, 3), u=1.0)
+    return s
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_all_repeat_a_step_as_far_as_the_unit_came(algorithm: Algorithm):
+    options = MasterOptions(repeat_discarded=True, algorithm=algorithm)
+    rows = seen(system(2), Fraction(1, 2), "short.y", "other.x", options=options)
+    shorter = [begin + part for begin in grid(10)[:5] for part in (0.0, 0.04, 0.08)] + [0.5]
+    assert list(rows) == pytest.approx(shorter, abs=1e-12)
+    for t, row in rows.items():
+        assert row == pytest.approx((t, t), abs=1e-12)
+
+
+def test_fmi_3_tells_no_time_so_halves_are_tried():
+    rows = seen(system(3), Fraction(1, 5), "short.y", "other.x", options=REPEATING)
+    assert list(rows)[:5] == pytest.approx([0.0, 0.025, 0.0625, 0.1, 0.125], abs=1e-12)
+    for t, row in rows.items():
+        assert row == pytest.approx((t, t), abs=1e-12)
+
+
+@pytest.mark.parametrize(("fmi", "came"), [(2, "0.04"), (3, "0")])
+def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
+    with pytest.raises(StepDiscarded) as failure:
+        seen(system(fmi), Fraction(1, 2), "short.y")
+    assert failure.value.reached == pytest.approx(float(came))
+    assert failure.value.headline == (
+        f"short: fmi{fmi}DoStep at t = 0 s answered Discard, having reached t = {came} s; "
+        "steps are repeated shorter only if the master is told to"
+    )
+    assert failure.value.told.startswith("[Discard] a step of 0.1 s is longer than 0.04 s (steps are repeated")
+
+
+def test_a_unit_that_cannot_go_back_is_told():
+    s = system(2, canGetAndSetFMUstate=False, canSerializeFMUstate=False)
+    with pytest.raises(StepDiscarded, match=r"having reached t = 0.04 s; short cannot save its state or vary its step"):
+        seen(s, Fraction(1, 2), "short.y", options=REPEATING)
+
+
+def test_others_that_cannot_go_back_are_told():
+    s = system(2, "fixed_step")
+    with pytest.raises(StepDiscarded, match="the others would have to go back too, and other cannot save its state"):
+        seen(s, Fraction(1, 2), "short.y", options=REPEATING)
+
+
+def test_a_unit_that_discards_every_step_ends_the_run():
+    s = System()
+    s.add("short", native_fmu("discards", 3), longest=1e-9)
+    with pytest.raises(StepDiscarded, match=r"steps down to 9.77e-05 s were tried"):
+        seen(s, Fraction(1, 2), "short.y", options=REPEATING)
+
+
+def test_repetition_changes_nothing_where_nothing_is_discarded():
+    def two_masses() -> System:
+        s = System()
+        mass, spring = s.add("mass", native_fmu("mass"), x0=1.0), s.add("spring", native_fmu("sprung_mass"), k_c=2.0)
+        s.connect(mass.y.x, spring.u.x1)
+        s.connect(mass.y.v, spring.u.v1)
+        s.connect(spring.y.f, mass.u.f)
+        return s
+
+    names = ("mass.x", "spring.x", "spring.f")
+    assert seen(two_masses(), Fraction(3), *names, options=REPEATING) == seen(two_masses(), Fraction(3), *names)
+
+
+def test_units_are_told_apart_that_have_events():
+    with Master(system(2)) as plain, Master(system(2), REPEATING) as repeating:
+        assert (plain.has_events, repeating.has_events) == (False, True)
+    s = System()
+    s.add("ball", native_fmu("ball"))
+    assert Master(s).has_events
+
+
+def test_a_step_that_goes_on_by_itself_is_not_waited_for():
+    s = System()
+    s.add("pending", native_fmu("pending", 2))
+    with pytest.raises(UnitFailure, match=r"pending: fmi2DoStep at t = 0.2 s answered Pending"):
+        seen(s, Fraction(1, 2), "pending.count")

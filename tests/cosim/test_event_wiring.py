@@ -1,0 +1,106 @@
+"""What is refused before anything starts: clocks that cannot tick, and units of which there may be one."""
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from native_units import native_fmu
+
+from cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
+from cosim.extrapolation import Extrapolation
+from cosim.fmu_description import describe_fmu
+from cosim.master import Master
+from cosim.master_options import MasterOptions
+from cosim.ssp.writing import write_ssp
+from cosim.system import PortName, System
+
+
+def faults_of(s: System) -> tuple[str, ...]:
+    with pytest.raises(WiringError) as refused:
+        Master(s)
+    return refused.value.faults
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "fault"),
+    [
+        ("a.count", "b.tick", "a clock can be connected with a clock only"),
+        ("a.carry", "b.increment", "a clock can be connected with a clock only"),
+        ("b.tick", "a.carry", "an output clock lets an input clock tick, not the other way round"),
+        ("b.carry", "a.tick", "it ticks at times of its own; a triggered input clock can be connected"),
+    ],
+)
+def test_clocks_that_do_not_fit_are_told(source: str, target: str, fault: str):
+    s = System()
+    s.add("a", native_fmu("counter_tenths"))
+    s.add("b", native_fmu("counter_triggered"))
+    s.connect(PortName(*source.split(".")), PortName(*target.split(".")))
+    assert faults_of(s) == (f"{source} -> {target}: {fault}",)
+
+
+def test_clocked_ports_need_event_mode():
+    s = System()
+    s.add("a", native_fmu("counter_tenths", hasEventMode=False))
+    s.add("b", native_fmu("counter_thirds"), sampled=True)
+    reached = "carried, count, increment can be reached only while a clock ticks, in event mode"
+    assert faults_of(s) == (
+        f"a: {reached}, which its FMU does not have (hasEventMode)",
+        f"b: {reached}; it cannot be placed as a sampled unit, which runs without",
+    )
+
+
+def test_a_unit_with_clocked_ports_is_not_taken_for_a_sampled_one():
+    d = describe_fmu(native_fmu("counter_tenths", canHandleVariableCommunicationStepSize=False))
+    assert not d.sampled
+    assert describe_fmu(native_fmu("discrete_passer", canHandleVariableCommunicationStepSize=False)).sampled
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_of_some_units_a_process_holds_one_only(fmi: int):
+    s = System()
+    fmu = native_fmu("integrator", fmi, canBeInstantiatedOnlyOncePerProcess=True)
+    for name in ("left", "right"):
+        s.add(name, fmu)
+    s.add("other", native_fmu("integrator", fmi))
+    assert faults_of(s) == (
+        f"left and right are one FMU, {fmu.name}, of which a process may hold one instance only "
+        "(canBeInstantiatedOnlyOncePerProcess)",
+    )
+
+
+def test_a_clock_that_never_ticks_is_no_clock(tmp_path: Path):
+    file = edited(tmp_path / "never.fmu", native_fmu("counter_tenths"), 'intervalCounter="1"', 'intervalCounter="0"')
+    with pytest.raises(InvalidFmu, match=r"its clock 'tick' ticks every 0 s from 0 s on"):
+        describe_fmu(file)
+
+
+def edited(file: Path, fmu: Path, old: str, new: str) -> Path:
+    """Copy an FMU with its description changed."""
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(file, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "modelDescription.xml":
+                assert old.encode() in content
+                content = content.replace(old.encode(), new.encode())
+            target.writestr(name, content)
+    return file
+
+
+def test_inputs_are_not_extrapolated_to_events():
+    s = System()
+    s.add("ball", native_fmu("ball"))
+    linear = Extrapolation.LINEAR
+    with pytest.raises(ScheduleError, match=r"steps may end off it at events \(ball\): let inputs be held"):
+        Master(s, MasterOptions(extrapolation=linear))
+    s = System()
+    s.add("short", native_fmu("discards"))
+    with pytest.raises(ScheduleError, match=r"steps may end off it when one is discarded: let inputs be held"):
+        Master(s, MasterOptions(extrapolation=linear, repeat_discarded=True))
+
+
+def test_clock_connections_are_not_exported_silently(tmp_path: Path):
+    s = System()
+    a, b = s.add("a", native_fmu("counter_tenths")), s.add("b", native_fmu("counter_triggered"))
+    s.connect(a.y.carry, b.u.tick)
+    with pytest.raises(NotExportable, match=r"a.carry -> b.tick lets a clock tick"):
+        write_ssp(s, tmp_path / "clocks.ssp", "clocks")

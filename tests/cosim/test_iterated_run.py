@@ -1,0 +1,51 @@
+"""`handover run` with an iterated coupling: what its summary tells, and how it ends where units do not agree."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from native_units import native_fmu
+from two_masses import TwoMasses
+
+from cosim.ssp.writing import write_ssp
+from cosim.system import System
+from scenarios.command import main
+
+
+@pytest.fixture(scope="module")
+def masses(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("masses") / "masses.ssp"
+    return write_ssp(TwoMasses(k_c=4000.0).system(Fraction(1, 10)), file, "two masses", Fraction(1))
+
+
+def run(file: Path, out: Path, *arguments: str) -> Result:
+    return CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
+
+
+def test_the_summary_tells_how_much_was_iterated(masses: Path, tmp_path: Path):
+    result = run(masses, tmp_path / "out", "--algorithm", "newton")
+    assert result.exit_code == 0, result.output
+    metrics = json.loads((tmp_path / "out" / "summary.json").read_text())["metrics"]
+    assert 1.0 < metrics["iterations"]["value"] < 4.0
+    assert metrics["rollbacks"]["value"] >= 10
+
+
+def test_units_that_do_not_agree_end_the_run_with_status_3(masses: Path, tmp_path: Path):
+    strict = ("--tolerance", "1e-15", "--iterations", "2")
+    result = run(masses, tmp_path / "out", "--algorithm", "fixed-point", *strict)
+    assert result.exit_code == 3, result.output
+    assert "came to no solution in 2 iterations" in result.output
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert "b.f -> a.f still moves by" in summary["reason"]
+
+
+def test_an_algebraic_loop_without_a_solution_is_bad_input(tmp_path: Path):
+    s = System()
+    unit = s.add("a", native_fmu("gain"), a=1.0, b=1.0)
+    s.connect(unit.y.y, unit.u.u)
+    result = run(write_ssp(s, tmp_path / "loop.ssp", "loop", Fraction(1)), tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "algebraic loop: a.y -> a.u, a.u acts on a.y at once" in " ".join(result.output.split())
+    assert not (tmp_path / "out").exists()
