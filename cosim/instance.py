@@ -3,7 +3,6 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.magnitudes import Floats
+from cosim.native_calls import NativeStep
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
@@ -28,16 +28,6 @@ State = ctypes.c_void_p
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
-
-
-@dataclass(frozen=True)
-class NativeStep:
-    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
-
-    fmi: int
-    function: int
-    component: int
-    flags: tuple[int, ...]
 
 
 class Instance:

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.instance import NativeStep
 from cosim.linear import Linear
-from cosim.signal_buffer import NativeCall, Views
+from cosim.native_calls import NativeCall, NativeStep, Views
 from cosim.width import Width
 
 SIZE = 72
