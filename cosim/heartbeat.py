@@ -29,8 +29,9 @@ class Call(NamedTuple):
 class Heartbeat:
     """Tells which call is under way. Writing costs a few stores in memory and no system call.
 
-    The first 64 bytes are eight cells: 0 the call under way as int64 (see `code`; -1: none), 1 the number of calls
-    begun as int64, 2 simulated time as float64, 3 an int64 that is not 0 when the units are taken from who steps them.
+    The first 64 bytes are eight cells: 0 the call under way as int64 (see `code`; -1: none), 1 a count as int64 that
+    changes with every call, 2 simulated time as float64, 3 an int64 that is not 0 when the units are taken from who
+    steps them.
     A C loop over units writes cell 2 at each step's time, then before a call adds one to cell 1 and sets cell 0, and
     after the last call sets cell 0 to -1. After each call it reads cell 3 before it goes on; where that is not 0 it
     touches no unit any more and returns, and its caller raises `Abandoned`.
@@ -49,6 +50,8 @@ class Heartbeat:
         self._log, self._notes = _Lines(self.memory, *_LOG), _Lines(self.memory, *_NOTES)
         self._places = {name: i for i, name in enumerate(self._units.read())}
         self._known = {name: i for i, name in enumerate(self._calls.read())}
+        self._write = struct.Struct("=qqd").pack_into
+        self._count = 0
         self.abandoned: set[str] = set()
         if memory is None:
             self.end()
@@ -66,9 +69,8 @@ class Heartbeat:
 
     def begin(self, code: int, t: float) -> None:
         """Tell that a call begins, at simulated time t in seconds."""
-        self._seconds[_TIME] = t
-        self._cells[_COUNT] += 1
-        self._cells[_DOING] = code
+        self._count += 1
+        self._write(self.memory, 0, code, self._count, t)
 
     def end(self) -> None:
         """Tell that the call has returned."""
@@ -76,7 +78,7 @@ class Heartbeat:
 
     @property
     def beat(self) -> tuple[int, int] | None:
-        """A call under way as code and count, which no other call shares; None between calls."""
+        """A call under way as code and count, which the next one does not share; None between calls."""
         count, code = self._cells[_COUNT], self._cells[_DOING]
         return None if code == _NONE else (code, count)
 

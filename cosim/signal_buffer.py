@@ -2,15 +2,18 @@
 
 import ctypes
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.fmu_description import FmuPort
-from cosim.native_calls import NativeCall, Views
 
 _POINTER: Callable[[Any], Any] = ctypes.POINTER
+
+Views = tuple[NDArray[Any], ...]
+"""Where a port's value lives. Plain values: one array. Binary: addresses and sizes. Strings: addresses."""
 
 Copy = tuple[NDArray[Any], NDArray[Any]]
 """Where values go, and where they come from."""
@@ -23,6 +26,24 @@ _VALUES: dict[str, Any] = {
     **{f"Int{b}": getattr(ctypes, f"c_int{b}") for b in (8, 16, 32, 64)},
     **{f"UInt{b}": getattr(ctypes, f"c_uint{b}") for b in (8, 16, 32, 64)},
 }
+
+
+@dataclass(frozen=True)
+class NativeCall:
+    """What a program in C needs to make a buffer's call itself.
+
+    Attributes:
+        function: the function's address.
+        component: the instance's.
+        references: the value references.
+        arrays: the memory: values; of binaries addresses and sizes.
+    """
+
+    fmi: int
+    function: int
+    component: int
+    references: "ctypes.Array[ctypes.c_uint]"
+    arrays: Views
 
 
 class SignalBuffer:

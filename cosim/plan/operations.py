@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.linear import Linear
-from cosim.native_calls import NativeCall, NativeStep, Views
+from cosim.native_step import NativeStep
+from cosim.signal_buffer import NativeCall, Views
 from cosim.width import Width
 
 SIZE = 72

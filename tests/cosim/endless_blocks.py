@@ -1,6 +1,7 @@
 """Blocks that do not return: in a step, or as they are made, until a file appears that they are told the place of."""
 
 import os
+import re
 from pathlib import Path
 
 from master_blocks import Counter, CounterInputs, CounterOutputs, CounterParams
@@ -29,3 +30,12 @@ class HangsAtOnce(Counter):
     def __init__(self, params: CounterParams) -> None:
         _wait()
         super().__init__(params)
+
+
+class HoldsTheInterpreter(Counter):
+    """Counts until its fourth step, in which no other thread of its process comes to its turn."""
+
+    def step(self, t: float, dt: float, u: CounterInputs) -> CounterOutputs:
+        if t > 0.29:
+            re.match(r"(a+)+$", "a" * 60 + "b")  # takes 2^60 tries, without a break
+        return super().step(t, dt, u)

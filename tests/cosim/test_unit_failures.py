@@ -91,6 +91,31 @@ def test_the_others_are_terminated_and_freed_and_the_failed_one_as_the_standard_
     assert [c for u, c in ends if u == "bad"] == [f"fmi{fmi}{name}" for name in left]
 
 
+@COMPILED
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_that_ends_the_simulation_is_told_and_terminated_like_the_others(
+    fmi: int, compiled: bool, tmp_path: Path
+):
+    failure, called = failed("ends", fmi, tmp_path / "r.parquet", compiled=compiled)
+    assert type(failure) is UnitEnded
+    assert str(failure) == f"bad: fmi{fmi}DoStep at t = 0.2 s asked to end the simulation"
+    assert Record(tmp_path / "r.parquet").time.tolist() == [0.0, 0.1, 0.2]
+    ends = [(unit, call) for unit, call in called.calls if call.endswith(("Terminate", "FreeInstance"))]
+    assert [call for unit, call in ends if unit == "bad"] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
+
+
+@COMPILED
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_step_that_is_discarded_is_told_and_the_unit_terminated(fmi: int, compiled: bool):
+    s, called = System(), Called()
+    s.add("bad", native_fmu("discards", fmi), period=Fraction(1, 10))
+    with pytest.raises(UnitDiscarded) as caught, Master(s, MasterOptions(compiled=compiled), called) as master:
+        master.run(Fraction(1))
+    assert caught.value.headline.startswith(f"bad: fmi{fmi}DoStep at t = 0 s answered Discard")
+    assert "a step of 0.1 s is longer than 0.04 s" in str(caught.value)
+    assert [call for _, call in called.calls][-2:] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_after_fatal_no_instance_of_the_same_fmu_is_called(fmi: int):
     system, called = fed_by(native_fmu("fatal", fmi), fmi), Called()

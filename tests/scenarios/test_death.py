@@ -2,6 +2,7 @@
 
 import json
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from failing_systems import failing_ssp, native_fmu, start
 
 from cosim.ssp.writing import write_ssp
 from cosim.system import System
+from fmus.build import build_block
 from scenarios.record import Record
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can be forked that tells")
@@ -66,3 +68,14 @@ def test_a_crash_as_units_are_made_is_named_and_leaves_nothing(tmp_path: Path):
     )
     assert not (tmp_path / "r").exists()
     assert list((tmp_path / "tmp").iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_unit_that_holds_the_whole_process_is_told_by_the_parent(tmp_path: Path):
+    s = System()
+    s.add("bad", build_block("endless_blocks:HoldsTheInterpreter", 3, tmp_path, step=Fraction(1, 10)))
+    ssp = write_ssp(s, tmp_path / "held.ssp", "held", Fraction(1))
+    going = start(tmp_path, ssp, "--out", "r", "--call-limit", "1")
+    _, errors = going.communicate(timeout=120)
+    assert (going.returncode, errors) == (3, "bad: fmi3DoStep at t = 0.3 s did not return within 1 s\n")
+    assert Record(tmp_path / "r" / "signals.parquet").time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])

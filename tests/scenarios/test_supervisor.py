@@ -79,7 +79,8 @@ def test_ctrl_c_in_a_terminal_is_heard_once(arguments: tuple[str | Path, ...], t
     streams = {"stdin": terminal, "stdout": terminal, "stderr": terminal}
     going = start(tmp_path, *arguments, program=IN_TERMINAL, start_new_session=True, **streams)
     os.close(terminal)
-    begun(going, tmp_path)
+    child = begun(going, tmp_path)
+    assert os.tcgetpgrp(here) == os.getpgid(going.pid) != os.getpgid(child)  # else the child might hear of it twice
     os.write(here, b"\x03")
     shown = b""
     with contextlib.suppress(OSError):  # the terminal is closed when all its processes are gone

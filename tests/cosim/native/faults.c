@@ -57,6 +57,11 @@ static enum status leave(Unit *unit, double t, double h) {
     exit(0);
 }
 
+static enum status end_simulation(Unit *unit, double t, double h, StepEnd *end) {
+    end->terminate = beyond(unit, t + h);
+    return integrate(unit, t, h, end);
+}
+
 static int instances;
 
 static void crash_on_fifth(Unit *unit) {
@@ -82,6 +87,7 @@ AT_A_TIME(gives_infinity, give_infinity)
 AT_A_TIME(hangs, hang)
 AT_A_TIME(crashes, crash)
 AT_A_TIME(exits, leave)
+FAULTY(ends, 0, NULL, end_simulation)
 FAULTY(crashes_on_fifth, 0, crash_on_fifth, integrate)
 FAULTY(stateless, NO_STATES, NULL, integrate)
 FAULTY(fixed_step, FIXED_STEP, NULL, integrate)
