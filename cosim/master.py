@@ -30,7 +30,7 @@ from cosim.jacobi import Jacobi
 from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.pacing import Pacer
-from cosim.plan.choice import plan_stepper
+from cosim.plan.choice import plan_stepper, tell_general_path
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
@@ -233,6 +233,8 @@ class Master:
         return pause
 
     def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
+        if isinstance(ensemble, EventEnsemble) or self.options.adaptive is not None:
+            tell_general_path("steps may end anywhere")
         if isinstance(ensemble, EventEnsemble):
             return EventStepper(self.schedule, ensemble, coupling)
         control = self.options.adaptive

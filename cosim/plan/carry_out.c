@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cpu_clock.h"
 #include "plan.h"
 
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);

@@ -25,15 +25,17 @@ def plan_stepper(
     `coupling` does the same on the general path; `iterates` tells that units go over steps again.
     """
     reason = _obstacle(schedule, options, iterates)
-    if reason is not None:
-        _log.info("no compiled plan: %s", reason)
-        return None
-    library = loop()
+    library = loop() if reason is None else None
     if library is None:
-        _log.info("no compiled plan: its library is not compiled for this machine")
+        tell_general_path(reason or "its library is not compiled for this machine")
         return None
     made = PlanMaker(ensemble, schedule, options.algorithm, library, clock=options.cpu_times)
     return PlanStepper(schedule, ensemble, coupling, made)
+
+
+def tell_general_path(reason: str) -> None:
+    """Say in the log why a system does not run as a plan."""
+    _log.info("no compiled plan: %s", reason)
 
 
 def _obstacle(schedule: Schedule, options: MasterOptions, iterates: bool) -> str | None:

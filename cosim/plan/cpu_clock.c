@@ -1,9 +1,9 @@
-/* The CPU time that this process has spent, in seconds: the clock that Python's `time.process_time` reads. */
 #define _POSIX_C_SOURCE 199309L
 
-#include "plan.h"
+#include "cpu_clock.h"
 
 #ifdef _WIN32
+#include <stdint.h>
 #include <windows.h>
 
 static double seconds(FILETIME t) { return ((uint64_t)t.dwHighDateTime << 32 | t.dwLowDateTime) * 1e-7; }

@@ -133,7 +133,6 @@ typedef struct {
 } Plan;
 
 double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator);
-double cpu_clock(void);
 enum outcome carry_out(Plan *plan, const Segment *segment);
 
 #endif

@@ -133,12 +133,11 @@ class PlanStepper:
         due = {unit: group.due for units, group in grouped for unit in units}
         acted = {unit: group.acted for units, group in grouped for unit in units if group.sampled}
         order = [slot.unit for slot in self._schedule.slots]
-        coupling = {"coupling": kept} if (kept := self.coupling.get_state()) else {}
         return {
             "tick": self._plan.tick,
             "due": {unit: due[unit] for unit in order},
             "acted": {slot.unit: acted[slot.unit] for slot in self._schedule.sampled},
-            **coupling,
+            "coupling": self.coupling.get_state(),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -146,7 +145,7 @@ class PlanStepper:
         for units, group in zip(self._members, self._groups, strict=True):
             group.due = state["due"][units[0]]
             group.acted = state["acted"].get(units[0], -1)
-        self.coupling.set_state(state.get("coupling", {}))
+        self.coupling.set_state(state["coupling"])
         self._plan.tick = state["tick"]
         self._plan.time = self._schedule.time(state["tick"])
         self._hear_times()
