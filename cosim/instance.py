@@ -337,7 +337,7 @@ class Instance:
             return self.time
         reached, ended = discarded_step(self._function, self._component, self.time)
         if ended:
-            raise UnitEnded(self.name, self._step_call, reached, tuple(self.log))
+            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
         return reached
 
     def _make_step_arguments(self) -> tuple[Any, ...]:

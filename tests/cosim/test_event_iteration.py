@@ -65,12 +65,12 @@ def test_a_unit_that_does_not_get_on_is_named():
         seen(s, Fraction(1, 2), "staller.count")
 
 
-@pytest.mark.parametrize(("fmi", "at"), [(2, 0.3), (3, 0.2)])
-def test_a_unit_may_end_the_simulation(fmi: int, at: float):
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_may_end_the_simulation(fmi: int):
     s = System()
     s.add("quitter", native_fmu("quitter", fmi))
     times: list[float] = []
-    with pytest.raises(UnitEnded, match=rf"quitter: fmi{fmi}DoStep at t = {at} s answered a request to end"):
+    with pytest.raises(UnitEnded, match=rf"quitter: fmi{fmi}DoStep at t = 0\.2 s asked to end the simulation"):
         run_into(s, times)
     assert times == [0.0, 0.1, 0.2]
 
