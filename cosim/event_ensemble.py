@@ -46,10 +46,6 @@ class EventEnsemble(Ensemble):
         """The units that run in event mode."""
         return {n: i for n, i in self.instances.items() if isinstance(i, EventInstance)}
 
-    def refresh_inputs(self, unit: str, t: float) -> None:
-        """Fetch a unit's inputs from their sources, without setting them."""
-        self.gather(unit, t)
-
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt, or as far as it goes; `ends` tells.
 

@@ -94,7 +94,7 @@ class EventIteration:
     ) -> bool:
         """Give a unit its inputs and fetch what comes of them; return False where nothing has changed."""
         instance = self._units[unit]
-        self._ensemble.refresh_inputs(unit, t)
+        self._ensemble.gather(unit, t)
         if instance.has_other_inputs():
             instance.set_inputs()
         elif unit not in pending:
@@ -122,7 +122,7 @@ class EventIteration:
         """Return the units at t whose discrete inputs have changed."""
         found: set[str] = set()
         for unit in self._ordered(present):
-            self._ensemble.refresh_inputs(unit, t)
+            self._ensemble.gather(unit, t)
             if self._units[unit].wants_inputs():
                 found.add(unit)
         return found

@@ -59,7 +59,7 @@ class EventStepper:
         self.time = float(self._now)
         flagged = self._flagged()
         if flagged or self._is_between():
-            self._gather()
+            self._bring_back()
         present = self._present()
         self._coupling.arrive(self.time, [], self._continuous())
         self._iteration.settle(self.time, flagged, present)
@@ -101,9 +101,10 @@ class EventStepper:
             course.reached = Fraction(end.reached) if end.early and end.reached < float(target) else target
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the times, and the states to which units that are ahead may have to go back; see `Stepper`."""
+        """Return times, what the coupling keeps, and states to which units ahead may have to go back; see `Stepper`."""
         ahead = [n for n, c in self._courses.items() if float(c.reached) > self.time]
         return {
+            "coupling": self._coupling.get_state(),
             "begins": self._ensemble.get_begins(ahead),
             "now": str(self._now),
             "due": {n: str(t) for n, t in self._due.items()},
@@ -123,6 +124,7 @@ class EventStepper:
         for name, timing in state["units"].items():
             self._ensemble.event_units[name].set_timing(timing)
         self._ensemble.set_begins(state["begins"])
+        self._coupling.set_state(state["coupling"])
 
     def _present(self) -> list[str]:
         return [n for n, c in self._courses.items() if float(c.reached) == self.time]
@@ -150,7 +152,7 @@ class EventStepper:
         """Whether a unit at this point is there before its period has passed."""
         return any(float(c.reached) == self.time and c.reached % c.period for c in self._courses.values())
 
-    def _gather(self) -> None:
+    def _bring_back(self) -> None:
         """Bring the units that are ahead to this point, where they can go back."""
         for unit, course in self._courses.items():
             if float(course.reached) <= self.time:

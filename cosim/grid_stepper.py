@@ -46,13 +46,14 @@ class GridStepper:
         """Return the ticks, what the coupling keeps and what inputs follow; see `Stepper`."""
         lines = {} if self._lines is None else {"lines": self._lines.get_state()}
         ticks = {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
-        return {**ticks, "coupling": self._coupling.get_state(), **lines}
+        coupling = {"coupling": kept} if (kept := self._coupling.get_state()) else {}
+        return {**ticks, **coupling, **lines}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to ticks that `get_state` gave."""
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
-        self._coupling.set_state(state["coupling"])
+        self._coupling.set_state(state.get("coupling", {}))
         if self._lines is not None:
             self._lines.set_state(state["lines"])
         self.time = self._schedule.time(self._tick)

@@ -3,7 +3,6 @@
 import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.magnitudes import Floats
+from cosim.native_step import NativeStep
 from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
@@ -28,16 +28,6 @@ State = ctypes.c_void_p
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
-
-
-@dataclass(frozen=True)
-class NativeStep:
-    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
-
-    fmi: int
-    function: int
-    component: int
-    flags: tuple[int, ...]
 
 
 class Instance:
@@ -140,11 +130,7 @@ class Instance:
         self.time = t + dt
 
     def try_step(self, t: float, dt: float) -> StepEnd:
-        """Advance from t by dt, or as far as the unit goes.
-
-        Raises:
-            UnitFailure: the unit answered anything but OK, a warning or a discard, or ended the simulation.
-        """
+        """Advance from t by dt, or as far as the unit goes; raise as `step`, but for a discard."""
         self.time = t
         self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
@@ -155,13 +141,11 @@ class Instance:
         early = self._fmi == 3 and self._early.value and self._last_time.value < t + dt
         self.time = self._last_time.value if early else t + dt
         if not self.time >= t:
-            told = f"a return at t = {self.time:.9g} s, which is before the step's begin"
-            raise UnitFailure(self.name, self._step_call, t, told, tuple(self.log))
+            raise UnitFailure(self.name, self._step_call, t, f"a return at t = {self.time:.9g} s", tuple(self.log))
         return StepEnd(self.time, early, self._fmi == 3 and self._event.value)
 
     def discarded(self, reached: float, reason: str) -> StepDiscarded:
         """Return the failure of a step that the unit discarded and that is not repeated, for a reason."""
-        self._failed = _DISCARD
         return StepDiscarded(self.name, self._step_call, self.time, reached, reason, tuple(self.log))
 
     def judge_step(self, status: int) -> None:
@@ -328,14 +312,8 @@ class Instance:
         return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
 
     def _reached(self) -> float:
-        """Return how far a step came that was discarded: FMI 2 tells, in FMI 3 the unit stays where it was.
-
-        Raises:
-            UnitEnded: it was because the unit wants to end the simulation.
-        """
-        if self._fmi == 3:
-            return self.time
-        reached, ended = discarded_step(self._function, self._component, self.time)
+        """Return how far a step came that was discarded; raise if that was because the unit wants to end."""
+        reached, ended = discarded_step(self._function, self._component, self.time, self._fmi)
         if ended:
             raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
         return reached

@@ -1,5 +1,6 @@
 """Inputs that follow the lines through the last two points of their sources."""
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from cosim.instance import Instance
 from cosim.linear import Linear
-from cosim.system import Connection, System
+from cosim.system import Connection, PortName, System
 from cosim.trace import Moments, Trace
 
 Memory = Mapping[str, Any]
@@ -71,12 +72,15 @@ class LinearInputs:
         self._traces: dict[str, dict[str, Trace]] = {name: {} for name in instances}
         self._lines: dict[str, list[_Line]] = {name: [] for name in instances}
         followed = [c for c in system.connections if _is_followed(system, c)]
-        for name, instance in instances.items():
-            ports = [c.target.port for c in followed if c.target.unit == name]
-            if ports and instance.description.capabilities.interpolates_inputs:
-                instance.interpolate(ports)
+        ports: dict[str, list[str]] = defaultdict(list)
         for c in followed:
-            self._lines[c.target.unit].append(self._line(system, c))
+            ports[c.target.unit].append(c.target.port)
+        for name, fed in ports.items():
+            if instances[name].description.capabilities.interpolates_inputs:
+                instances[name].interpolate(fed)
+        at_once = _acting_at_once(system)
+        for c in followed:
+            self._lines[c.target.unit].append(self._line(system, c, at_once=c.target in at_once))
 
     def feed(self, unit: str, t: float, dt: float, ends: Mapping[str, NDArray[np.float64]] = _NONE) -> None:
         """Write the inputs that follow lines, for a step from t to t + dt; `ends` are presumed values, by port."""
@@ -120,7 +124,7 @@ class LinearInputs:
             for port, trace in traces.items():
                 trace.set_state(state["traces"][unit][port])
 
-    def _line(self, system: System, c: Connection) -> _Line:
+    def _line(self, system: System, c: Connection, *, at_once: bool) -> _Line:
         target, traces = self._instances[c.target.unit], self._traces[c.source.unit]
         values = self._instances[c.source.unit].y[c.source.port][0]
         rate = target.du.get(c.target.port)
@@ -129,7 +133,7 @@ class LinearInputs:
             trace=traces.setdefault(c.source.port, Trace(values)),
             target=target.u[c.target.port][0],
             change=system.change_by(c) or Linear(),
-            halves=0 if rate else 2 if _acts_at_once(system, c) else 1,
+            halves=0 if rate else 2 if at_once else 1,
             rate=rate[0] if rate else None,
         )
 
@@ -145,7 +149,10 @@ def _is_followed(system: System, c: Connection) -> bool:
     return all(port.is_continuous for port in ends)
 
 
-def _acts_at_once(system: System, c: Connection) -> bool:
-    feedthrough = system.units[c.target.unit].description.feedthrough
-    feeding = {x.source.port for x in system.connections if x.source.unit == c.target.unit}
-    return any(c.target.port in feedthrough.get(output, ()) for output in feeding)
+def _acting_at_once(system: System) -> set[PortName]:
+    """Return the inputs that are declared to act at once on an output that feeds a unit."""
+    feeding = {c.source for c in system.connections}
+    inputs: set[PortName] = set()
+    for y in feeding:
+        inputs |= {PortName(y.unit, u) for u in system.units[y.unit].description.feedthrough.get(y.port, ())}
+    return inputs

@@ -11,8 +11,9 @@ from cosim.coupling import Coupling
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
 from cosim.event_ensemble import EventEnsemble
+from cosim.event_options import has_events, refuse_off_grid
 from cosim.event_stepper import EventStepper
-from cosim.exceptions import ScheduleError, UnitFailure, UnitRefused
+from cosim.exceptions import UnitFailure, UnitRefused
 from cosim.extrapolation import Extrapolation
 from cosim.failures import UnitHung
 from cosim.fixed_point import FixedPoint
@@ -41,10 +42,6 @@ from cosim.watchdog import Watchdog
 T = TypeVar("T")
 
 _PLAIN = MasterOptions()
-_OFF_GRID = (
-    "inputs can follow lines only where all steps lie on one grid, and steps may end off it {}: let inputs be held "
-    "(extrapolation)"
-)
 
 Observer = Callable[[float, Signals], None]
 """Called at every communication point with the time and the signals that hold at that time."""
@@ -61,9 +58,8 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule` and
-            `check_control`; or units make circles that cannot be solved, or inputs are to be extrapolated though steps
-            may end anywhere.
+        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`,
+            `check_control` and `refuse_off_grid`, or units make circles that cannot be solved.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -72,11 +68,9 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
+        refuse_off_grid(system, options)
         if options.adaptive is not None:
             check_control(system)
-        if self.has_events and options.extrapolation is Extrapolation.LINEAR:
-            eventful = ", ".join(n for n, u in system.units.items() if u.uses_events)
-            raise ScheduleError(_OFF_GRID.format(f"at events ({eventful})" if eventful else "when one is discarded"))
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()
@@ -112,7 +106,7 @@ class Master:
     @property
     def has_events(self) -> bool:
         """Whether steps may end off the schedule's grid; without, a run is a plain sequence of fixed steps."""
-        return self.system.has_events or (self.options.repeat_discarded and self.options.adaptive is None)
+        return has_events(self.system, self.options)
 
     @property
     def ensemble(self) -> Ensemble:

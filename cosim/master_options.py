@@ -86,6 +86,7 @@ class MasterOptions:
             "iterations": self.most_iterations,
             "extrapolation": self.extrapolation.value,
             "adaptive": control,
+            "repeat_discarded": self.repeat_discarded,
         }
 
     @property

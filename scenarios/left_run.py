@@ -96,7 +96,7 @@ class LeftRun:
 
     def _fmu(self, name: str, unit: str) -> Path:
         """Return a unit's file, or the same unit built anew where the folder of built units was cleared."""
-        path = Path(self._told["units"][name]["path"])
+        path = Path(self._told["files"][name])
         return path if path.is_file() else cached(unit, 3)
 
     def _check_fmus(self, task: Task) -> None:

@@ -92,6 +92,11 @@ _OPTIONS = (
     click.option(
         "--largest-step", type=Seconds(), metavar="SECONDS", help="With --adaptive: the longest step.  [default: any]"
     ),
+    click.option(
+        "--repeat-discarded",
+        is_flag=True,
+        help="Let all units go back and take a step shorter that one of them discards, as with --adaptive anyway.",
+    ),
 )
 _CONTROL_FIELDS: Mapping[str, str] = {
     "adaptive_absolute": "absolute",
@@ -125,4 +130,5 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
         "most_iterations": given["iterations"],
         "extrapolation": Extrapolation(given["extrapolation"]),
         "adaptive": None if given["adaptive"] is None else AdaptiveStep(relative=given["adaptive"], **control),
+        "repeat_discarded": given["repeat_discarded"],
     }

@@ -96,8 +96,8 @@ class RunFolder:
         _write_json(self.path / "summary.json", summary)
 
     def write_run(self, configuration: Mapping[str, Any], fmus: Mapping[str, Path]) -> None:
-        """Write `run.json`: configuration, versions, and place and hash of every unit's FMU."""
-        units = {n: {"fmu": p.name, "path": str(p.absolute()), "sha256": sha256_of(p)} for n, p in fmus.items()}
+        """Write `run.json`: configuration, versions, and name and hash of every unit's FMU."""
+        units = {n: {"fmu": p.name, "sha256": sha256_of(p)} for n, p in fmus.items()}
         told = {"platform": platform.platform(), **versions()}
         _write_json(self.path / "run.json", {**configuration, "units": units, "versions": told})
 

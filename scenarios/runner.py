@@ -242,7 +242,8 @@ def _configuration(task: Task) -> dict[str, Any]:
 
 def _options(task: Task) -> dict[str, Any]:
     every = None if task.every is None else str(task.every)
-    return {"source": task.source, "formats": list(task.formats), "checkpoint": every}
+    files = {name: str(path.absolute()) for name, path in task.fmus.items()}
+    return {"source": task.source, "files": files, "formats": list(task.formats), "checkpoint": every}
 
 
 def _summary(

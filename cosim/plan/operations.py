@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.instance import NativeStep
 from cosim.linear import Linear
+from cosim.native_step import NativeStep
 from cosim.signal_buffer import NativeCall, Views
 from cosim.width import Width
 

@@ -35,8 +35,7 @@ def statistics(master: Master) -> StepStatistics:
     return master.stepper.statistics
 
 
-@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL])
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("algorithm", "fmi"), [(Algorithm.JACOBI, 2), (Algorithm.GAUSS_SEIDEL, 3)])
 def test_the_global_error_follows_the_tolerance(algorithm: Algorithm, fmi: int):
     """A tolerance of each step gives a global error that goes with its power p / (p + 1), p = 2."""
     tolerances = (1e-3, 1e-4, 1e-5)

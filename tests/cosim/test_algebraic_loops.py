@@ -1,5 +1,6 @@
 """Algebraic loops are found at ports, solved at the start and at each step, or refused with the loop spelled out."""
 
+import json
 from fractions import Fraction
 from typing import Any
 
@@ -94,6 +95,20 @@ def test_of_a_loop_of_several_rates_those_iterate_that_are_due():
         y = [float(master.signals[name]) for name in ("fast.y", "slow.y")]
         assert master.iterations.steps == 3  # at 0, 0.2 and 0.4 s
     assert y == pytest.approx([-0.5, 0.75], rel=1e-7)
+
+
+def test_a_loop_is_solved_beside_units_with_events():
+    s = driven()
+    s.add("ball", native_fmu("ball"), period=Fraction(1, 10))
+    with Master(s) as master:
+        assert master.has_events
+        master.run(Fraction(1))
+        x, y, z = (float(master.signals[name]) for name in ("ramp.x", "y.y", "z.y"))
+        state = json.loads(json.dumps(master.stepper.get_state()))
+        assert state["coupling"]["count"]["steps"] == master.iterations.steps >= 10
+        master.stepper.set_state(state)
+    assert x == pytest.approx(1.0)
+    assert (y, z) == pytest.approx((-1.0 / 7.0, 4.0 / 7.0), rel=1e-6)
 
 
 def test_a_circle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCaptureFixture):

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from native_units import native_fmu
 
+from cosim.adaptive_step import AdaptiveStep
 from cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
 from cosim.extrapolation import Extrapolation
 from cosim.fmu_description import describe_fmu
@@ -104,3 +105,10 @@ def test_clock_connections_are_not_exported_silently(tmp_path: Path):
     s.connect(a.y.carry, b.u.tick)
     with pytest.raises(NotExportable, match=r"a.carry -> b.tick lets a clock tick"):
         write_ssp(s, tmp_path / "clocks.ssp", "clocks")
+
+
+def test_the_step_does_not_follow_the_error_across_events():
+    s = System()
+    s.add("ball", native_fmu("ball"))
+    with pytest.raises(ScheduleError, match=r"cannot follow the error while steps end at events \(ball\)"):
+        Master(s, MasterOptions(adaptive=AdaptiveStep()))

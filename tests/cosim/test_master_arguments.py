@@ -45,6 +45,7 @@ def test_what_is_chosen_is_done_and_told(ssp: Path, tmp_path: Path):
         "iterations": 20,
         "extrapolation": "linear",
         "adaptive": None,
+        "repeat_discarded": False,
     }
     assert read(tmp_path / "chosen", "run.json")["master"] == expected
     assert read(tmp_path / "chosen", "summary.json")["master"] == expected
@@ -84,6 +85,7 @@ def test_a_step_that_cannot_be_small_enough_fails_the_run(ssp: Path, tmp_path: P
         (("--adaptive", "0"), "'0' is not a finite number above 0"),
         (("--tolerance", "inf"), "'inf' is not a finite number above 0"),
         (("--adaptive", "1e-3", "--largest-step", "1e-9"), "the largest step, 1e-09 s, is below the smallest, 1e-06 s"),
+        (("--repeat-discarded", "--extrapolation", "linear"), "steps may end off it when one is discarded"),
         (("--algorithm", "gauss"), "'gauss' is not one of 'jacobi'"),
         (("--iterations", "0"), "0 is not in the range x>=1"),
     ],
