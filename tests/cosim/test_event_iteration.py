@@ -70,11 +70,7 @@ def test_a_unit_may_end_the_simulation(fmi: int):
     s = System()
     s.add("quitter", native_fmu("quitter", fmi))
     times: list[float] = []
-<<<<<<< HEAD
     with pytest.raises(UnitEnded, match=rf"quitter: fmi{fmi}DoStep at t = 0\.2 s asked to end the simulation"):
-=======
-    with pytest.raises(UnitEnded, match=rf"quitter: fmi{fmi}DoStep at t = {at} s asked to end"):
->>>>>>> dc9c5a6e424a66b6ca8e79ad89973d4d9a247e05
         run_into(s, times)
     assert times == [0.0, 0.1, 0.2]
 
