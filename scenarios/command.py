@@ -138,6 +138,9 @@ def run_(
     FILE.ssp is a system from another tool (SSP 1.0 or 2.0), or from `handover export`: it runs until its stop time.
 
     Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
+
+    The run is a process of its own: a unit that crashes it is named, and the record completed. On Windows it is not,
+    and such a unit ends the command.
     """
     if is_ssp(scenario):
         refuse_for_ssp(**{"-p": parameters, "--seed": seed, "--unit": replaced})
