@@ -68,9 +68,9 @@ class Master:
         self.system = system
         self.options = options
         self.schedule = Schedule(system)
-        refuse_off_grid(system, options)
         if options.adaptive is not None:
             check_control(system)
+        refuse_off_grid(system, options)
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
         self.heartbeat = heartbeat or Heartbeat()

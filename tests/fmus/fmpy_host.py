@@ -32,7 +32,11 @@ class FmpyHost:
         folder = Path(self._folder.name)
         unpack(fmu, folder, d.fmi, d.identifier)
         load = load_fmi2 if d.fmi == 2 else load_fmi3
-        self.fmu = load(fmu, folder, d.identifier, d.token, "unit", lambda _status, message: self.log.append(message))
+
+        def log(_status: int, message: str) -> None:
+            self.log.append(message)
+
+        self.fmu = load(fmu, folder, d.identifier, d.token, "unit", log, lambda _call: None)
 
     def __enter__(self) -> "FmpyHost":
         return self
