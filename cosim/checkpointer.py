@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.checkpoint import take_checkpoint, write_checkpoint
 from cosim.master import Master, Observer
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 
 _log = logging.getLogger(__name__)

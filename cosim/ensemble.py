@@ -18,13 +18,13 @@ from cosim.fmpy_edge import unpack
 from cosim.fmu_description import FmuPort
 from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance, State
-from cosim.linear_inputs import LinearInputs
 from cosim.narrowing import Narrowing, narrows
 from cosim.saved_states import SavedStates
 from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
+from cosim.stepping.linear_inputs import LinearInputs
 from cosim.system import PortName, System
 
 _log = logging.getLogger(__name__)

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from cosim.capabilities import Capabilities, capabilities_of
+from cosim.events.fmu_clock import FmuClock, clocks_of, without_clocks
 from cosim.exceptions import InvalidFmu
 from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
-from cosim.fmu_clock import FmuClock, clocks_of, without_clocks
 from cosim.fmu_xml import XmlElement
 from cosim.units import UNKNOWN, BaseExponents, Unit
 from cosim.variable import Causality, Declared, Kind
@@ -162,7 +162,7 @@ def _unit(u: Any) -> Unit:
 
 def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = _KINDS.get(v.type)
-    if kind is None:  # clocks, see `cosim.fmu_clock`, and whatever later standards bring
+    if kind is None:  # clocks, see `cosim.events.fmu_clock`, and whatever later standards bring
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)

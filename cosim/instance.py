@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from cosim.event_failures import StepDiscarded
+from cosim.events.event_failures import StepDiscarded
+from cosim.events.step_end import StepEnd
+from cosim.events.step_status import discarded_step
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
 from cosim.failures import UnitEnded, failure_of
 from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.magnitudes import Floats
+from cosim.iterating.magnitudes import Floats
 from cosim.native_step import NativeStep
-from cosim.rate_buffer import RateBuffer
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
-from cosim.step_end import StepEnd
-from cosim.step_status import discarded_step
+from cosim.stepping.rate_buffer import RateBuffer
 from cosim.variable import Kind
 
 State = ctypes.c_void_p

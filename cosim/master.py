@@ -6,36 +6,36 @@ from fractions import Fraction
 from types import TracebackType
 from typing import TypeVar
 
-from cosim.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
-from cosim.coupling import Coupling
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
-from cosim.event_ensemble import EventEnsemble
-from cosim.event_options import has_events, refuse_off_grid
-from cosim.event_stepper import EventStepper
+from cosim.events.event_ensemble import EventEnsemble
+from cosim.events.event_options import has_events, refuse_off_grid
+from cosim.events.event_stepper import EventStepper
 from cosim.exceptions import UnitFailure, UnitRefused
-from cosim.extrapolation import Extrapolation
 from cosim.failures import UnitHung
-from cosim.fixed_point import FixedPoint
-from cosim.gauss_seidel import GaussSeidel
-from cosim.grid_stepper import GridStepper
 from cosim.group import Group, groups_of_data_flow
 from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.initial_values import InitialValues
-from cosim.interface import Interface
-from cosim.interface_newton import InterfaceNewton
-from cosim.interface_solver import InterfaceSolver
-from cosim.iteration_count import IterationCount
-from cosim.jacobi import Jacobi
+from cosim.iterating.fixed_point import FixedPoint
+from cosim.iterating.initial_values import InitialValues
+from cosim.iterating.interface import Interface
+from cosim.iterating.interface_newton import InterfaceNewton
+from cosim.iterating.interface_solver import InterfaceSolver
+from cosim.iterating.iteration_count import IterationCount
 from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
-from cosim.pacing import Pacer
 from cosim.plan.choice import plan_stepper, tell_general_path
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
 from cosim.signals import Signals
-from cosim.step_statistics import StepStatistics
-from cosim.stepper import Stepper
+from cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
+from cosim.stepping.coupling import Coupling
+from cosim.stepping.extrapolation import Extrapolation
+from cosim.stepping.gauss_seidel import GaussSeidel
+from cosim.stepping.grid_stepper import GridStepper
+from cosim.stepping.jacobi import Jacobi
+from cosim.stepping.pacing import Pacer
+from cosim.stepping.step_statistics import StepStatistics
+from cosim.stepping.stepper import Stepper
 from cosim.system import System
 from cosim.watchdog import Watchdog
 

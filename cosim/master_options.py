@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import Any
 
-from cosim.adaptive_step import AdaptiveStep
 from cosim.exceptions import BadOptions
-from cosim.extrapolation import Extrapolation
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.stepping.extrapolation import Extrapolation
 
 
 class Algorithm(enum.Enum):

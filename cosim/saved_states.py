@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from cosim.instance import State
-from cosim.linear_inputs import Memory
+from cosim.stepping.linear_inputs import Memory
 
 
 class SavedStates(dict[str, State]):

@@ -7,9 +7,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from cosim.event_wiring import clock_mismatch, event_faults, once_faults
+from cosim.events.event_wiring import clock_mismatch, event_faults, once_faults
+from cosim.events.fmu_clock import FmuClock
 from cosim.exceptions import WiringError, nearest
-from cosim.fmu_clock import FmuClock
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from cosim.linear import Linear
 from cosim.start_values import fault_of

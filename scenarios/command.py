@@ -12,7 +12,7 @@ import click
 
 from cosim.exceptions import nearest
 from cosim.master_options import MasterOptions
-from cosim.record_formats import RECORD_FORMATS
+from cosim.record.record_formats import RECORD_FORMATS
 from fmus.build import cached
 from fmus.catalog import UNITS
 from scenarios.bad_call import BadCall, told_in_one_line

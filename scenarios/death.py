@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.complete_record import complete_record
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitCrashed, UnitHung
 from cosim.heartbeat import Call, Heartbeat
+from cosim.record.complete_record import complete_record
 from scenarios.experiment import Outcome
 from scenarios.listing import print_summary
 from scenarios.record import Record

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from cosim.checkpoint import BadCheckpoint
-from cosim.complete_record import complete_record
 from cosim.exceptions import nearest
-from cosim.file_lock import FileLocked
+from cosim.record.complete_record import complete_record
+from cosim.record.file_lock import FileLocked
 from fmus.build import cached
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 
 from cosim.block_description import describe
-from cosim.pacing import PaceReport
 from cosim.start_values import range_of
+from cosim.stepping.pacing import PaceReport
 from cosim.variable import Causality, Kind, Variable
 from fmus.build import import_block
 from fmus.catalog import UNITS, Entry

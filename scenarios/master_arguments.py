@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-from cosim.adaptive_step import AdaptiveStep
-from cosim.extrapolation import Extrapolation
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.stepping.extrapolation import Extrapolation
 from scenarios.bad_call import BadCall
 from scenarios.ssp_call import Seconds
 

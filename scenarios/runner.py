@@ -15,10 +15,10 @@ from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
-from cosim.iteration_count import IterationCount
+from cosim.iterating.iteration_count import IterationCount
 from cosim.master import Master, Observer
 from cosim.master_options import MasterOptions
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.experiment import Experiment, Metric, Outcome, Watch
 from scenarios.interruption import Interruption

@@ -2,14 +2,14 @@
 
 import logging
 
-from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
-from cosim.extrapolation import Extrapolation
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.plan.memory import loop
 from cosim.plan.plan_maker import PlanMaker
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
+from cosim.stepping.coupling import Coupling
+from cosim.stepping.extrapolation import Extrapolation
 
 _log = logging.getLogger(__name__)
 

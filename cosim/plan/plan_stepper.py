@@ -6,15 +6,15 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from cosim.coupling import Coupling
 from cosim.ensemble import Ensemble
 from cosim.heartbeat import Abandoned
 from cosim.plan import memory
 from cosim.plan.plan_maker import PlanMaker
-from cosim.record_block import RecordBlock
-from cosim.recorder import Recorder
+from cosim.record.record_block import RecordBlock
+from cosim.record.recorder import Recorder
 from cosim.schedule import Schedule
 from cosim.signals import Signals
+from cosim.stepping.coupling import Coupling
 
 _STRETCH = 0.05
 """Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""

@@ -42,7 +42,7 @@ def handover(
     """Give a ring in our master."""
     from cosim.master import Master
     from cosim.master_options import Algorithm, MasterOptions
-    from cosim.recorder import Recorder
+    from cosim.record.recorder import Recorder
     from cosim.system import System
 
     system = System()

@@ -9,7 +9,7 @@ from cosim.exceptions import UnitFailure
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.plan.plan_stepper import PlanStepper
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
 from cosim.variable import Kind

@@ -8,16 +8,16 @@ import pytest
 from native_units import native_fmu
 from oscillator import PLAIN, STATES, STIFF
 
-from cosim.adaptive_step import AdaptiveStep
-from cosim.adaptive_stepper import AdaptiveStepper
 from cosim.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
 from cosim.exceptions import BadOptions, ScheduleError
-from cosim.extrapolation import Extrapolation
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.signals import Signals
-from cosim.step_statistics import StepStatistics
-from cosim.step_too_small import StepTooSmall
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.stepping.adaptive_stepper import AdaptiveStepper
+from cosim.stepping.extrapolation import Extrapolation
+from cosim.stepping.step_statistics import StepStatistics
+from cosim.stepping.step_too_small import StepTooSmall
 from cosim.system import System
 
 H = Fraction(1, 100)

@@ -9,13 +9,13 @@ import pytest
 from native_units import native_fmu
 
 from cosim.algebraic_loop import algebraic_loops
-from cosim.chained_derivatives import ChainedDerivatives
 from cosim.exceptions import ScheduleError, UnitRefused
+from cosim.iterating.chained_derivatives import ChainedDerivatives
+from cosim.iterating.magnitudes import Floats
+from cosim.iterating.not_converged import NotConverged
 from cosim.linear import Linear
-from cosim.magnitudes import Floats
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
-from cosim.not_converged import NotConverged
 from cosim.schedule import Schedule
 from cosim.signals import Signals
 from cosim.system import System

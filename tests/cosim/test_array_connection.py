@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from cosim.event_instance import EventInstance
+from cosim.events.event_instance import EventInstance
 from cosim.exceptions import WiringError
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions

@@ -13,7 +13,7 @@ from native_units import native_fmu
 from cosim.failures import UnitHung
 from cosim.master import Master
 from cosim.master_options import MasterOptions
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
 from fmus.build import build_block

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from native_units import native_fmu
 
-from cosim.adaptive_step import AdaptiveStep
 from cosim.checkpoint import (
     BadCheckpoint,
     Checkpoint,
@@ -24,11 +23,12 @@ from cosim.checkpoint import (
     take_checkpoint,
     write_checkpoint,
 )
-from cosim.complete_record import complete_record
-from cosim.extrapolation import Extrapolation
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
-from cosim.recorder import Recorder
+from cosim.record.complete_record import complete_record
+from cosim.record.recorder import Recorder
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.stepping.extrapolation import Extrapolation
 from cosim.system import System
 from scenarios.record import Record
 

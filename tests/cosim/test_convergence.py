@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 from oscillator import PLAIN
 
-from cosim.extrapolation import Extrapolation
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.stepping.extrapolation import Extrapolation
 from cosim.system import System
 
 HOLD, LINEAR = Extrapolation.HOLD, Extrapolation.LINEAR

@@ -6,7 +6,7 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.event_failures import StepDiscarded
+from cosim.events.event_failures import StepDiscarded
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions

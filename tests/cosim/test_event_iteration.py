@@ -6,8 +6,8 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.event_failures import UnsettledEvents
-from cosim.event_iteration import MOST_ITERATIONS
+from cosim.events.event_failures import UnsettledEvents
+from cosim.events.event_iteration import MOST_ITERATIONS
 from cosim.failures import UnitEnded
 from cosim.master import Master
 from cosim.system import System

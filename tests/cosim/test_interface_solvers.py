@@ -4,10 +4,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cosim.fixed_point import FixedPoint
-from cosim.interface_newton import InterfaceNewton
-from cosim.interface_solver import InterfaceSolver, Unsolved
-from cosim.magnitudes import Floats, Magnitudes
+from cosim.iterating.fixed_point import FixedPoint
+from cosim.iterating.interface_newton import InterfaceNewton
+from cosim.iterating.interface_solver import InterfaceSolver, Unsolved
+from cosim.iterating.magnitudes import Floats, Magnitudes
 
 Make = Callable[..., InterfaceSolver]
 

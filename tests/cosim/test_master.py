@@ -11,7 +11,7 @@ import pytest
 from cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused, WiringError
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
 from scenarios.record import Record

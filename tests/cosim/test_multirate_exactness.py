@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from cosim.grid_stepper import GridStepper
 from cosim.schedule import Schedule, Slot
+from cosim.stepping.grid_stepper import GridStepper
 from cosim.system import System
 
 THIRD, SEVENTH = Fraction(1, 3000), Fraction(1, 7000)

@@ -8,7 +8,7 @@ from native_units import native_fmu
 from cosim.exceptions import BadOptions
 from cosim.master import Master
 from cosim.master_options import MasterOptions
-from cosim.pacing import Pacer, PaceReport
+from cosim.stepping.pacing import Pacer, PaceReport
 from cosim.system import System
 
 

@@ -7,13 +7,13 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from cosim.extrapolation import Extrapolation
-from cosim.grid_stepper import GridStepper
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.native_libraries import CompilationError
 from cosim.plan import choice, memory
 from cosim.plan.plan_stepper import PlanStepper
+from cosim.stepping.extrapolation import Extrapolation
+from cosim.stepping.grid_stepper import GridStepper
 from cosim.system import System
 
 

@@ -6,11 +6,11 @@ import pytest
 from fmu_of import FmuOf
 from native_units import native_fmu
 
-from cosim.grid_stepper import GridStepper
 from cosim.linear import Linear
 from cosim.master import Master
 from cosim.plan.plan_stepper import PlanStepper
-from cosim.stepper import Stepper
+from cosim.stepping.grid_stepper import GridStepper
+from cosim.stepping.stepper import Stepper
 from cosim.system import System
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from signals_of import signals_of
 
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.units import Unit
 from cosim.variable import Kind
 from scenarios.record import Record

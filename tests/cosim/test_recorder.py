@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 from signals_of import signals_of
 
-from cosim.complete_record import complete_record
 from cosim.exceptions import RecordNotWritten
-from cosim.file_lock import FileLocked
-from cosim.recorder import Recorder
+from cosim.record.complete_record import complete_record
+from cosim.record.file_lock import FileLocked
+from cosim.record.recorder import Recorder
 from scenarios.record import Record
 
 FmuOf = Callable[..., Path]
@@ -28,7 +28,7 @@ import os, signal
 from fractions import Fraction
 from pathlib import Path
 from cosim.master import Master
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.system import System
 s = System()
 s.add("counter", Path({str(fmu("Counter"))!r}))

@@ -15,7 +15,7 @@ from cosim.exceptions import UnitFailure, UnitRefused
 from cosim.failures import NotFinite, UnitCrashed, UnitDiscarded, UnitEnded, UnitError, UnitFatal, UnitHung
 from cosim.master import Master
 from cosim.master_options import MasterOptions
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.system import System
 from scenarios.record import Record
 

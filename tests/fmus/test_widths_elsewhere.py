@@ -15,7 +15,7 @@ from workshop import Workshop
 
 from cosim.exceptions import UnitRefused, WiringError
 from cosim.master import Master
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.system import System
 
 BLOCK = "every_width:EveryWidth"

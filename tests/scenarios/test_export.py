@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from cosim.master import Master
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from cosim.ssp.ssp_file import SspFile
 from cosim.system import System
 from fmus.build import cached

@@ -11,7 +11,7 @@ import pytest
 
 from cosim.exceptions import UnitRefused
 from cosim.master import Master, Observer
-from cosim.recorder import Recorder
+from cosim.record.recorder import Recorder
 from fmus.build import cached
 from scenarios.experiment import Outcome
 from scenarios.interruption import Interruption

@@ -1,0 +1,1 @@
+"""FMI 3 event mode and clocks, and steps that end before their time."""

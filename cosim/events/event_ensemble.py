@@ -1,0 +1,162 @@
+"""Units of which some have events: their steps may end early, and can be taken back."""
+
+import contextlib
+import logging
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cosim.endings import Endings
+from cosim.ensemble import Ensemble
+from cosim.events.event_instance import EventInstance
+from cosim.events.step_end import StepEnd
+from cosim.exceptions import CosimError
+from cosim.heartbeat import Heartbeat
+from cosim.instance import Instance, State
+from cosim.schedule import Slot
+from cosim.system import PlacedUnit, System
+
+_log = logging.getLogger(__name__)
+
+_SHORTEST = 2.0**-10
+"""How much of a discarded step the shortest is that is tried."""
+
+
+class EventEnsemble(Ensemble):
+    """Loads the units that have events in event mode, and keeps of each step what is needed to go back to its begin.
+
+    Attributes:
+        ends: how the last step of each unit ended.
+    """
+
+    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+        self.ends: dict[str, StepEnd] = {}
+        self._begun: dict[str, tuple[float, State]] = {}
+        super().__init__(system, heartbeat, endings)
+        self._staying = [u.name for u in system.units.values() if not u.sampled and not can_go_back(u)]
+        self._told: set[str] = set()
+
+    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
+        """Take all units through initialisation mode; those with events are in event mode after that."""
+        super().initialize(slots, work_out)
+        self._endings.add(self._forget_begins)
+
+    @property
+    def event_units(self) -> dict[str, EventInstance]:
+        """The units that run in event mode."""
+        return {n: i for n, i in self.instances.items() if isinstance(i, EventInstance)}
+
+    def step(self, unit: str, t: float, dt: float) -> None:
+        """Let a unit go from t to t + dt, or as far as it goes; `ends` tells.
+
+        Raises:
+            UnitFailure: its call failed, or it discards the step and that cannot be repeated shorter.
+        """
+        if self.system.units[unit].sampled:
+            super().step(unit, t, dt)
+            return
+        if unit not in self._staying:
+            self._keep_begin(unit, t)
+        instance = self.instances[unit]
+        end = instance.try_step(t, dt)
+        self.ends[unit] = self._repeat(instance, t, dt, end) if end.discarded else end
+
+    def bring(self, unit: str, t: float, dt: float) -> bool:
+        """Take a unit back to the begin of its step, and let it go only by dt, to t; return False if it cannot.
+
+        It keeps the inputs that it had: they are part of its state.
+
+        Raises:
+            UnitFailure: its call failed, or it does not come as far as before.
+        """
+        if unit not in self._begun:
+            if unit not in self._told:
+                self._told.add(unit)
+                _log.warning("%s cannot go back to the event at t = %.9g s: it stays at the end of its step", unit, t)
+            return False
+        begin, state = self._begun[unit]
+        instance = self.instances[unit]
+        instance.restore_state(state)
+        end = instance.try_step(begin, dt)
+        if end.early:
+            raise instance.discarded(end.reached, "it had come farther from the same state before")
+        self.ends[unit] = replace(end, reached=t)
+        self.publish(unit)
+        return True
+
+    def get_begins(self, units: Iterable[str]) -> dict[str, tuple[float, str]]:
+        """Return where the steps of units began, and their serialised states there; of units that can go back."""
+        begins: dict[str, tuple[float, str]] = {}
+        for unit in units:
+            if unit in self._begun:
+                begin, state = self._begun[unit]
+                with self._at(unit, lambda i, state=state: i.restore_state(state)) as instance:
+                    begins[unit] = begin, instance.serialise_state().hex()
+        return begins
+
+    def set_begins(self, begins: Mapping[str, tuple[float, str]]) -> None:
+        """Take over what `get_begins` gave."""
+        for unit, (begin, state) in begins.items():
+            with self._at(unit, lambda i, state=state: i.deserialise_state(bytes.fromhex(state))):
+                self._keep_begin(unit, begin)
+
+    @contextlib.contextmanager
+    def _at(self, unit: str, go: Callable[[Instance], None]) -> Generator[Instance, None, None]:
+        """Let a unit be in another state for a while."""
+        instance = self.instances[unit]
+        here = instance.save_state()
+        try:
+            go(instance)
+            yield instance
+        finally:
+            instance.restore_state(here)
+            instance.free_state(here)
+
+    def _repeat(self, instance: Instance, t: float, dt: float, end: StepEnd) -> StepEnd:
+        """Repeat a step that was discarded, shorter: as far as the unit came, or else half as far, and so on."""
+        if instance.name in self._staying:
+            raise instance.discarded(end.reached, _unable([instance.name]))
+        if others := [n for n in self._staying if n != instance.name]:
+            raise instance.discarded(end.reached, f"the others would have to go back too, and {_unable(others)}")
+        tried = dt
+        while tried > dt * _SHORTEST:
+            came = end.reached - t
+            tried = came if 0.0 < came < tried else tried / 2.0
+            instance.restore_state(self._begun[instance.name][1])
+            end = instance.try_step(t, tried)
+            if not end.discarded:
+                _log.info("%s discarded a step of %.6g s at t = %.9g s; %.6g s were taken", instance.name, dt, t, tried)
+                return end if end.early else replace(end, early=True)
+        raise instance.discarded(end.reached, f"steps down to {tried:.3g} s were tried")
+
+    def _keep_begin(self, unit: str, t: float) -> None:
+        self._forget_begin(unit)
+        self._begun[unit] = (t, self.instances[unit].save_state())
+
+    def _forget_begins(self) -> None:
+        for unit in list(self._begun):
+            with contextlib.suppress(CosimError):  # ending goes on whether or not the unit agrees
+                if not self.is_corrupt(self.instances[unit]):
+                    self._forget_begin(unit)
+
+    def _forget_begin(self, unit: str) -> None:
+        if unit in self._begun:
+            _, state = self._begun.pop(unit)
+            self.instances[unit].free_state(state)
+
+    def _make(self, name: str, folder: Path) -> Instance:
+        unit = self.system.units[name]
+        make = EventInstance if unit.uses_events else Instance
+        return make(name, unit.description, folder, self.system.sources_of(name), self.heartbeat)
+
+
+def can_go_back(unit: PlacedUnit) -> bool:
+    """Whether a unit's step can be taken back and repeated shorter."""
+    return unit.description.capabilities.saves_state and unit.description.capabilities.varies_step
+
+
+def _unable(units: Iterable[str]) -> str:
+    told = ", ".join(units)
+    return (
+        f"{told} cannot save its state or vary its step (canGetAndSetFMUstate, canHandleVariableCommunicationStepSize)"
+    )

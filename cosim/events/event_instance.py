@@ -1,0 +1,187 @@
+"""A unit that runs in event mode: what can be set and got there, and when it wants to be there. FMI 3.0, sec. 4.2."""
+
+import ctypes
+from collections.abc import Collection, Iterable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from cosim.events.clock_calls import ClockCalls
+from cosim.events.clock_timer import ClockTimer
+from cosim.exceptions import UnitFailure
+from cosim.failures import UnitEnded
+from cosim.fmpy_loading import load_fmi3
+from cosim.fmu_description import FmuDescription, FmuPort
+from cosim.heartbeat import Heartbeat
+from cosim.instance import Instance
+from cosim.signal_buffer import SignalBuffer
+from cosim.signal_content import content_of
+
+
+class EventInstance(Instance):
+    """A unit in event mode or in step mode; initialisation leaves it in event mode.
+
+    Step mode lets continuous inputs be set. Discrete ones wait for event mode, clocked ones for a tick of their clock;
+    so do clocked outputs, which stay in `y` what they were at the last tick.
+
+    Attributes:
+        in_event_mode: whether it is there.
+        active: the clocks that tick in the present iteration.
+        timers: its time-based clocks.
+        next_event: when it will have an event that it knows beforehand, s.
+    """
+
+    def __init__(
+        self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
+        heartbeat: Heartbeat | None = None,
+    ) -> None:  # fmt: skip
+        fed = list(inputs)
+        super().__init__(name, description, folder, fed, heartbeat)
+        self.in_event_mode = False
+        self.active: set[str] = set()
+        self.timers: list[ClockTimer] = []
+        self.next_event: float | None = None
+        self._fed = [description.inputs[i] for i in fed]
+        self._outputs = list(description.outputs.values())
+        self._initialized = False
+        self._given: dict[str, bytes] = {}
+        self._parts: dict[tuple[str, tuple[str, ...]], list[SignalBuffer]] = {}
+        self._clock_calls = ClockCalls(self._call, description.clocks)
+        self._flags = [ctypes.c_bool() for _ in range(5)]
+        self._next = ctypes.c_double()
+
+    def exit_initialization(self) -> None:
+        """Ask clocks when they will tick, and go on to event mode.
+
+        Raises:
+            UnitFailure: the call failed, or a clock cannot tick as the unit says.
+        """
+        timed = [c for c in self.description.clocks.values() if c.is_input and not c.is_triggered]
+        try:
+            self.timers = [ClockTimer(c, self._clock_calls) for c in timed]
+        except ValueError as e:
+            raise UnitFailure(self.name, "fmi3ExitInitializationMode", self.time, str(e), tuple(self.log)) from e
+        super().exit_initialization()
+        self._initialized = self.in_event_mode = True
+        self._hold(self._fed)
+
+    def set_inputs(self) -> None:
+        """Hand over those contents of `u` that the unit takes in its present mode."""
+        ports = self._settable()
+        self._transfer("Set", ports)
+        self._hold(ports)
+
+    def get_outputs(self) -> None:
+        """Fetch the outputs that the unit gives in its present mode."""
+        self._transfer("Get", [p for p in self._outputs if self._is_reachable(p)])
+
+    def wants_inputs(self) -> bool:
+        """Whether a discrete input that can be set in event mode has another value than the unit was given last."""
+        return any(p.discrete and not p.clocks and self._is_other(p) for p in self._fed)
+
+    def has_other_inputs(self) -> bool:
+        """Whether an input that can be set in the present mode has another value than the unit was given last."""
+        return any(self._is_other(p) for p in self._settable())
+
+    def enter_event_mode(self) -> None:
+        """Leave step mode."""
+        self._call("EnterEventMode")
+        self.in_event_mode = True
+
+    def enter_step_mode(self) -> None:
+        """Leave event mode."""
+        self._call("EnterStepMode")
+        self.in_event_mode = False
+
+    def tick(self, clocks: Collection[str]) -> None:
+        """Let input clocks tick, in event mode; `update` ends their tick."""
+        self._clock_calls.tick(sorted(clocks))
+        self.active |= set(clocks)
+
+    def ticking(self) -> set[str]:
+        """Return the output clocks that tick in the present iteration; they count as active."""
+        found = self._clock_calls.ticking()
+        self.active |= found
+        return found
+
+    def update(self, t: float) -> bool:
+        """End an iteration in event mode at t; return whether the unit wants another one.
+
+        Raises:
+            UnitEnded: it wants the simulation to end. UnitFailure: its call failed.
+        """
+        self.time = t
+        again, terminate, _, _, known = self._flags
+        self._call("UpdateDiscreteStates", *(ctypes.byref(f) for f in self._flags), ctypes.byref(self._next))
+        if terminate.value:
+            raise UnitEnded(self.name, "fmi3UpdateDiscreteStates", t, tuple(self.log))
+        self.next_event = self._next.value if known.value else None
+        for timer in self.timers:
+            if timer.clock.name in self.active:
+                timer.tick()
+            timer.ask(t)
+        self.active.clear()
+        return again.value
+
+    def get_timing(self) -> Mapping[str, Any]:
+        """Return what a run that goes on from here must know besides the unit's state; JSON can hold it."""
+        return {
+            "held": {name: content.hex() for name, content in self._given.items()},
+            "ticks": {t.clock.name: None if t.next is None else str(t.next) for t in self.timers},
+            "next_event": self.next_event,
+            "in_event_mode": self.in_event_mode,
+        }
+
+    def set_timing(self, timing: Mapping[str, Any]) -> None:
+        """Go back to what `get_timing` gave."""
+        self._given = {name: bytes.fromhex(content) for name, content in timing["held"].items()}
+        self.next_event, self.in_event_mode = timing["next_event"], timing["in_event_mode"]
+        for timer in self.timers:
+            told = timing["ticks"][timer.clock.name]
+            timer.next = None if told is None else Fraction(told)
+
+    def _load(self, folder: Path) -> Any:
+        d = self.description
+        return load_fmi3(
+            d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins, events=True
+        )
+
+    def _is_reachable(self, port: FmuPort) -> bool:
+        return not port.clocks or not self._initialized or not self.active.isdisjoint(port.clocks)
+
+    def _settable(self) -> list[FmuPort]:
+        anything = self.in_event_mode or not self._initialized
+        return [p for p in self._fed if self._is_reachable(p) and (anything or not p.discrete)]
+
+    def _is_other(self, port: FmuPort) -> bool:
+        return content_of(port, self.u[port.name]) != self._given[port.name]
+
+    def _hold(self, ports: Iterable[FmuPort]) -> None:
+        for p in ports:
+            self._given[p.name] = content_of(p, self.u[p.name])
+
+    def _transfer(self, verb: str, ports: list[FmuPort]) -> None:
+        """Set or get ports; where they are not all of them, by way of buffers of their own."""
+        whole, contents = (self._setters, self.u) if verb == "Set" else (self._getters, self.y)
+        if len(ports) == len(contents):
+            self._carry_out(whole)
+            return
+        key = verb, tuple(p.name for p in ports)
+        if key not in self._parts:
+            self._parts[key] = self._buffers(verb, ports)
+        parts = self._parts[key]
+        if verb == "Set":
+            _copy(parts, contents, outwards=True)
+        self._carry_out(parts)
+        if verb == "Get":
+            _copy(parts, contents, outwards=False)
+
+
+def _copy(parts: Iterable[SignalBuffer], contents: Mapping[str, Any], *, outwards: bool) -> None:
+    for buffer in parts:
+        for name, views in buffer.views.items():
+            for mine, theirs in zip(views, contents[name], strict=True):
+                if outwards:
+                    mine[:] = theirs
+                else:
+                    theirs[:] = mine

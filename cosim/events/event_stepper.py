@@ -1,0 +1,179 @@
+"""Steps that end at events too: the schedule's grid, and between its points the instants at which something happens."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from cosim.events.event_ensemble import EventEnsemble
+from cosim.events.event_failures import UnsettledEvents
+from cosim.events.event_iteration import MOST_ITERATIONS, EventIteration
+from cosim.schedule import Schedule, Slot
+from cosim.stepping.coupling import Coupling
+
+
+@dataclass
+class Course:
+    """How far a continuous unit has come: the step that it took last, from `begun` to `reached`, in seconds."""
+
+    period: Fraction
+    begun: Fraction = Fraction(0)
+    reached: Fraction = Fraction(0)
+    event: bool = False
+
+
+class EventStepper:
+    """Communication points are the schedule's, and every instant at which a unit that has events wants one.
+
+    - A step ends at the next multiple of the unit's period, or before it at an event that is known: a tick of a clock
+      or a `nextEventTime`, of any unit where the unit can vary its step, else of its own.
+    - Where a unit returns early, all that can go back (they save states and vary their steps) are taken back to the
+      begin of their steps and come to the instant too, with the inputs they had; the others stay at the ends of their
+      steps, which the log says once. Sampled units hold between their instants anyway.
+    - At such an instant the event iteration settles what changes, then sampled units act on that, and what they change
+      in turn is settled; observers see the instant once, after all of it.
+    - A unit that returns at once, without getting on, has its event settled by itself, after observers saw the instant.
+    - A step that is discarded and repeated shorter is like an early return without an event.
+
+    Times are exact: whole periods and clocks' intervals are fractions that are added up, events are the units' floats.
+    """
+
+    def __init__(self, schedule: Schedule, ensemble: EventEnsemble, coupling: Coupling) -> None:
+        self.time = 0.0
+        self._now = Fraction(0)
+        self._schedule = schedule
+        self._ensemble = ensemble
+        self._coupling = coupling
+        self._periods = {s.unit: s.every * schedule.tick for s in schedule.slots}
+        self._courses = {s.unit: Course(self._periods[s.unit]) for s in schedule.continuous}
+        self._due = {s.unit: Fraction(0) for s in schedule.sampled}
+        self._acted: dict[str, Fraction] = {}
+        self._iteration = EventIteration(ensemble, [s.unit for s in schedule.slots])
+        self._adapting = {n for n in self._courses if ensemble.system.units[n].description.capabilities.varies_step}
+
+    def arrive(self, last: int) -> bool:
+        """Go to the next point at which a unit is due or has an event, and settle events; see `Stepper`."""
+        stop = last * self._schedule.tick
+        self._now = min((stop, *self._due.values(), *(c.reached for c in self._courses.values())), key=float)
+        self.time = float(self._now)
+        flagged = self._flagged()
+        if flagged or self._is_between():
+            self._bring_back()
+        present = self._present()
+        self._coupling.arrive(self.time, [], self._continuous())
+        self._iteration.settle(self.time, flagged, present)
+        for unit in present:
+            self._courses[unit].event = False
+        if sampled := [s for s in self._sampled() if self._acted.get(s.unit) != self._due[s.unit]]:
+            self._coupling.arrive(self.time, sampled, [])
+            self._acted.update((s.unit, self._due[s.unit]) for s in sampled)
+            self._iteration.settle(self.time, [], present)
+        return self.time == float(stop)
+
+    def depart(self) -> None:
+        """Step what is due.
+
+        Raises:
+            UnsettledEvents: units return early again and again without getting on. UnitFailure: a call failed.
+        """
+        sampled = self._sampled()
+        self._step(sampled, self._continuous())
+        for slot in sampled:
+            self._due[slot.unit] += self._periods[slot.unit]
+        units: list[str] = []
+        for _ in range(MOST_ITERATIONS):
+            stalled = self._continuous()
+            if not stalled:
+                return
+            units = [slot.unit for slot in stalled]
+            self._iteration.settle(self.time, self._flagged(), units)
+            self._step([], stalled)
+        raise UnsettledEvents(units, self.time, MOST_ITERATIONS, "fmi3DoStep")
+
+    def _step(self, sampled: Sequence[Slot], due: Sequence[Slot]) -> None:
+        targets = {slot.unit: self._target(slot.unit) for slot in due}
+        slots = [Slot(slot.unit, slot.every, float(targets[slot.unit] - self._now)) for slot in due]
+        self._coupling.depart(self.time, sampled, slots)
+        for unit, target in targets.items():
+            end, course = self._ensemble.ends[unit], self._courses[unit]
+            course.begun, course.event = self._now, end.event
+            course.reached = Fraction(end.reached) if end.early and end.reached < float(target) else target
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return times, what the coupling keeps, and states to which units ahead may have to go back; see `Stepper`."""
+        ahead = [n for n, c in self._courses.items() if float(c.reached) > self.time]
+        return {
+            "coupling": self._coupling.get_state(),
+            "begins": self._ensemble.get_begins(ahead),
+            "now": str(self._now),
+            "due": {n: str(t) for n, t in self._due.items()},
+            "acted": {n: str(t) for n, t in self._acted.items()},
+            "courses": {n: [str(c.begun), str(c.reached), c.event] for n, c in self._courses.items()},
+            "units": {n: i.get_timing() for n, i in self._ensemble.event_units.items()},
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to times that `get_state` gave."""
+        self._now = Fraction(state["now"])
+        self.time = float(self._now)
+        self._due = {n: Fraction(t) for n, t in state["due"].items()}
+        self._acted = {n: Fraction(t) for n, t in state["acted"].items()}
+        for name, (begun, reached, event) in state["courses"].items():
+            self._courses[name] = Course(self._periods[name], Fraction(begun), Fraction(reached), event)
+        for name, timing in state["units"].items():
+            self._ensemble.event_units[name].set_timing(timing)
+        self._ensemble.set_begins(state["begins"])
+        self._coupling.set_state(state["coupling"])
+
+    def _present(self) -> list[str]:
+        return [n for n, c in self._courses.items() if float(c.reached) == self.time]
+
+    def _continuous(self) -> list[Slot]:
+        present = self._present()
+        return [s for s in self._schedule.continuous if s.unit in present]
+
+    def _sampled(self) -> list[Slot]:
+        return [s for s in self._schedule.sampled if float(self._due[s.unit]) == self.time]
+
+    def _flagged(self) -> list[str]:
+        """Return the units at this point that have an event: in step mode they told, or they told beforehand."""
+        units = self._ensemble.event_units
+        return [
+            n
+            for n in self._present()
+            if n in units and (self._courses[n].event or self._time_reached(units[n].next_event))
+        ]
+
+    def _time_reached(self, t: float | None) -> bool:
+        return t is not None and t <= self.time
+
+    def _is_between(self) -> bool:
+        """Whether a unit at this point is there before its period has passed."""
+        return any(float(c.reached) == self.time and c.reached % c.period for c in self._courses.values())
+
+    def _bring_back(self) -> None:
+        """Bring the units that are ahead to this point, where they can go back."""
+        for unit, course in self._courses.items():
+            if float(course.reached) <= self.time:
+                continue
+            if self._ensemble.bring(unit, self.time, float(self._now - course.begun)):
+                course.reached, course.event = self._now, self._ensemble.ends[unit].event
+
+    def _target(self, unit: str) -> Fraction:
+        """Return where a step from here ends: after the period, or at an event known before."""
+        period = self._courses[unit].period
+        target = (math.floor(self._now / period) + 1) * period
+        while float(target) <= self.time:
+            target += period
+        known = self._known(self._ensemble.event_units if unit in self._adapting else [unit])
+        return min((k for k in known if self.time < float(k) < float(target)), default=target)
+
+    def _known(self, units: Sequence[str] | Mapping[str, Any]) -> list[Fraction]:
+        """Return when the units have events that they know."""
+        found: list[Fraction] = []
+        for instance in (self._ensemble.event_units[n] for n in units if n in self._ensemble.event_units):
+            found += [t.next for t in instance.timers if t.next is not None]
+            if instance.next_event is not None:
+                found.append(Fraction(instance.next_event))
+        return found

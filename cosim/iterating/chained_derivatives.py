@@ -1,0 +1,73 @@
+"""Derivatives of a circle of units at an instant, from what each unit says of its own."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cosim.ensemble import Ensemble
+from cosim.group import Group
+from cosim.iterating.interface import Interface
+from cosim.iterating.magnitudes import Floats
+from cosim.system import Connection
+from cosim.variable import Kind
+
+
+class ChainedDerivatives:
+    """dg/dx, where x are the inputs that lead back and g what comes out for them when units act one after another.
+
+    A direction goes through the circle as values do: through each unit by its directional derivative, along each
+    connection by the factor of its conversion. It holds at an instant, with the units' states as they are; how a step's
+    end depends on inputs that are held over it is another matter, which units do not tell.
+    """
+
+    def __init__(self, ensemble: Ensemble, group: Group, interface: Interface) -> None:
+        self._ensemble = ensemble
+        self._units = group.units
+        self._interface = interface
+        back = set(group.back(group.units))
+        self._forward: dict[str, list[Connection]] = {name: [] for name in group.units}
+        self._outputs: dict[str, list[str]] = {name: [] for name in group.units}
+        real = [c for c in group.circle if self._kind(c) is Kind.REAL]
+        for c in real:
+            if c not in back:
+                self._forward[c.target.unit].append(c)
+            if c.source.port not in self._outputs[c.source.unit]:
+                self._outputs[c.source.unit].append(c.source.port)
+        self._back = [c for c in real if c in back]
+        self._factor = {c: change.factor if (change := ensemble.system.change_by(c)) else 1.0 for c in real}
+
+    @property
+    def are_given(self) -> bool:
+        """Whether all units say that they give directional derivatives."""
+        units = self._ensemble.system.units
+        return all(units[name].description.capabilities.directional_derivatives for name in self._units)
+
+    def __call__(self) -> Floats:
+        """Return dg/dx at the values that the units have.
+
+        Raises:
+            UnitFailure: a unit does not give its derivatives.
+        """
+        n = len(self._interface)
+        return np.stack([self._column(row) for row in np.eye(n)], axis=1)
+
+    def _column(self, dx: Floats) -> Floats:
+        dy: dict[str, dict[str, Floats]] = {}
+        for name in self._units:
+            du = self._interface.parts(name, dx)
+            for c in self._forward[name]:
+                du[c.target.port] = self._factor[c] * dy[c.source.unit][c.source.port]
+            dy[name] = self._through(name, du)
+        ends: Sequence[Floats] = [self._factor[c] * dy[c.source.unit][c.source.port] for c in self._back]
+        return np.concatenate(ends)
+
+    def _through(self, unit: str, du: dict[str, Floats]) -> dict[str, Floats]:
+        moving = {port: d for port, d in du.items() if np.any(d)}
+        outputs = self._outputs[unit]
+        if not moving:
+            ports = self._ensemble.system.units[unit].description.outputs
+            return {y: np.zeros(ports[y].size) for y in outputs}
+        return self._ensemble.instances[unit].directional_derivative(outputs, moving)
+
+    def _kind(self, c: Connection) -> Kind:
+        return self._ensemble.system.units[c.source.unit].description.outputs[c.source.port].kind

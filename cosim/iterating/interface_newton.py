@@ -1,0 +1,99 @@
+"""Newton's method on the signals between units."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
+from cosim.iterating.magnitudes import Floats, Magnitudes
+
+_SINGULAR = 1e-7
+"""Least singular value of I - dg/dx, in magnitudes, at which differences of g still tell a solution from none."""
+_NO_SOLUTION = "the equations are singular: signals act on themselves with a gain of 1"
+_SLOW = 0.5
+"""A step that leaves more than this part of the residual shows that the Jacobian is out of date."""
+
+
+class InterfaceNewton:
+    """x <- x + (I - J)^-1 (g(x) - x), where J is dg/dx.
+
+    J is what units say of their derivatives, or differences of g. It is corrected by Broyden's update at each
+    iteration, kept for the next solution and taken anew when an iteration does not halve the residual: as g is a whole
+    step of units, differences cost far more than iterations. [Sicklinger2014] Interface Jacobian-based co-simulation;
+    [Broyden1965] A class of methods for solving nonlinear simultaneous equations.
+
+    Args:
+        magnitudes: measures what has converged; J is scaled by them.
+        most_iterations: after so many calls of g, differences not counted, it gives up.
+    """
+
+    def __init__(self, magnitudes: Magnitudes, most_iterations: int) -> None:
+        self.magnitudes = magnitudes
+        self._most = most_iterations
+        self._kept: Floats | None = None
+
+    def solve(self, g: Map, x: Floats, jacobian: Jacobian | None = None) -> Solution:
+        """Iterate; see `InterfaceSolver`."""
+        residual: Floats = residual_of(g, x, 1)
+        fresh = False
+        for iteration in range(1, self._most):
+            if not np.any(self.magnitudes.moving(x, residual)):
+                return self._solved(x, iteration)
+            dx = self._step(x, residual)
+            if dx is None and not fresh:
+                self._kept, fresh = self._derivative(g, x, residual, jacobian), True
+                dx = self._step(x, residual)
+            if dx is None or self._kept is None:
+                self._kept = None
+                raise Unsolved(_NO_SOLUTION, iteration, x, residual)
+            moved: Floats = x + dx
+            after = residual_of(g, moved, iteration + 1)
+            slow = not fresh and self.magnitudes.length(moved, after) > _SLOW * self.magnitudes.length(moved, residual)
+            self._kept = None if slow else self._updated(self._kept, dx, dx + after - residual, moved)
+            x, residual, fresh = moved, after, False
+        if np.any(self.magnitudes.moving(x, residual)):
+            self._kept = None
+            raise Unsolved("values have not settled", self._most, x, residual)
+        return self._solved(x, self._most)
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return the magnitudes and the Jacobian; see `InterfaceSolver`."""
+        kept = None if self._kept is None else self._kept.tolist()
+        return {"magnitudes": self.magnitudes.get_state(), "jacobian": kept}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to what `get_state` gave."""
+        self.magnitudes.set_state(state["magnitudes"])
+        kept = state["jacobian"]
+        self._kept = None if kept is None else np.array(kept, dtype=np.float64)
+
+    def _solved(self, x: Floats, iterations: int) -> Solution:
+        self.magnitudes.learn(x)
+        return Solution(x, iterations)
+
+    def _derivative(self, g: Map, x: Floats, residual: Floats, jacobian: Jacobian | None) -> Floats:
+        given = None if jacobian is None else jacobian()
+        return differences(g, x, x + residual, self.magnitudes.perturbations(x)) if given is None else given
+
+    def _step(self, x: Floats, residual: Floats) -> Floats | None:
+        """Return (I - J)^-1 r, worked out in magnitudes, or None where J is singular or not known."""
+        if self._kept is None:
+            return None
+        scale = self.magnitudes.of(x)
+        matrix = np.eye(len(x)) - self._kept * scale / scale[:, None]
+        if not np.all(np.isfinite(matrix)) or np.linalg.svd(matrix, compute_uv=False)[-1] < _SINGULAR:
+            return None
+        return scale * np.linalg.solve(matrix, residual / scale)
+
+    def _updated(self, kept: Floats, dx: Floats, dy: Floats, x: Floats) -> Floats:
+        """Return J with the least change, in magnitudes, that makes J dx = dy."""
+        weighed = dx / self.magnitudes.of(x) ** 2
+        length = float(dx @ weighed)
+        return kept if length == 0.0 else kept + np.outer(dy - kept @ dx, weighed) / length
+
+
+def differences(g: Map, x: Floats, y: Floats, perturbations: Floats) -> Floats:
+    """Return dg/dx by forward differences, where y = g(x); column i takes a call of g."""
+    moved: Floats = x + np.diag(perturbations)
+    return np.stack([(g(row) - y) / np.sum(row - x) for row in moved], axis=1)

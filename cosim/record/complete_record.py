@@ -1,0 +1,115 @@
+"""Makes a record of what a process has left of it: the stream of whole blocks and the block under way."""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from cosim.record.record_block import DamagedTail, RecordBlock
+from cosim.record.record_columns import RecordColumns
+from cosim.record.record_formats import RECORD_FORMATS
+from cosim.record.record_stream import RecordStream, stream_batches, stream_schema
+
+Batches = Callable[[], Iterable["pa.RecordBatch"]]
+"""Gives all rows of a record, each time from the first one on."""
+
+
+def stream_of(path: Path) -> Path:
+    """Return where the whole blocks of a record under way are."""
+    return path.with_suffix(".arrows")
+
+
+def tail_of(path: Path) -> Path:
+    """Return where the rows of the block under way are."""
+    return path.with_suffix(".tail")
+
+
+def complete_record(path: Path) -> int:
+    """Complete the record that a process left which died, in the forms that it was asked for; return its rows.
+
+    Nothing is changed where the record is complete already.
+
+    Args:
+        path: the record (`signals.parquet`), which need not exist yet.
+
+    Raises:
+        FileLocked: the process still runs. OSError: there is nothing of a record, or it cannot be written.
+    """
+    stream = stream_of(path)
+    if not stream.exists():
+        return _rows_in(path)
+    block = _left_block(tail_of(path))
+    if block is None:
+        return finish_record(path, (), lambda: stream_batches(stream))
+    try:
+        written = sum(batch.num_rows for batch in stream_batches(stream))
+        columns = RecordColumns(stream_schema(stream), block.layout["places"])
+        last = columns.batch(block, min(written - int(block.counters[1]), block.filled))
+        formats: Sequence[str] = block.layout["formats"]
+        return finish_record(path, formats, lambda: _chained(stream, last))
+    finally:
+        block.close()
+        if not stream.exists():
+            tail_of(path).unlink(missing_ok=True)
+
+
+def finish_record(path: Path, formats: Sequence[str], batches: Batches) -> int:
+    """Write a record in Parquet and other forms, then remove its stream; return the number of rows.
+
+    Raises:
+        OSError: a file cannot be written; the stream stays.
+    """
+    schema = stream_schema(stream_of(path))
+    for name in dict.fromkeys(("parquet", *formats)):
+        made = path if name == "parquet" else path.with_suffix(f".{name}")
+        unfinished = made.with_name(made.name + ".part")
+        RECORD_FORMATS[name](unfinished, schema, batches())
+        os.replace(unfinished, made)
+    stream_of(path).unlink()
+    return _rows_in(path)
+
+
+def rewind_stream(path: Path, schema: "pa.Schema", rows: int) -> int:
+    """Cut a record's stream after so many rows, or make it again of the completed record; return its bytes.
+
+    Raises:
+        OSError: neither is there, or they have fewer rows or other columns.
+    """
+    stream = stream_of(path)
+    source = stream if stream.exists() else path
+    found = stream_schema(stream) if source == stream else pq.read_schema(path)
+    if not found.equals(schema, check_metadata=True):
+        raise OSError(f"{source} has other columns than this run records")
+    batches = stream_batches(stream) if source == stream else pq.ParquetFile(path).iter_batches()
+    made = RecordStream(stream.with_name(stream.name + ".part"), schema)
+    left = rows
+    try:
+        for batch in batches:
+            if left:
+                made.write(batch.slice(0, left))
+                left -= min(left, batch.num_rows)
+    finally:
+        made.close()
+    if left:
+        raise OSError(f"{source} has {rows - left} rows where the checkpoint counts {rows}")
+    os.replace(made.path, stream)
+    return made.size
+
+
+def _left_block(path: Path) -> RecordBlock | None:
+    try:
+        return RecordBlock.open(path)
+    except (FileNotFoundError, DamagedTail):  # the process died before there was a row in it
+        return None
+
+
+def _chained(stream: Path, last: "pa.RecordBatch") -> Iterable["pa.RecordBatch"]:
+    yield from stream_batches(stream)
+    yield last
+
+
+def _rows_in(path: Path) -> int:
+    rows: int = pq.read_metadata(path).num_rows
+    return rows

@@ -1,0 +1,153 @@
+"""The rows of a record that are not in its stream yet, in a memory-mapped file that outlives the process."""
+
+import contextlib
+import json
+import mmap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.record.file_lock import FileLocked, lock_file, unlock_file
+
+_MAGIC = b"HANDOVER"
+_HEAD = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
+_ALIGNMENT = 64
+_BYTES = 2**22
+_LEAST_ROWS, _MOST_ROWS = 16, 4096
+
+
+class Part(NamedTuple):
+    """Where rows come from and where they go.
+
+    `values` is an array of n outputs of one unit, contiguous; `rows` is [capacity, n], row-major, of the same type.
+    """
+
+    values: NDArray[Any]
+    rows: NDArray[Any]
+
+
+class DamagedTail(ValueError):
+    """A file that should hold the last rows of a record does not."""
+
+
+class RecordBlock:
+    """Rows that wait to be written, in memory that the system keeps when the process dies in whatever way.
+
+    To add a row: set `time[i]` and, of every part, `rows[i, :] = values` with i = `counters[0]`, and only then add one
+    to `counters[0]`; what the counter does not count is not there. When it reaches `capacity`, the recorder's `flush`
+    has to be called. Python and C do alike; C must not let its compiler put the counter before the rows (a volatile or
+    atomic store).
+
+    The file holds 32 bytes of head (magic, bytes of layout, the two counters), the layout in JSON, and, each at a
+    multiple of 64 bytes, `time` and the rows of the parts. While the block is open, the file is locked.
+
+    Attributes:
+        capacity: rows that the block can hold.
+        time: seconds, [capacity].
+        parts: where rows come from and go.
+        counters: int64, [2]: rows in the block, and the number of rows of the record that came before them.
+    """
+
+    def __init__(self, file: mmap.mmap, handle: Any, sources: Sequence[NDArray[Any]] | None = None) -> None:
+        head = np.frombuffer(file, dtype=_HEAD, count=1)
+        if head["magic"][0] != _MAGIC:
+            raise DamagedTail("it does not begin as the last rows of a record do")
+        size = int(head["layout"][0])
+        self.layout: dict[str, Any] = json.loads(file[_HEAD.itemsize : _HEAD.itemsize + size])
+        self._file, self._handle = file, handle
+        self.counters: NDArray[np.int64] = np.frombuffer(file, dtype=np.int64, count=2, offset=16)
+        self.capacity = int(self.layout["capacity"])
+        at = _aligned(_HEAD.itemsize + size)
+        self.time: NDArray[np.float64] = np.frombuffer(file, dtype=np.float64, count=self.capacity, offset=at)
+        at = _aligned(at + self.time.nbytes)
+        self.parts: list[Part] = []
+        for i, (name, n) in enumerate(self.layout["parts"]):
+            flat: NDArray[Any] = np.frombuffer(file, dtype=name, count=self.capacity * n, offset=at)
+            self.parts.append(Part(sources[i] if sources is not None else np.zeros(n, name), flat.reshape(-1, n)))
+            at = _aligned(at + flat.nbytes)
+
+    @classmethod
+    def create(cls, path: Path, sources: Sequence[NDArray[Any]], about: dict[str, Any]) -> "RecordBlock":
+        """Make the file for rows of these arrays; `about` is kept in its layout.
+
+        Its place on the disk is taken at once: to find the disk full while writing to mapped memory ends a process.
+
+        Raises:
+            FileLocked: a running process records into that file. OSError: it cannot be made.
+        """
+        parts: list[tuple[str, int]] = [(a.dtype.str, len(a)) for a in sources]
+        row = 8 + sum(a.itemsize * len(a) for a in sources)
+        capacity = min(max(_BYTES // row, _LEAST_ROWS), _MOST_ROWS)
+        layout = json.dumps({**about, "capacity": capacity, "parts": parts}).encode()
+        size = _aligned(_aligned(_HEAD.itemsize + len(layout)) + 8 * capacity)
+        for a in sources:
+            size = _aligned(size + a.itemsize * len(a) * capacity)
+        handle = open(path, "a+b")  # noqa: SIM115 (kept open: it carries the lock)
+        try:
+            lock_file(handle)
+            handle.truncate(0)
+            head = np.array([(_MAGIC, len(layout), 0, 0)], dtype=_HEAD)
+            handle.write((head.tobytes() + layout).ljust(size, b"\0"))
+            handle.flush()
+            return cls(mmap.mmap(handle.fileno(), size), handle, sources)
+        except BaseException:
+            handle.close()
+            raise
+
+    @classmethod
+    def open(cls, path: Path) -> "RecordBlock":
+        """Open what a process left.
+
+        Raises:
+            FileLocked: that process still runs. DamagedTail: the file is not whole. OSError: it cannot be read.
+        """
+        handle = open(path, "r+b")  # noqa: SIM115 (kept open: it carries the lock)
+        try:
+            lock_file(handle)
+            return cls(mmap.mmap(handle.fileno(), 0), handle)
+        except FileLocked:
+            handle.close()
+            raise
+        except (ValueError, KeyError, TypeError) as e:  # too short, or not in the form that `create` writes
+            handle.close()
+            raise DamagedTail(f"{path}: {e}") from e
+
+    @property
+    def filled(self) -> int:
+        """Rows in the block."""
+        return int(self.counters[0])
+
+    @property
+    def rows(self) -> int:
+        """Rows of the record until now, those before the block included."""
+        return int(self.counters[0] + self.counters[1])
+
+    def add(self, t: float) -> bool:
+        """Add a row of what the sources hold at time t; return whether the block is full."""
+        i = int(self.counters[0])
+        self.time[i] = t
+        for values, rows in self.parts:
+            rows[i] = values
+        self.counters[0] = i + 1
+        return i + 1 == self.capacity
+
+    def clear(self, first: int) -> None:
+        """Forget the rows: `first` are in the stream. In this order a process may die between the two."""
+        self.counters[0] = 0
+        self.counters[1] = first
+
+    def close(self) -> None:
+        """Let go of the file. Who still holds one of the arrays keeps its memory."""
+        unlock_file(self._handle)
+        self._handle.close()
+        nothing = np.zeros(2, dtype=np.int64)
+        self.counters, self.time, self.parts = nothing, np.zeros(0), []
+        with contextlib.suppress(BufferError):  # an array of it is held elsewhere
+            self._file.close()
+
+
+def _aligned(n: int) -> int:
+    return -(-n // _ALIGNMENT) * _ALIGNMENT

@@ -1,0 +1,79 @@
+"""Which signal of a record stands where in its rows, and how it is typed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from cosim.record.record_block import RecordBlock
+from cosim.signals import Column
+from cosim.variable import Kind
+from cosim.width import Width
+
+_WIDE: dict[Any, Any] = {pa.float64(): np.float64, pa.int64(): np.int64, pa.uint64(): np.uint64, pa.bool_(): np.bool_}
+_TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}
+
+
+@dataclass(frozen=True)
+class RecordColumns:
+    """The columns of a record: their types with what is told of them, and of each its part of a block and its place.
+
+    The first column is `time` in seconds. A column's metadata hold its unit and description, an enumeration's also its
+    items.
+    """
+
+    schema: "pa.Schema"
+    places: Sequence[tuple[int, int]]
+
+    def batch(self, block: RecordBlock, begin: int = 0) -> "pa.RecordBatch":
+        """Return a block's rows from row `begin` of the block on as columns."""
+        end = block.filled
+        turned: list[NDArray[Any]] = [part.rows[begin:end].T.copy(order="C") for part in block.parts]
+        columns: list[NDArray[Any]] = [block.time[begin:end].copy()]
+        for kind, (part, place) in zip(self.schema.types[1:], self.places, strict=True):
+            columns.append(turned[part][place].astype(_WIDE[kind], copy=False))
+        arrays: list[pa.Array[Any]] = [pa.array(column) for column in columns]
+        return pa.RecordBatch.from_arrays(arrays, schema=self.schema)
+
+
+def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArray[Any]]]:
+    """Return where these signals stand in rows, and the whole arrays that the parts of a row are copied from.
+
+    A unit's outputs of one type are views of one array: copying that at once costs a tenth of going entry by entry.
+    """
+    wholes: list[NDArray[Any]] = []
+    part_of: dict[int, int] = {}
+    places: list[tuple[int, int]] = []
+    for c in columns:
+        whole = c.values if c.values.base is None else c.values.base
+        if id(whole) not in part_of:
+            part_of[id(whole)] = len(wholes)
+            wholes.append(whole)
+        first = (c.values.ctypes.data - whole.ctypes.data) // whole.itemsize
+        places.append((part_of[id(whole)], first + c.index))
+    time = pa.field("time", pa.float64(), metadata={"unit": "s", "description": "simulated time"})
+    return RecordColumns(pa.schema([time, *(_field(c) for c in columns)]), places), wholes
+
+
+def told_of(schema: "pa.Schema") -> list[tuple[str, dict[str, str]]]:
+    """Return of each column its name and what is told of it: `unit`, `description`, and `items` of an enumeration."""
+    told: list[tuple[str, dict[str, str]]] = []
+    for name in schema.names:
+        metadata: dict[bytes, bytes] = schema.field(name).metadata or {}
+        known = {"unit": "1", "description": "", "items": ""}
+        told.append((name, known | {k.decode(): v.decode() for k, v in metadata.items()}))
+    return told
+
+
+def _type_of(c: Column) -> "pa.DataType":
+    return pa.uint64() if c.port.width is Width.UINT64 else _TYPES[c.port.kind]
+
+
+def _field(c: Column) -> "pa.Field[Any]":
+    metadata = {"unit": c.port.unit.symbol, "description": c.port.description}
+    if c.port.items:
+        metadata["items"] = ", ".join(f"{v} {n}" for n, v in c.port.items)
+    return pa.field(c.name, _type_of(c), metadata=metadata)

@@ -1,0 +1,83 @@
+"""Writes a record as OpenModelica and Dymola write their results: MATLAB's level 4, arranged as a trajectory."""
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from cosim.record.record_columns import told_of
+
+_DOUBLE, _INT32, _TEXT = 0, 20, 51  # type and kind of a matrix, little-endian
+_HEAD = struct.Struct("<5i")  # type, rows, columns, imaginary, bytes of the name
+
+
+def write_mat(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> None:
+    """Write the matrices `Aclass`, `name`, `description`, `dataInfo`, `data_1` and `data_2`, transposed ("binTrans").
+
+    `name` and `description` have a column of UTF-8 for each signal; a unit stands in brackets at the description's
+    end. `data_2` has a row for each signal, `time` first, and a column for each time; the format knows no other number
+    than doubles for it, so of integers beyond 2^53 the last digits are rounded. `data_1`, which holds what is constant,
+    has nothing but the first and the last time. `dataInfo` says of each signal that it is in `data_2`, in which row,
+    that it is interpolated linearly (0), which all of these are by their readers' custom, and that nothing is known
+    before and after (-1).
+
+    Source: OpenModelica User's Guide, "Simulation result files"; MATLAB's "MAT-File Format", level 4.
+    """
+    told = told_of(schema)
+    info = np.array([[2, i + 1, 0, -1] for i in range(len(told))], dtype="<i4")
+    info[0, 0] = 0  # time is in all matrices
+    with open(path, "wb") as file:
+        rows = [row.ljust(11) for row in ("Atrajectory", "1.1", "", "binTrans")]
+        _write_texts(file, "Aclass", ["".join(column) for column in zip(*rows, strict=True)])
+        _write_texts(file, "name", [name for name, _ in told])
+        _write_texts(file, "description", [_description(known) for _, known in told])
+        _write_head(file, "dataInfo", _INT32, (4, len(told)))
+        file.write(info.tobytes())
+        _write_head(file, "data_1", _DOUBLE, (1, 2))
+        limits_at = file.tell()
+        file.write(np.zeros(2).tobytes())
+        head_at = file.tell()
+        _write_head(file, "data_2", _DOUBLE, (len(told), 0))
+        count, first, last = 0, 0.0, 0.0
+        for batch in batches:
+            if not batch.num_rows:
+                continue
+            values = _doubles(batch)
+            file.write(values.tobytes())
+            first, last = (first if count else values[0, 0]), values[-1, 0]
+            count += len(values)
+        file.seek(limits_at)
+        file.write(np.array([first, last], dtype="<f8").tobytes())
+        file.seek(head_at)
+        _write_head(file, "data_2", _DOUBLE, (len(told), count))
+
+
+def _doubles(batch: "pa.RecordBatch") -> NDArray[np.float64]:
+    """Return a batch as [rows, columns]."""
+    values = np.empty((batch.num_rows, batch.num_columns), dtype="<f8")
+    for i in range(batch.num_columns):
+        column: NDArray[Any] = batch.column(i).to_numpy(zero_copy_only=False)
+        values[:, i] = column
+    return values
+
+
+def _description(told: Mapping[str, str]) -> str:
+    unit = "" if told["unit"] in ("", "1") else f"[{told['unit']}]"
+    items = f"({told['items']})" if told["items"] else ""
+    return " ".join(text for text in (told["description"], items, unit) if text)
+
+
+def _write_texts(file: IO[bytes], name: str, texts: Sequence[str]) -> None:
+    """Write texts as the columns of a matrix, padded with blanks as Dymola does: not all readers take zero bytes."""
+    coded = [t.encode() for t in texts]
+    longest = max(map(len, coded)) or 1
+    _write_head(file, name, _TEXT, (longest, len(coded)))
+    file.write(b"".join(t.ljust(longest) for t in coded))
+
+
+def _write_head(file: IO[bytes], name: str, kind: int, shape: tuple[int, int]) -> None:
+    file.write(_HEAD.pack(kind, *shape, 0, len(name) + 1) + name.encode() + b"\0")

@@ -1,0 +1,131 @@
+"""Records the scalar signals of a run, one column a signal, so that no row is lost however the process ends."""
+
+import contextlib
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from cosim.exceptions import RecordNotWritten
+from cosim.record.complete_record import finish_record, rewind_stream, stream_of, tail_of
+from cosim.record.record_block import RecordBlock
+from cosim.record.record_columns import RecordColumns, record_columns
+from cosim.record.record_stream import RecordStream, stream_batches
+from cosim.signals import Signals
+
+
+class Recorder:
+    """An observer of `Master.run` that records every communication point. Use as a context manager.
+
+    The record is `path`, a Parquet file, with further forms beside it as `formats` asks: see `RECORD_FORMATS`. Such
+    files cannot be written as rows come. Rows go to a block in a memory-mapped file (`signals.tail`), and whole blocks
+    to an Arrow stream (`signals.arrows`), both beside the record; leaving turns the two into the record, also when the
+    run was cut short. If the process dies, both files stay with every row, and `complete_record` makes the record of
+    them.
+
+    Who steps units in another way than `Master.run` calls `open`, then adds rows to `block` as that describes, and
+    calls `flush` when it is full.
+
+    Args:
+        path: the record, with the suffix `.parquet`.
+        formats: forms of the record; Parquet is always written.
+        after: go on with a record that a process left, after so many rows; later ones are forgotten.
+    """
+
+    def __init__(self, path: Path, formats: Sequence[str] = (), after: int = 0) -> None:
+        self.path = path
+        self.stream, self.tail = stream_of(path), tail_of(path)
+        self._formats = tuple(formats)
+        self._after = after
+        self._block: RecordBlock | None = None
+        self._columns: RecordColumns | None = None
+        self._file: RecordStream | None = None
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._block is None or self._file is None:
+            return
+        try:
+            self.flush()
+        finally:
+            self._file.close()
+            self._block.close()
+        with self._told():
+            finish_record(self.path, self._formats, lambda: stream_batches(self.stream))
+            self.tail.unlink(missing_ok=True)
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Record one row."""
+        if self._block is None:
+            self.open(signals)
+        if self.block.add(t):
+            self.flush()
+
+    def open(self, signals: Signals) -> None:
+        """Begin the files; the first row does it where nobody has.
+
+        Raises:
+            RecordNotWritten: they cannot be made, or another process records into them.
+        """
+        columns, sources = record_columns(signals.columns())
+        about = {"places": columns.places, "formats": self._formats}
+        with self._told(), contextlib.ExitStack() as undo:
+            block = RecordBlock.create(self.tail, sources, about)
+            undo.callback(block.close)
+            size = rewind_stream(self.path, columns.schema, self._after) if self._after else 0
+            self._file = RecordStream(self.stream, columns.schema, size)
+            block.clear(self._after)
+            undo.pop_all()
+            self._block, self._columns = block, columns
+
+    @property
+    def is_open(self) -> bool:
+        """Whether `open` was called, or the first row has done it."""
+        return self._block is not None
+
+    @property
+    def block(self) -> RecordBlock:
+        """The rows that are not in the stream yet, and where more of them go. It stays the same while recording."""
+        if self._block is None:
+            raise RuntimeError("nothing is recorded before `open`")
+        return self._block
+
+    @property
+    def rows(self) -> int:
+        """Rows recorded, those before `after` included."""
+        return self._after if self._block is None else self._block.rows
+
+    def flush(self) -> None:
+        """Write the block's rows to the stream and empty it.
+
+        Raises:
+            RecordNotWritten: they cannot be written; they stay in the block.
+        """
+        if self._block is None or self._columns is None or self._file is None or not self._block.filled:
+            return
+        rows = self._block.rows
+        with self._told():
+            self._file.write(self._columns.batch(self._block))
+        self._block.clear(rows)
+
+    def sync(self) -> int:
+        """Flush, wait until all rows are on the disk, and return their number.
+
+        Raises:
+            RecordNotWritten: as by `flush`.
+        """
+        self.flush()
+        if self._file is not None:
+            with contextlib.suppress(OSError):  # file systems without it
+                self._file.sync()
+        return self.rows
+
+    @contextlib.contextmanager
+    def _told(self) -> Generator[None, None, None]:
+        try:
+            yield
+        except OSError as e:
+            raise RecordNotWritten(self.path, e.strerror or str(e)) from e

@@ -1,0 +1,199 @@
+"""Steps whose length follows their error."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from cosim.ensemble import Ensemble
+from cosim.exceptions import ScheduleError, UnitFailure
+from cosim.failures import NotFinite, UnitDiscarded
+from cosim.iterating.not_converged import NotConverged
+from cosim.schedule import Schedule, Slot
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.stepping.coupling import Coupling
+from cosim.stepping.pi_controller import PiController
+from cosim.stepping.step_error import StepError, WorstSignal
+from cosim.stepping.step_statistics import StepStatistics
+from cosim.stepping.step_too_small import StepTooSmall
+from cosim.system import System
+
+_TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
+"""What a shorter step may cure."""
+_RESOLUTION = 8
+"""Ticks of the fine grid in the smallest step."""
+
+
+class AdaptiveStepper:
+    """Takes all continuous units together through steps whose error is tolerated, by step doubling.
+
+    Each step is taken as one, rolled back, and taken again as two of half the length. What the two attempts differ by
+    tells the error, see `StepError`, and the error the next step's length, see `PiController`. A step with a larger
+    error than tolerated is rolled back and tried shorter, and so is one that a unit discards, that gives no numbers, or
+    whose iteration does not converge; else the units go on from the two halves. Sampled units act at their instants,
+    once.
+
+    Communication points are whole ticks of a grid that divides the schedule's by a power of two, and every instant of
+    a sampled unit and the stop time is one of them.
+
+    Raises:
+        StepTooSmall: from `depart`; the units are where the step began.
+    """
+
+    def __init__(
+        self, schedule: Schedule, coupling: Coupling, ensemble: Ensemble, control: AdaptiveStep, order: int
+    ) -> None:
+        self.time = 0.0
+        self.statistics = StepStatistics()
+        self._schedule, self._coupling, self._ensemble = schedule, coupling, ensemble
+        self._grid = fine_tick(schedule, control)
+        self._per_tick = int(schedule.tick / self._grid)
+        self._tick = self._last = 0
+        self._due = {s.unit: 0 for s in schedule.sampled}
+        self._acted = {s.unit: -1 for s in schedule.sampled}
+        self._units = [s.unit for s in schedule.continuous]
+        self._error = StepError(ensemble, self._units, control, order)
+        self._controller = PiController(order + 1)
+        self._smallest = 2 * math.ceil(control.smallest / self._grid / 2)
+        self._largest = None if control.largest is None else max(self._smallest, int(control.largest / self._grid))
+        initial = control.initial or min(s.every for s in schedule.continuous) * schedule.tick
+        self._wanted = self._within_limits(int(initial / self._grid))
+        for unit in self._units:
+            ensemble.instances[unit].goes_back = True
+
+    def arrive(self, last: int) -> bool:
+        """Let sampled units act that are due; see `Stepper`."""
+        self._last = last * self._per_tick
+        due = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick > self._acted[s.unit]]
+        self._coupling.arrive(self.time, due, ())
+        for slot in due:
+            self._acted[slot.unit] = self._tick
+        return self._tick >= self._last
+
+    def depart(self) -> None:
+        """Step sampled units that are due, and take the others to the next communication point.
+
+        Raises:
+            StepTooSmall: an error is not tolerated even with the smallest step. UnitFailure: a unit's call failed.
+        """
+        due = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick]
+        self._coupling.depart(self.time, due, ())
+        for slot in due:
+            self._due[slot.unit] += slot.every * self._per_tick
+        states = self._ensemble.save(self._units)
+        try:
+            while not self._attempt(self._length()):
+                self._ensemble.restore(states)
+        except (StepTooSmall, *_TOO_LONG):
+            self._ensemble.restore(states)
+            raise
+        finally:
+            self._ensemble.forget(states)
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return ticks, the step wanted, and what control and inputs remember; see `Stepper`."""
+        lines = self._ensemble.lines
+        return {
+            "tick": self._tick,
+            "due": dict(self._due),
+            "acted": dict(self._acted),
+            "wanted": self._wanted,
+            "coupling": self._coupling.get_state(),
+            "controller": self._controller.get_state(),
+            "largest": self._error.get_state(),
+            "statistics": dataclasses.asdict(self.statistics),
+            **({} if lines is None else {"lines": lines.get_state()}),
+        }
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to what `get_state` gave."""
+        self._tick, self._wanted = state["tick"], state["wanted"]
+        self._due, self._acted = dict(state["due"]), dict(state["acted"])
+        self.time = self._seconds(self._tick)
+        self._coupling.set_state(state["coupling"])
+        self._controller.set_state(state["controller"])
+        self._error.set_state(state["largest"])
+        self.statistics = StepStatistics(**state["statistics"])
+        if self._ensemble.lines is not None:
+            self._ensemble.lines.set_state(state["lines"])
+
+    def _attempt(self, length: int) -> bool:
+        """Try a step from where the units are; return whether it was accepted."""
+        failure: UnitFailure | None = None
+        try:
+            worst = self._try(length)
+        except _TOO_LONG as e:
+            failure, worst = e, WorstSignal(e.unit, "", math.inf)
+        if worst.error > 1:
+            self.statistics.rejected += 1
+            if length <= self._smallest:
+                step = self._seconds(length)
+                raise failure or StepTooSmall(worst.unit, worst.name, self.time, step, worst.error)
+            self._wanted = self._within_limits(int(length * self._controller.after_rejection(worst.error)))
+            return False
+        self.statistics.accept(self._seconds(length))
+        self._error.accept()
+        proposed = int(length * self._controller.after_acceptance(worst.error))
+        cut = length < self._wanted  # by a communication point, which says nothing of the error of longer steps
+        self._wanted = self._within_limits(max(proposed, self._wanted) if cut else proposed)
+        self._tick += length
+        self.time = self._seconds(self._tick)
+        return True
+
+    def _try(self, length: int) -> WorstSignal:
+        states = self._ensemble.save(self._units)
+        try:
+            self._step(self._tick, length)
+            whole = self._error.values()
+            self._ensemble.restore(states)
+        finally:
+            self._ensemble.forget(states)
+        self._step(self._tick, length // 2)
+        self._step(self._tick + length // 2, length // 2)
+        return self._error.worst(whole, self._error.values())
+
+    def _step(self, tick: int, length: int) -> None:
+        step = self._seconds(length)
+        slots = [Slot(unit, length, step) for unit in self._units]
+        self._coupling.depart(self._seconds(tick), (), slots)
+        self._coupling.arrive(self._seconds(tick + length), (), slots)
+
+    def _length(self) -> int:
+        """Return the length to try: as wanted, but up to the next communication point, in parts of similar length."""
+        left = min(self._last, *self._due.values()) - self._tick if self._due else self._last - self._tick
+        if self._wanted >= left:
+            return left
+        return min(self._wanted, max(2, left // 4 * 2))
+
+    def _within_limits(self, length: int) -> int:
+        length = max(length // 2 * 2, self._smallest)
+        return length if self._largest is None else min(length, self._largest // 2 * 2)
+
+    def _seconds(self, ticks: int) -> float:
+        """Return so many ticks in seconds, rounded once."""
+        return ticks * self._grid.numerator / self._grid.denominator
+
+
+def fine_tick(schedule: Schedule, control: AdaptiveStep) -> Fraction:
+    """Return the grid of the steps in seconds: the schedule's tick, halved until it resolves the smallest step."""
+    halvings = 1
+    while schedule.tick / 2**halvings * _RESOLUTION > control.smallest:
+        halvings += 1
+    return schedule.tick / 2**halvings
+
+
+def check_control(system: System) -> None:
+    """Check that the step of all units that do not act at instants can be controlled.
+
+    Raises:
+        ScheduleError: it cannot; all units are named that are in the way.
+    """
+    units = [u for u in system.units.values() if not u.sampled]
+    faults = [f"{u.name} cannot save its state" for u in units if not u.description.capabilities.saves_state]
+    faults += [f"{u.name} has events, at which steps end" for u in units if u.uses_events]
+    faults += [f"{u.name} takes fixed steps only" for u in units if not u.description.capabilities.varies_step]
+    if not units:
+        faults.append("all units act at instants, at fixed times")
+    if faults:
+        raise ScheduleError(f"the step cannot follow the error: {'; '.join(faults)}")
