@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from cosim.directional_derivatives import derivatives_along
 from cosim.events.event_failures import StepDiscarded
 from cosim.events.step_end import StepEnd
 from cosim.events.step_status import discarded_step
@@ -199,16 +198,7 @@ class Instance:
         Raises:
             UnitFailure: it does not tell.
         """
-        d = self.description
-        unknowns, knowns = [d.outputs[y] for y in outputs], [d.inputs[u] for u in inputs]
-        seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
-        found = np.zeros(sum(p.size for p in unknowns))
-        references = (_references(unknowns), _references(knowns))
-        lengths = ((), ()) if self._fmi == 2 else ((len(seed),), (len(found),))
-        vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
-        self._call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
-        ends = np.cumsum([p.size for p in unknowns])[:-1]
-        return dict(zip(outputs, np.split(found, ends), strict=True))
+        return derivatives_along(self._call, self._fmi, self.description, outputs, inputs)
 
     def save_state(self) -> State:
         """Let the unit save its state; it is freed by `free_state`.
@@ -389,12 +379,3 @@ class Instance:
             line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
             self.log.append(line)
             self._heartbeat.log(self.name, line)
-
-
-def _references(ports: Sequence[FmuPort]) -> Any:
-    references = [r for p in ports for r in p.references]
-    return (ctypes.c_uint * len(references))(*references)
-
-
-def _doubles(values: Floats) -> Any:
-    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
