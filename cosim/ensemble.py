@@ -3,40 +3,25 @@
 import array
 import contextlib
 import functools
-import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import NamedTuple
 
 from cosim.endings import Endings
 from cosim.exceptions import CosimError
 from cosim.finite_check import FiniteCheck
 from cosim.fmpy_edge import unpack
-from cosim.fmu_description import FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.instance import Instance
-from cosim.narrowing import Narrowing, narrows
 from cosim.saved_states import SavedStates
-from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
-from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
 from cosim.state_calls import State
 from cosim.stepping.linear_inputs import LinearInputs
-from cosim.system import PortName, System
-
-_log = logging.getLogger(__name__)
-
-
-class Feeding(NamedTuple):
-    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
-
-    narrowings: Sequence[Narrowing]
-    copies: Sequence[Copy]
-    scaled: Sequence[ScaledCopy]
+from cosim.system import System
+from cosim.wiring import Feeding, feedings, finite_checks
 
 
 class Ensemble:
@@ -57,15 +42,13 @@ class Ensemble:
         """Whether CPU time is taken of steps."""
         self.lines: LinearInputs | None = None
         """What inputs follow that are extrapolated; None where all are held."""
-        self._copies: dict[str, Sequence[Copy]] = {}
-        self._scaled: dict[str, list[ScaledCopy]] = {}
-        self._narrowings: dict[str, list[Narrowing]] = {}
+        self._feedings: dict[str, Feeding] = {}
         self._finite: dict[str, FiniteCheck] = {}
         self._endings = endings or Endings()
         try:
             self._load()
-            self._wire()
-            self._watch_numbers()
+            self._feedings = feedings(system, self.instances)
+            self._finite = finite_checks(system, self.instances)
         except BaseException:
             if endings is None:
                 self.close()
@@ -117,7 +100,7 @@ class Ensemble:
 
     def feeding(self, unit: str) -> Feeding:
         """Return what `feed` does before it sets a unit's inputs, where none are extrapolated."""
-        return Feeding(self._narrowings[unit], self._copies[unit], self._scaled[unit])
+        return self._feedings[unit]
 
     def feed_known(self, unit: str, known: Collection[str]) -> None:
         """Set only the inputs whose sources are units that are known; the others keep what they have.
@@ -143,12 +126,7 @@ class Ensemble:
         Raises:
             UnitFailure: a number does not fit its input.
         """
-        for narrowing in self._narrowings[unit]:
-            narrowing.check(t)
-        for target, source in self._copies[unit]:
-            target[...] = source
-        for scaled in self._scaled[unit]:
-            scaled()
+        self._feedings[unit].carry_out(t)
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt.
@@ -263,34 +241,6 @@ class Ensemble:
     def _make(self, name: str, folder: Path) -> Instance:
         d = self.system.units[name].description
         return Instance(name, d, folder, self.system.sources_of(name), self.heartbeat)
-
-    def _watch_numbers(self) -> None:
-        read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in self.instances}
-        for name in self.instances:
-            for port, source in self.system.sources_of(name).items():
-                output = self.instances[source.unit].description.outputs[source.port]
-                read[source.unit].setdefault(source.port, (output, []))[1].append(f"{name}.{port}")
-        for name, instance in self.instances.items():
-            self._finite[name] = FiniteCheck(name, instance.description.fmi, instance.y, read[name])
-
-    def _wire(self) -> None:
-        changes = {c.target: change for c in self.system.connections if (change := self.system.change_by(c))}
-        for name, instance in self.instances.items():
-            copies: list[Copy] = []
-            self._scaled[name] = []
-            self._narrowings[name] = []
-            for port, source in self.system.sources_of(name).items():
-                other, target = self.instances[source.unit], instance.description.inputs[port]
-                output, change = other.description.outputs[source.port], changes.get(PortName(name, port))
-                if change is not None:
-                    self._scaled[name].append(ScaledCopy(instance.u[port][0], other.y[source.port][0], change))
-                    _log.info("%s (%s) -> %s.%s (%s): %s", source, output.unit, name, port, target.unit, change)
-                else:
-                    copies += zip(instance.u[port], other.y[source.port], strict=True)
-                if target.width and narrows(output, target):
-                    values = other.y[source.port][0]
-                    self._narrowings[name].append(Narrowing(str(source), name, port, target.width, values))
-            self._copies[name] = joined(copies)
 
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:

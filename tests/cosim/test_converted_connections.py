@@ -30,7 +30,7 @@ def test_degrees_millimetres_and_celsius_arrive_in_si_units(fmi: int, compiled: 
     s, a, b = pair(fmi, angle_in=30.0, length_in=125.0, temperature_in=20.0)
     for name in QUANTITIES:
         s.connect(getattr(a.y, name), getattr(b.u, f"{name}_in"))
-    with caplog.at_level(logging.INFO, "cosim.ensemble"), Master(s, MasterOptions(compiled=compiled)) as master:
+    with caplog.at_level(logging.INFO, "cosim.wiring"), Master(s, MasterOptions(compiled=compiled)) as master:
         at_start = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]
         master.run(Fraction(1))
         at_end = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]

@@ -39,12 +39,20 @@ def threads() -> Iterator[list[Stuck]]:
         assert not thread.is_alive()
 
 
-@pytest.mark.parametrize("options", [{}, {"compiled": False}, {"repeat_discarded": True}], ids=str)
+@pytest.mark.parametrize(
+    "options",
+    [
+        MasterOptions(call_limit=0.5),
+        MasterOptions(call_limit=0.5, compiled=False),
+        MasterOptions(call_limit=0.5, repeat_discarded=True),
+    ],
+    ids=["plan", "grid", "events"],
+)
 @pytest.mark.parametrize("call", ["Terminate", "FreeInstance"])
-def test_others_are_ended(call: str, options: dict[str, bool], threads: list[Stuck]):
+def test_others_are_ended(call: str, options: MasterOptions, threads: list[Stuck]):
     called = Stuck(f"fmi3{call}")
     threads.append(called)
-    master = Master(fed_by(native_fmu("gain"), 3), MasterOptions(call_limit=0.5, **options), called)
+    master = Master(fed_by(native_fmu("gain"), 3), options, called)
     with pytest.raises(UnitHung, match=f"bad: fmi3{call} at t = "), master:
         master.run(Fraction(1))
     for unit in ("source", "reader"):
