@@ -65,6 +65,8 @@ class Master:
         self._is_left = False
 
     def __enter__(self) -> "Master":
+        if self._ensemble is not None and not self._is_left:
+            raise RuntimeError("the master is entered already: leave it first, or make another one")
         self._is_left = False
         try:
             self._watchdog.carry_out(self._start)

@@ -73,6 +73,13 @@ def test_units_that_are_freed_are_not_called(options: MasterOptions):
         assert master.signals["ramp.x"] == pytest.approx(0.5)
 
 
+def test_units_are_not_loaded_twice_at_once():
+    with Master(ramp()) as master:
+        with pytest.raises(RuntimeError, match="entered already"):
+            master.__enter__()
+        master.run(Fraction(1))
+
+
 @all_ways
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_unit_that_failed_does_not_go_on(fmi: int, options: MasterOptions):
