@@ -25,7 +25,8 @@ class Interruption:
     KeyboardInterrupt.
 
     Python handles signals between its own instructions. A thread that hears of them at once therefore ends the process
-    if an abort is not handled in time, as when a unit's native code hangs; such a run leaves its stream alone.
+    if an abort is not handled in time, as when a unit's native code hangs. What was recorded stays beside
+    the record, which `complete_record` makes of it, as when the run is resumed.
     """
 
     def __init__(self) -> None:
