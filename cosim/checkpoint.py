@@ -162,7 +162,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 kept=archive.read("kept"),
             )
     except FileNotFoundError as e:
-        raise BadCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint EVERY") from e
+        raise BadCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
     except BadCheckpoint:
         raise
     except Exception as e:  # whatever the readers of archive, JSON and pickle make of damaged bytes

@@ -8,10 +8,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
+from scenarios.exit_status import ABORTED
 from scenarios.supervisor import leave
-
-ABORTED = 130
-"""Exit status of what Ctrl-C aborted, as shells have it."""
 
 _GRACE = 2.0
 """How long Python gets to act on an interrupt before the process is ended, s; a unit's native code may never return."""

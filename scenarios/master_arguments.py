@@ -10,7 +10,7 @@ from cosim.master_options import Algorithm, MasterOptions
 from cosim.stepping.adaptive_step import AdaptiveStep
 from cosim.stepping.extrapolation import Extrapolation
 from scenarios.bad_call import BadCall
-from scenarios.ssp_call import Seconds
+from scenarios.seconds import Seconds
 
 _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()
