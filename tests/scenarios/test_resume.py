@@ -1,15 +1,14 @@
-import fcntl
 import json
 import pickle
 import shutil
 import signal
-import sys
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from killed_run import end_between
 
 from fmus.build import cached
 from scenarios.catalog import SCENARIOS
@@ -21,9 +20,7 @@ from scenarios.parameters import parse_parameters
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
 
-sys.path.insert(0, str(Path(__file__).parent))  # killed_run
-
-from killed_run import end_between
+fcntl = pytest.importorskip("fcntl")
 
 OF_TIME = ("cpu_", "pace_", "peak_memory")
 
