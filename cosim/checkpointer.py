@@ -7,7 +7,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from cosim.checkpoint import take_checkpoint, write_checkpoint
-from cosim.master import Master, Observer
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 

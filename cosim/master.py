@@ -23,6 +23,7 @@ from cosim.iterating.interface_solver import InterfaceSolver
 from cosim.iterating.iteration_count import IterationCount
 from cosim.loop_refusal import refuse_circles, refuse_loops
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.observer import Observer
 from cosim.plan.choice import plan_stepper, tell_general_path
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.schedule import Schedule
@@ -42,9 +43,6 @@ from cosim.watchdog import Watchdog
 T = TypeVar("T")
 
 _PLAIN = MasterOptions()
-
-Observer = Callable[[float, Signals], None]
-"""Called at every communication point with the time and the signals that hold at that time."""
 
 
 def never() -> bool:

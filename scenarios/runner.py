@@ -8,7 +8,8 @@ from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer, from_then_on
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
-from cosim.master import Master, Observer
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.ended import Ended

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from cosim.exceptions import UnitRefused
-from cosim.master import Master, Observer
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from fmus.build import cached
 from scenarios.ended import Ended
