@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from cosim.directional_derivatives import derivatives_along
+from cosim.events.discarded_step import discarded_step
 from cosim.events.event_failures import StepDiscarded
 from cosim.events.step_end import StepEnd
-from cosim.events.step_status import discarded_step
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from cosim.failures import UnitEnded, failure_of
-from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
+from cosim.failures import STATUS, UnitEnded, failure_of
+from cosim.fmpy_loading import load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.iterating.magnitudes import Floats

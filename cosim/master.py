@@ -14,6 +14,7 @@ from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.iterating.iteration_count import IterationCount
 from cosim.master_options import MasterOptions
 from cosim.method import Method
+from cosim.observer import Observer
 from cosim.plan.plan_stepper import PlanStepper
 from cosim.signals import Signals
 from cosim.stepping.adaptive_stepper import AdaptiveStepper
@@ -28,9 +29,6 @@ from cosim.watchdog import Watchdog
 T = TypeVar("T")
 
 _PLAIN = MasterOptions()
-
-Observer = Callable[[float, Signals], None]
-"""Called at every communication point with the time and the signals that hold at that time."""
 
 
 def never() -> bool:

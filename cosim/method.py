@@ -43,7 +43,7 @@ class Method:
         self._system, self._options = system, options
         self.schedule = Schedule(system)
         if options.adaptive is not None:
-            check_control(system)
+            check_control(system, options.adaptive)
         refuse_off_grid(system, options)
         self._continuous = self._groups()
         refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)

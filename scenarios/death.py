@@ -11,14 +11,14 @@ from cosim.exceptions import UnitFailure
 from cosim.failures import UnitCrashed, UnitHung
 from cosim.heartbeat import Call, Heartbeat
 from cosim.record.complete_record import complete_record
+from scenarios.ended import Ended
+from scenarios.exit_status import UNIT_FAILED
 from scenarios.experiment import Outcome
 from scenarios.listing import print_summary
 from scenarios.record import Record
 from scenarios.report import write_report
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Ended
 
-_UNIT_FAILED = 3
 _BY_SIGNAL = 128  # what shells add to a signal's number
 
 
@@ -43,7 +43,7 @@ def tell_death(heartbeat: Heartbeat, number: int | None, status: int, wall: floa
         data = _data(call, heartbeat.time, number, status) if failure is None else failure.as_data()
         reason = told if failure is None else f"a unit failed: {failure.cause}"
         _complete(facts, {"reason": reason, "wall_seconds": wall, "failure": data}, failure)
-    return _UNIT_FAILED if failure is not None or "folder" in facts else _BY_SIGNAL + (number or 0)
+    return UNIT_FAILED if failure is not None or "folder" in facts else _BY_SIGNAL + (number or 0)
 
 
 def _failure(

@@ -3,7 +3,7 @@
 import sys
 from typing import NoReturn
 
-ABORTED = 130
+from scenarios.exit_status import ABORTED
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may end the process that they are in."""

@@ -8,10 +8,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
+from scenarios.exit_status import ABORTED
 from scenarios.supervisor import leave
-
-ABORTED = 130
-"""Exit status of what Ctrl-C aborted, as shells have it."""
 
 _GRACE = 2.0
 """How long Python gets to act on an interrupt before the process is ended, s; a unit's native code may never return."""
@@ -25,7 +23,8 @@ class Interruption:
     KeyboardInterrupt.
 
     Python handles signals between its own instructions. A thread that hears of them at once therefore ends the process
-    if an abort is not handled in time, as when a unit's native code hangs; such a run leaves its stream alone.
+    if an abort is not handled in time, as when a unit's native code hangs. What was recorded stays beside
+    the record, which `complete_record` makes of it, as when the run is resumed.
     """
 
     def __init__(self) -> None:

@@ -16,10 +16,10 @@ from fmus.build import import_block
 from fmus.catalog import UNITS, Entry
 from scenarios.catalog import SCENARIOS, SYSTEMS
 from scenarios.console import open_console
+from scenarios.ended import Ended
 from scenarios.experiment import Experiment
 from scenarios.report import told
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Ended
 
 
 def print_catalog() -> None:

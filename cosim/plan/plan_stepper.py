@@ -10,6 +10,7 @@ from typing import Any
 from cosim.ensemble import Ensemble
 from cosim.from_then_on import FromThenOn
 from cosim.heartbeat import Abandoned
+from cosim.observer import Observer
 from cosim.plan import memory
 from cosim.plan.plan_maker import PlanMaker
 from cosim.record.record_block import RecordBlock
@@ -26,8 +27,6 @@ _ROOM = 2 * _LONGEST
 """CPU times of a unit that the loop can take before they are told."""
 _LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
 _FARTHEST = 2**62
-
-Observer = Callable[[float, Signals], None]
 
 
 class PlanStepper:

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from cosim.ensemble import Ensemble
-from cosim.exceptions import ScheduleError, UnitFailure
+from cosim.exceptions import ScheduleError, UnitFailure, nearest
 from cosim.failures import NotFinite, UnitDiscarded
 from cosim.iterating.not_converged import NotConverged
 from cosim.schedule import Schedule, Slot
@@ -178,11 +178,11 @@ def fine_tick(schedule: Schedule, control: AdaptiveStep) -> Fraction:
     return schedule.tick / 2**halvings
 
 
-def check_control(system: System) -> None:
+def check_control(system: System, control: AdaptiveStep) -> None:
     """Check that the step of all units that do not act at instants can be controlled.
 
     Raises:
-        ScheduleError: it cannot; all units are named that are in the way.
+        ScheduleError: it cannot; all units are named that are in the way, and signals that are not there.
     """
     units = [u for u in system.units.values() if not u.sampled]
     faults = [f"{u.name} cannot save its state" for u in units if not u.description.capabilities.saves_state]
@@ -190,5 +190,8 @@ def check_control(system: System) -> None:
     faults += [f"{u.name} takes fixed steps only" for u in units if not u.description.capabilities.varies_step]
     if not units:
         faults.append("all units act at instants, at fixed times")
+    outputs = [f"{u.name}.{port}" for u in units for port in u.description.outputs]
+    unknown = [name for name in control.uncontrolled if name not in outputs]
+    faults += [f"there is no output {name!r}: {nearest(name, outputs)}" for name in unknown]
     if faults:
         raise ScheduleError(f"the step cannot follow the error: {'; '.join(faults)}")

@@ -9,7 +9,8 @@ from native_units import native_fmu
 from cosim.checkpoint import read_checkpoint
 from cosim.checkpointer import Checkpointer
 from cosim.from_then_on import FromThenOn
-from cosim.master import Master, Observer
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
