@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cosim.checkpoint import check_states, remove_checkpoint
-from cosim.checkpointer import Checkpointer, from_then_on
+from cosim.checkpointer import Checkpointer
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
+from cosim.from_then_on import FromThenOn
 from cosim.master import Master
 from cosim.observer import Observer
 from cosim.record.recorder import Recorder
@@ -98,7 +99,7 @@ def _run(
 
         observers: list[Observer] = [recorder, watch, *checkpoints]
         if resumption is not None:
-            observers = [from_then_on(resumption.checkpoint.time, observe) for observe in observers]
+            observers = [FromThenOn(resumption.checkpoint.time, observe) for observe in observers]
         try:
             master.run(stop, [*observers, tell], until=lambda: watch.over or interruption.asked)
             if interruption.asked and not watch.over:

@@ -81,15 +81,13 @@ class AdaptiveStepper:
         self._coupling.depart(self.time, due, ())
         for slot in due:
             self._due[slot.unit] += slot.every * self._per_tick
-        states = self._ensemble.save(self._units)
-        try:
-            while not self._attempt(self._length()):
+        with self._ensemble.saved(self._units) as states:
+            try:
+                while not self._attempt(self._length()):
+                    self._ensemble.restore(states)
+            except (StepTooSmall, *_TOO_LONG):
                 self._ensemble.restore(states)
-        except (StepTooSmall, *_TOO_LONG):
-            self._ensemble.restore(states)
-            raise
-        finally:
-            self._ensemble.forget(states)
+                raise
 
     def get_state(self) -> Mapping[str, Any]:
         """Return ticks, the step wanted, and what control and inputs remember; see `Stepper`."""
@@ -142,13 +140,10 @@ class AdaptiveStepper:
         return True
 
     def _try(self, length: int) -> WorstSignal:
-        states = self._ensemble.save(self._units)
-        try:
+        with self._ensemble.saved(self._units) as states:
             self._step(self._tick, length)
             whole = self._error.values()
             self._ensemble.restore(states)
-        finally:
-            self._ensemble.forget(states)
         self._step(self._tick, length // 2)
         self._step(self._tick + length // 2, length // 2)
         return self._error.worst(whole, self._error.values())
