@@ -56,7 +56,7 @@ class NotFinite(UnitFailure):
         readers: the inputs that it feeds, as `unit.port`.
     """
 
-    kind = "not finite"
+    kind = "not_finite"
 
     def __init__(
         self, unit: str, call: str, t: float, port: str, index: Sequence[int], value: float, *,

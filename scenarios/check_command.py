@@ -34,7 +34,7 @@ Exit status
 """
 
 
-@click.command("check", help=_HELP)
+@click.command("check", help=_HELP, short_help="Tell what is wrong with FMUs, whoever made them.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @click.option(
     "--timeout",

@@ -13,6 +13,7 @@ from scenarios.chosen import fmus_of, replacements, scenario_named
 from scenarios.interruption import Interruption
 from scenarios.parameters import parse_parameters
 from scenarios.run_folder import check_place
+from scenarios.scenario_arguments import scenario_options
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 
@@ -21,14 +22,15 @@ Its units are FMUs of FMI 2, and of FMI 3 only where there is no other form (pic
 """
 
 
-@click.command("export", help=_HELP, context_settings={"show_default": True})
+@click.command(
+    "export",
+    help=_HELP,
+    short_help="Write a SCENARIO as an SSP, for other tools.",
+    context_settings={"show_default": True},
+)
 @click.argument("scenario")
 @click.option("--ssp", "file", required=True, type=click.Path(path_type=Path), metavar="FILE", help="File to write.")
-@click.option(
-    "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
-@click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Let another FMU take a unit's place.")
+@scenario_options
 def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: int, replaced: Sequence[str]) -> None:
     """Write a SCENARIO as an SSP."""
     experiment = scenario_named(scenario)

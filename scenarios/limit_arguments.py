@@ -1,14 +1,18 @@
 """Options of commands that run units: how long a call may take, and how fast simulated time passes."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import click
 
+from scenarios.headed_options import HeadedOption
+
 CALL_LIMIT = 60.0
 """Seconds of wall time that a unit may take for one call where nothing else is said."""
 
-_LIMIT = click.option(
+_option = partial(click.option, cls=HeadedOption, heading="Wall time")
+_LIMIT = _option(
     "--call-limit",
     type=click.FloatRange(min=0),
     default=CALL_LIMIT,
@@ -16,7 +20,7 @@ _LIMIT = click.option(
     metavar="SECONDS",
     help="Wall time that a unit may take for one call, such as loading it or one step; 0: any. The run fails then.",
 )
-_PACE = click.option(
+_PACE = _option(
     "--pace",
     type=click.FloatRange(min=0, min_open=True),
     metavar="FACTOR",

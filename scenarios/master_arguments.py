@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import click
@@ -10,6 +11,7 @@ from cosim.master_options import Algorithm, MasterOptions
 from cosim.stepping.adaptive_step import AdaptiveStep
 from cosim.stepping.extrapolation import Extrapolation
 from scenarios.bad_call import BadCall
+from scenarios.headed_options import HeadedOption
 from scenarios.seconds import Seconds
 
 _PLAIN = MasterOptions()
@@ -36,69 +38,72 @@ def _choice(values: type[Algorithm] | type[Extrapolation]) -> click.Choice[str]:
     return click.Choice([v.value for v in values])
 
 
+_coupling_option = partial(click.option, cls=HeadedOption, heading="Coupling of units")
+_step_option = partial(click.option, cls=HeadedOption, heading="Length of steps")
+
 _OPTIONS = (
-    click.option(
+    _coupling_option(
         "--algorithm",
         type=_choice(Algorithm),
         default=_PLAIN.algorithm.value,
         help="Which values units step from: all from those of one time, each from the newest, or, with rollback, from"
         " those at the end of the step, iterated to a fixed point or by Newton's method.",
     ),
-    click.option(
+    _coupling_option(
         "--tolerance",
         type=_Above0(),
         default=_PLAIN.tolerance,
         help="What iterated signals may differ by, relative to their magnitude.",
     ),
-    click.option(
+    _coupling_option(
         "--iterations",
         type=click.IntRange(min=1),
         default=_PLAIN.most_iterations,
         help="After so many iterations of one step, the run fails.",
     ),
-    click.option(
+    _coupling_option(
         "--extrapolation",
         type=_choice(Extrapolation),
         default=_PLAIN.extrapolation.value,
         help="What inputs are during a step: held, or on a line through the last two values.",
     ),
-    click.option(
+    _step_option(
         "--adaptive",
         type=_Above0(),
         metavar="ERROR",
         help="Let the step follow its error, with rollback: what a step may be wrong by, relative to a signal's"
         " magnitude, such as 1e-4.  [default: fixed steps]",
     ),
-    click.option(
+    _step_option(
         "--adaptive-absolute",
         type=_Above0(),
         metavar="ERROR",
         help="With --adaptive: what a step may be wrong by besides, relative to a signal's nominal value."
         f"  [default: {_CONTROL.absolute:g}]",
     ),
-    click.option(
+    _step_option(
         "--first-step",
         type=Seconds(),
         metavar="SECONDS",
         help="With --adaptive: the step to try first.  [default: the shortest that units take]",
     ),
-    click.option(
+    _step_option(
         "--smallest-step",
         type=Seconds(),
         metavar="SECONDS",
         help="With --adaptive: the run fails where a shorter step were needed."
         f"  [default: {float(_CONTROL.smallest):g}]",
     ),
-    click.option(
+    _step_option(
         "--largest-step", type=Seconds(), metavar="SECONDS", help="With --adaptive: the longest step.  [default: any]"
     ),
-    click.option(
+    _step_option(
         "--uncontrolled",
         multiple=True,
         metavar="UNIT.PORT",
         help="With --adaptive: an output whose error is not looked at, such as noise; may be given more than once.",
     ),
-    click.option(
+    _step_option(
         "--repeat-discarded",
         is_flag=True,
         help="Let all units go back and take a step shorter that one of them discards, as with --adaptive anyway.",

@@ -19,14 +19,15 @@ from scenarios.runner import carry_out
 _HELP = """Go on with a run that was interrupted, killed, or that failed, from its last checkpoint.
 
 DIR is the folder of a run with --checkpoint. What it leaves at its end is what it would have left without the break,
-bit for bit in its signals; only times that it took differ. Units and versions must be those that it began with.
+bit for bit in its signals; only times that it took differ. Units and versions must be those that it began with. The
+options below are not kept with the run: give them again where they are to count.
 
 A checkpoint holds Python objects, which can do anything when they are read: go on only with runs from people whom you
 trust.
 """
 
 
-@click.command("resume", help=_HELP)
+@click.command("resume", help=_HELP, short_help="Go on with a run from its last checkpoint.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @limit_options
 def resume(folder: Path, call_limit: float, pace: float | None) -> None:

@@ -3,8 +3,9 @@
 import contextlib
 from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -12,19 +13,19 @@ from cosim.ssp.ssp_file import SspFile
 from scenarios import supervisor
 from scenarios.bad_call import BadCall
 from scenarios.experiment import Experiment
+from scenarios.headed_options import HeadedOption
 from scenarios.run_folder import sha256_of
 from scenarios.seconds import Seconds
 from scenarios.ssp_run import UntilStop, experiment_of
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+_option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
+_STOP = _option("--stop", help="When the run ends.  [default: the file's own stop time]")
+_STEP = _option("--step", help="Communication step of all units.  [default: what each FMU proposes]")
 
 
-def ssp_options(command: Command) -> Command:
-    """Add the options that are for SSPs."""
-    stop = "Of FILE.ssp: when the run ends  [default: the file's own stop time]"
-    step = "Of FILE.ssp: communication step of all units  [default: what each FMU proposes]"
-    with_step = click.option("--step", type=Seconds(), metavar="SECONDS", help=step)(command)
-    return click.option("--stop", type=Seconds(), metavar="SECONDS", help=stop)(with_step)
+def ssp_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--stop` and `--step`, which are for SSPs."""
+    return _STOP(_STEP(command))
 
 
 def refuse_for_ssp(**given: Any) -> None:

@@ -17,6 +17,9 @@ class GaussSeidel:
     algebraic loops only, this solves those and is Gauss-Seidel for the rest; with groups of all units whose data flow
     in a circle, it is the iterated (strong, implicit) coupling.
 
+    Source: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49; the iterated coupling R. Kuebler,
+    W. Schiehlen, Two methods of simulator coupling, Math. Comput. Model. Dyn. Syst. 6 (2000) 93-113.
+
     Args:
         ensemble: the units.
         sampled, continuous: groups of all units, each in the order in which they step.

@@ -11,6 +11,7 @@ class Jacobi:
     """A step's results count from the time where it ends, for sampled units too.
 
     Whatever acts at once acts a step later here, so there is no algebraic loop to solve but at the start.
+    Also called the parallel scheme: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49.
     """
 
     def __init__(self, ensemble: Ensemble) -> None:

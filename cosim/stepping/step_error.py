@@ -31,6 +31,10 @@ class StepError:
     Richardson's estimate: if the error of one step goes with its length to the power of order + 1, two steps of half
     the length are off by |y_halves - y_whole| / (2^order - 1). It is tolerated relative to the largest magnitude that
     the signal has had, so that passing through zero asks for no more than the rest of its course.
+
+    Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, sec. II.4; for coupled units
+    T. Schierz, M. Arnold, C. Clauss, Co-simulation with communication step size control in an FMI compatible master
+    algorithm, 9th International Modelica Conference (2012).
     """
 
     def __init__(self, ensemble: Ensemble, units: Sequence[str], control: AdaptiveStep, order: int) -> None:

@@ -14,7 +14,7 @@ class StepTooSmall(UnitFailure):
         step: the step that was tried last, in seconds.
     """
 
-    kind: ClassVar[str] = "step too small"
+    kind: ClassVar[str] = "step_too_small"
 
     def __init__(self, unit: str, signal: str, t: float, step: float, error: float) -> None:
         self.signal, self.error, self.step = signal, error, step

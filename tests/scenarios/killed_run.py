@@ -20,7 +20,7 @@ main(sys.argv[4:])
 
 def tell_from(passed: float, waits: float) -> None:
     """Let runs of this process tell from one simulated time on that they have passed it, and wait at another."""
-    import scenarios.command
+    import scenarios.run_command
 
     @contextmanager
     def telling(_stream: TextIO) -> Generator[Callable[[float, float], None], None, None]:
@@ -33,7 +33,7 @@ def tell_from(passed: float, waits: float) -> None:
         if t >= waits:
             sys.stdin.read()
 
-    scenarios.command.progress_bar = telling
+    scenarios.run_command.progress_bar = telling
 
 
 def end_between(passed: float, waits: float, number: signal.Signals, *arguments: str | Path) -> int:

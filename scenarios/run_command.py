@@ -1,0 +1,122 @@
+"""The command `handover run`."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cosim.master_options import MasterOptions
+from cosim.record.record_formats import RECORD_FORMATS
+from fmus.build import cached
+from scenarios.bad_call import BadCall, told_in_one_line
+from scenarios.chosen import fmus_of, replacements, scenario_named
+from scenarios.ending import end_with
+from scenarios.experiment import Experiment
+from scenarios.headed_options import HeadedCommand, HeadedOption
+from scenarios.interruption import Interruption
+from scenarios.limit_arguments import limit_options, limits
+from scenarios.master_arguments import coupling_of, master_options
+from scenarios.parameters import parse_parameters
+from scenarios.progress import progress_bar
+from scenarios.run_folder import RunFolder
+from scenarios.runner import carry_out
+from scenarios.scenario_arguments import scenario_options
+from scenarios.seconds import Seconds
+from scenarios.ssp_call import open_experiment, refuse_for_ssp, source_of, ssp_options
+from scenarios.ssp_run import NoParameters, is_ssp
+from scenarios.task import Task
+
+_HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
+
+FILE.ssp is a system from another tool (SSP 1.0 or 2.0), or from `handover export`: it runs until its stop time.
+
+Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
+
+The run is a process of its own: a unit that crashes it is named, and the record completed. On Windows it is not, and
+such a unit ends the command.
+"""
+
+_record_option = partial(click.option, cls=HeadedOption, heading="Record")
+
+
+@click.command("run", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
+@click.argument("scenario", metavar="SCENARIO|FILE.ssp")
+@scenario_options
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
+)
+@click.help_option("-h", "--help")
+@ssp_options
+@_record_option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(list(RECORD_FORMATS)),
+    help="Form of the record; may be given more than once. Parquet is always written.  [default: parquet]",
+)
+@_record_option(
+    "--checkpoint",
+    "every",
+    type=Seconds(),
+    metavar="SECONDS",
+    help="Write a checkpoint every so many simulated seconds, for `handover resume`.",
+)
+@master_options
+@limit_options
+def run(
+    scenario: str,
+    parameters: Sequence[str],
+    seed: int,
+    replaced: Sequence[str],
+    out: Path | None,
+    stop: Fraction | None,
+    step: Fraction | None,
+    formats: Sequence[str],
+    every: Fraction | None,
+    call_limit: float,
+    pace: float | None,
+    **coupling: Any,
+) -> None:
+    """Run a SCENARIO or an SSP once."""
+    if is_ssp(scenario):
+        refuse_for_ssp(**{"-p": parameters, "--seed": seed, "--unit": replaced})
+    elif stop is not None or step is not None:
+        raise BadCall("--stop and --step are for an SSP; a scenario has its own")
+    with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
+        options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace))
+        source: Mapping[str, Any] = {}
+        if is_ssp(scenario):
+            experiment, values, source = _of_file(Path(scenario), stop, step, opened)
+        else:
+            experiment = scenario_named(scenario)()
+            values = parse_parameters(type(experiment), parameters)
+        folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{Path(scenario).stem}"))
+        fmus = fmus_of(type(experiment), replacements(type(experiment), replaced), lambda unit: cached(unit, 3))
+        task = Task(
+            experiment=experiment,
+            parameters=values,
+            seed=seed,
+            fmus=fmus,
+            folder=folder,
+            formats=formats,
+            every=every,
+            source=source,
+            options=options,
+        )
+        with progress_bar(sys.stderr) as progress:
+            ended = carry_out(task, progress, interruption)
+    end_with(ended, task)
+
+
+def _of_file(
+    file: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
+) -> tuple[Experiment[Any], NoParameters, Mapping[str, Any]]:
+    """Return an SSP as an experiment, its parameters, and what its run's folder has to say of it."""
+    experiment, values = open_experiment(file, stop, step, opened), NoParameters()
+    return experiment, values, source_of(file, experiment.stop_time(values), step)
