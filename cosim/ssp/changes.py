@@ -24,7 +24,9 @@ def converted(source: Unit, target: Unit) -> Linear | None:
     if pass_as_they_are(source, target):
         return None
     if not (source.defined and target.defined):
-        raise ValueError(f"the unit {(target if source.defined else source).symbol!r} is not defined")
+        undefined = (target if source.defined else source).symbol
+        told = f"{source.symbol!r} cannot be converted to {target.symbol!r}"
+        raise ValueError(f"{told}: the unit {undefined!r} is not defined")
     if source.base != target.base:
         raise ValueError(f"{source.symbol!r} cannot be converted to {target.symbol!r}: they differ in dimension")
     try:

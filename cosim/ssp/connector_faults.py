@@ -49,7 +49,8 @@ def _differences(c: SspConnector, port: FmuPort) -> list[str]:
     if c.type_name in _KINDS and port.kind not in _KINDS[c.type_name]:
         found.append(f"is of type {c.type_name} here and {port.type_name} in its FMU")
     if _differ(c.unit, port.unit):
-        found.append(f"is in {c.unit.symbol} here and in {port.unit.symbol} in its FMU")
+        undefined = "" if c.unit.defined else ", which <ssd:Units> does not define,"
+        found.append(f"is in {c.unit.symbol}{undefined} here and in {port.unit.symbol} in its FMU")
     return found
 
 
@@ -57,4 +58,4 @@ def _differ(a: Unit, b: Unit) -> bool:
     try:
         return converted(a, b) is not None
     except ValueError:
-        return a.defined and b.defined
+        return True

@@ -76,8 +76,9 @@ class _Flattening:
         self._values: dict[Node, SspValue] = {}
         self.flat = FlatSystem(dict(components_of(system)))
         self._enter(system, "")
-        for target in list(self._fed):
-            if target[0] in descriptions:
+        passed_on = {fed.source for fed in self._fed.values()}
+        for target in self._fed:
+            if target not in passed_on:
                 self._follow(target)
         for (path, name), value in self._values.items():
             if path in descriptions:
@@ -158,7 +159,7 @@ class _Flattening:
         return kind in (TAKES if end.element is None else GIVES)
 
     def _follow(self, target: Node) -> None:
-        """Find what feeds a component's variable through the systems between."""
+        """Find what feeds a component's variable through the systems between; of a system's connector only check it."""
         hops: list[tuple[SspConnection, Node]] = []
         node, seen = target, set[Node]()
         while node in self._fed and (node not in seen):
@@ -173,6 +174,8 @@ class _Flattening:
             linear = self._composed(node, hops[::-1])
         except ValueError as e:
             self.flat.faults.append(f"{where}{_join(*node)} -> {_join(*target)}: {e}")
+            return
+        if target[0] not in self._descriptions:
             return
         if node[0] in self._descriptions:
             self.flat.connections.append(FlatConnection(node, target, linear, where))

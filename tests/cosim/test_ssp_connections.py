@@ -161,6 +161,7 @@ def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: O
         (connectors(z="output"), "the FMU of 'a' has no variable 'z'; "),
         (connectors(y="input"), "a.y is of kind input here and of causality output in its FMU"),
         (connectors(y="output mm"), "a.y is in mm here and in m in its FMU"),
+        (connectors(y="output kg"), "line 3: a.y is in kg, which <ssd:Units> does not define, here and in m in its FMU"),
         (connectors(y="output").replace("Real", "Integer"), "a.y is of type Integer here and real in its FMU"),
         (connectors(u="input") * 2, "Element 'ssd:Connectors'"),
     ],
@@ -174,6 +175,15 @@ def test_units_that_do_not_fit_are_refused(opened: Open):
     inner = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output s"))
     told = refusal(lambda: opened(inner + component("b", PLAIN), connection("inner.x", "b.u"), seconds))
     assert "inner.a.y -> b.u: 'm' cannot be converted to 's': they differ in dimension" in told
+
+
+def test_a_unit_that_is_not_defined_is_refused_unless_the_fmu_has_it(opened: Open):
+    """Of systems' connectors too, those included that nothing goes on from."""
+    assert opened(component("a", connectors(y="output m")), more=MM).system.units
+    a, whole = component("a", PLAIN), connection("a.y", "y")
+    assert opened(system(a, whole, name="inner", before=connectors(y="output m"))).system.units
+    told = refusal(lambda: opened(system(a, whole, name="inner", before=connectors(y="output bogus"))))
+    assert "line 3: inner.a.y -> inner.y: 'm' cannot be converted to 'bogus': the unit 'bogus' is not defined" in told
 
 
 def test_a_value_that_feeds_itself_is_refused(opened: Open):

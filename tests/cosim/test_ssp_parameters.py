@@ -166,7 +166,7 @@ def test_a_name_that_nothing_has_is_left_out_and_told(started: Open, caplog: pyt
         ("light|Enumeration|BLUE", "a.light: 'BLUE' is none of red, green"),
         ("mode|Integer|12", "a.mode: 12 is out of range: from 0 to 11"),
         ("u|Real|NaN", "a.u: nan is not finite"),
-        ("u|Real|1|s", "u: the unit 's' is not defined"),
+        ("u|Real|1|s", "u: 's' cannot be converted to 'm': the unit 's' is not defined"),
     ],
 )
 def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: str, told: str):
