@@ -12,11 +12,12 @@ _PLACE = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """Return ", did you mean ...?" with the nearest valid names, or the valid names when none is near."""
-    names = sorted(valid)
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    """Return "did you mean ...?" with the nearest valid names, those as near by name, or all when none is near."""
+    names = sorted(set(valid))
+    near = difflib.get_close_matches(name, names, n=len(names) or 1, cutoff=0.5)
+    near.sort(key=lambda n: (-difflib.SequenceMatcher(None, n, name).ratio(), n))
     if near:
-        return f"did you mean {' or '.join(near)}?"
+        return f"did you mean {' or '.join(near[:3])}?"
     if not names:
         return "there are none"
     return f"valid: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}"

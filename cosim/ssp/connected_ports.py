@@ -42,6 +42,11 @@ def variable_names(d: FmuDescription) -> list[str]:
     return [name for port in ports_of(d).values() for name in entry_names(port)]
 
 
+def settable_names(d: FmuDescription) -> list[str]:
+    """Return the names that start values of an FMU can have."""
+    return [name for port in (*d.parameters.values(), *d.inputs.values()) for name in entry_names(port)]
+
+
 def taken_apart(d: FmuDescription, names: Collection[str]) -> FmuDescription:
     """Return a description in which the named arrays of scalars are scalars, as they are in the FMU itself."""
     if not names:

@@ -8,7 +8,7 @@ from cosim.exceptions import nearest
 from cosim.fmu_description import FmuDescription
 from cosim.linear import Linear
 from cosim.ssp.changes import chained, converted
-from cosim.ssp.connected_ports import find_entry, ports_of
+from cosim.ssp.connected_ports import find_entry, ports_of, settable_names
 from cosim.ssp.connector_faults import GIVES, TAKES, connector_faults
 from cosim.ssp.given_values import Given
 from cosim.ssp.parameter_set import SspValue
@@ -103,7 +103,8 @@ class _Flattening:
         for binding in element.bindings:
             for name, value in binding.items():
                 if not self._assign(element, path, name, value):
-                    _log.warning("%sno variable is called %r; its value is left out", value.where, name)
+                    near = nearest(name, self._names(element, path))
+                    _log.warning("%sno variable is called %r; %s; its value is left out", value.where, name, near)
 
     def _assign(self, element: SspElement, path: str, name: str, value: SspValue) -> bool:
         if isinstance(element, SspComponent):
@@ -118,6 +119,15 @@ class _Flattening:
                 rest = name.removeprefix(f"{child.name}.")
                 found = self._assign(child, _join(path, child.name), rest, value) or found
         return found
+
+    def _names(self, element: SspElement, path: str) -> Iterator[str]:
+        """Yield the names that values can be given to, as they are called from an element."""
+        if isinstance(element, SspComponent):
+            yield from settable_names(self._descriptions[path])
+            return
+        yield from element.connectors
+        for child in element.elements.values():
+            yield from (f"{child.name}.{name}" for name in self._names(child, _join(path, child.name)))
 
     def _connect(self, system: SspNestedSystem, path: str, connection: SspConnection) -> None:
         ends = [(end, self._end(system, path, end, connection)) for end in (connection.start, connection.end)]

@@ -173,6 +173,13 @@ def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: st
     assert told in refusal(lambda: started(one(given)))
 
 
+def test_a_name_that_nothing_has_is_told_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):
+    middle = system(component("a", bindings(parameters("moed|Integer|1"))), name="m")
+    assert started(system(middle, before=bindings(parameters("m.a.p[3]|Real|1")))) == {"m.a": {}}
+    assert "no variable is called 'moed'; did you mean mode?; its value is left out" in caplog.text
+    assert "no variable is called 'm.a.p[3]'; did you mean m.a.p[1] or m.a.p[2]" in caplog.text
+
+
 def bound(inside: str, more: str = "") -> str:
     binding = f"<ssd:ParameterBinding {more}>{inside}</ssd:ParameterBinding>"
     return system(component("a", f"<ssd:ParameterBindings>{binding}</ssd:ParameterBindings>"))

@@ -1,0 +1,19 @@
+"""Which names an error suggests for one that there is not."""
+
+import pytest
+
+from cosim.exceptions import nearest
+
+
+@pytest.mark.parametrize(
+    ("name", "valid", "told"),
+    [
+        ("p[4]", ["p[3]", "p[1]", "p[2]"], "did you mean p[1] or p[2] or p[3]?"),
+        ("p[0]", [f"p[{k}]" for k in (9, 7, 5, 3, 1)], "did you mean p[1] or p[3] or p[5]?"),
+        ("forse", ["force_2", "force", "torque"], "did you mean force or force_2"),
+        ("x", ["alpha", "beta"], "valid: alpha, beta"),
+        ("x", [], "there are none"),
+    ],
+)
+def test_the_nearest_come_first_and_those_as_near_by_name(name: str, valid: list[str], told: str):
+    assert nearest(name, iter(valid)).startswith(told)
