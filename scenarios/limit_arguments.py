@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from scenarios.finite_range import FiniteRange
 from scenarios.headed_options import HeadedOption
 
 CALL_LIMIT = 60.0
@@ -14,7 +15,7 @@ CALL_LIMIT = 60.0
 _option = partial(click.option, cls=HeadedOption, heading="Wall time")
 _LIMIT = _option(
     "--call-limit",
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     default=CALL_LIMIT,
     show_default=True,
     metavar="SECONDS",
@@ -22,7 +23,7 @@ _LIMIT = _option(
 )
 _PACE = _option(
     "--pace",
-    type=click.FloatRange(min=0, min_open=True),
+    type=FiniteRange(min=0, min_open=True),
     metavar="FACTOR",
     help="Let so many simulated seconds pass in one of the wall clock, 1 being real time; missed deadlines are told."
     "  [default: as fast as it goes]",

@@ -124,9 +124,9 @@ class _Flattening:
         """Yield the names that values can be given to, as they are called from an element."""
         if isinstance(element, SspComponent):
             yield from settable_names(self._descriptions[path])
-            return
-        yield from element.connectors
-        for child in element.elements.values():
+        else:
+            yield from element.connectors
+        for child in element.elements.values() if isinstance(element, SspNestedSystem) else ():
             yield from (f"{child.name}.{name}" for name in self._names(child, _join(path, child.name)))
 
     def _connect(self, system: SspNestedSystem, path: str, connection: SspConnection) -> None:

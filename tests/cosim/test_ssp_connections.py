@@ -161,7 +161,10 @@ def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: O
         (connectors(z="output"), "the FMU of 'a' has no variable 'z'; "),
         (connectors(y="input"), "a.y is of kind input here and of causality output in its FMU"),
         (connectors(y="output mm"), "a.y is in mm here and in m in its FMU"),
-        (connectors(y="output kg"), "line 3: a.y is in kg, which <ssd:Units> does not define, here and in m in its FMU"),
+        (
+            connectors(y="output kg"),
+            "line 3: a.y is in kg, which <ssd:Units> does not define, here and in m in its FMU",
+        ),
         (connectors(y="output").replace("Real", "Integer"), "a.y is of type Integer here and real in its FMU"),
         (connectors(u="input") * 2, "Element 'ssd:Connectors'"),
     ],
