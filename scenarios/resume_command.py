@@ -20,7 +20,8 @@ _HELP = """Go on with a run that was interrupted, killed, or that failed, from i
 
 DIR is the folder of a run with --checkpoint. What it leaves at its end is what it would have left without the break,
 bit for bit in its signals; only times that it took differ. Units and versions must be those that it began with. The
-options below are not kept with the run: give them again where they are to count.
+options below are not kept with the run: give them again where they are to count. Where it cannot go on, its record is
+completed all the same.
 
 A checkpoint holds Python objects, which can do anything when they are read: go on only with runs from people whom you
 trust.
@@ -33,7 +34,9 @@ trust.
 def resume(folder: Path, call_limit: float, pace: float | None) -> None:
     """Go on with a run from its last checkpoint."""
     with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
-        left = LeftRun(RunFolder.left_at(folder))
+        left_at = RunFolder.left_at(folder)
+        opened.enter_context(left_at.held())
+        left = LeftRun(left_at)
         task = left.task(opened)
         task = replace(task, options=replace(task.options, **limits(call_limit, pace)))
         with progress_bar(sys.stderr) as progress:

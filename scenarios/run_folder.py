@@ -1,15 +1,17 @@
 """The folder that a run leaves behind: checked before the run, written to during and after it."""
 
+import contextlib
 import hashlib
 import importlib.metadata
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from cosim.exceptions import one_line
+from cosim.record.file_lock import FileLocked, folder_locked
 
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 
@@ -91,6 +93,22 @@ class RunFolder:
         except OSError as e:
             raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
 
+    @contextlib.contextmanager
+    def held(self) -> Generator[None, None, None]:
+        """Keep other processes that call this from the folder that a run has left.
+
+        Raises:
+            BadRunFolder: another process holds it, or it is not there.
+        """
+        with contextlib.ExitStack() as held:
+            try:
+                held.enter_context(folder_locked(self.path))
+            except FileLocked as e:
+                raise BadRunFolder(self.path, "the run still goes on") from e
+            except OSError as e:
+                raise BadRunFolder(self.path, f"it cannot be opened: {e.strerror}") from e
+            yield
+
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write `summary.json`."""
         _write_json(self.path / "summary.json", summary)
@@ -127,11 +145,14 @@ class RunFolder:
 
     def _read(self, name: str, missing: str) -> dict[str, Any]:
         try:
-            return dict(json.loads((self.path / name).read_bytes()))
+            content = json.loads((self.path / name).read_bytes())
         except OSError as e:
             raise BadRunFolder(self.path, missing) from e
-        except (ValueError, TypeError) as e:
+        except ValueError as e:
             raise BadRunFolder(self.path, f"its {name} is damaged: {one_line(e)}") from e
+        if not isinstance(content, dict):
+            raise BadRunFolder(self.path, f"its {name} is damaged: it holds no JSON object")
+        return cast(dict[str, Any], content)
 
 
 def sha256_of(file: Path) -> str:

@@ -1,5 +1,9 @@
 """Locks a file for as long as a process lives; Windows, where a mapped file is protected anyway, needs none."""
 
+import contextlib
+import os
+from collections.abc import Generator
+from pathlib import Path
 from typing import IO
 
 try:
@@ -9,7 +13,7 @@ except ImportError:  # Windows
 
 
 class FileLocked(OSError):
-    """Another process that runs holds the file."""
+    """Another process that runs holds the file or folder."""
 
 
 def lock_file(file: IO[bytes]) -> None:
@@ -30,3 +34,28 @@ def unlock_file(file: IO[bytes]) -> None:
     """Unlock it, also for a child process that has inherited it."""
     if fcntl is not None:
         fcntl.flock(file, fcntl.LOCK_UN)
+
+
+@contextlib.contextmanager
+def folder_locked(path: Path) -> Generator[None, None, None]:
+    """Lock a folder, for those who would change what is in it, without a file of its own that could be left behind.
+
+    Raises:
+        FileLocked: it is locked already. OSError: it cannot be opened.
+    """
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as e:
+            raise FileLocked(f"{path} belongs to a run that still goes on") from e
+        except OSError:  # some network file systems lock only what can be written to
+            pass
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_UN)  # also for a child process that has inherited it
+        os.close(handle)

@@ -161,6 +161,8 @@ def test_a_folder_of_no_run_is_refused(tmp_path: Path):
 def test_a_damaged_configuration_is_refused(copy: Path):
     (copy / "run.json").write_text("{")
     assert_refused(copy, "its run.json is damaged")
+    (copy / "run.json").write_text("[]")
+    assert_refused(copy, "its run.json is damaged: it holds no JSON object")
     (copy / "run.json").write_text("{}")
     assert_refused(copy, "the run began with other versions: python None (here ")
 
@@ -175,6 +177,14 @@ def test_a_run_that_goes_on_is_refused(copy: Path):
         fcntl.flock(file, fcntl.LOCK_EX)
         assert_refused(copy, "the run still goes on")
     assert not (copy / "signals.parquet").exists()
+
+
+def test_a_run_that_another_process_is_about_to_go_on_with_is_refused(copy: Path):
+    with RunFolder.left_at(copy).held():
+        assert_refused(copy, "the run still goes on")
+    assert not (copy / "signals.parquet").exists()
+    (copy / "checkpoint.zip").unlink()
+    assert_refused(copy, "there is no checkpoint")  # who held it has let go of it
 
 
 def test_a_run_without_a_checkpoint_is_refused_and_its_record_is_whole(copy: Path):
