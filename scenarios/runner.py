@@ -20,10 +20,11 @@ from cosim.master import Master, Observer
 from cosim.master_options import MasterOptions
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
+from scenarios.conversions import conversions_of
 from scenarios.experiment import Experiment, Metric, Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
-from scenarios.report import write_report
+from scenarios.report import UnitRow, write_report
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import RunFolder
 from scenarios.supervisor import heartbeat_of_run
@@ -124,13 +125,14 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     if resumption is None:
         task.folder.make()
     fmus = {n: u.description.path for n, u in master.system.units.items()}
-    task.folder.write_run({**_configuration(task), **_options(task)}, fmus)
+    configuration = {**_configuration(task), **_options(task), "conversions": conversions_of(master.system)}
+    task.folder.write_run(configuration, fmus)
     master.heartbeat.tell(
         folder=str(task.folder.path),
         configuration=_configuration(task),
         title=task.experiment.title,
         parameters=_parameter_rows(task),
-        units=system_rows(master),
+        units=[(*row[:3], None, None) for row in system_rows(master)],
     )
 
 
@@ -179,12 +181,13 @@ def _checkpoints(
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
-def system_rows(master: Master) -> list[tuple[str, str, str, int, float]]:
-    """Return name, FMU, period, steps and CPU seconds of each unit."""
-    rows: list[tuple[str, str, str, int, float]] = []
+def system_rows(master: Master) -> list[UnitRow]:
+    """Return what is told of each unit."""
+    rows: list[UnitRow] = []
     for name, unit in master.system.units.items():
         d = unit.description
-        period = f"{float(unit.period) * 1000:.4g} ms"
+        follows = master.steps is not None and not unit.sampled
+        period = "varies" if follows else f"{float(unit.period) * 1000:.4g} ms"
         rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
     return rows
 
@@ -267,9 +270,7 @@ def _metric(m: Metric) -> dict[str, Any]:
     return {"value": m.value if math.isfinite(m.value) else None, "unit": m.unit, "description": m.description}
 
 
-def _present(
-    task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[tuple[str, str, str, int, float]]
-) -> None:
+def _present(task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[UnitRow]) -> None:
     figures = []
     if task.folder.signals.exists():
         record = Record(task.folder.signals)
