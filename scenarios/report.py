@@ -10,7 +10,7 @@ import jinja2
 from scenarios.conversions import told_conversion
 from scenarios.experiment import Figure
 from scenarios.master_rows import master_rows
-from scenarios.run_folder import RunFolder
+from scenarios.run_folder import RunFolder, write_whole
 
 UnitRow = tuple[str, str, str, int | None, float | None]
 """Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
@@ -54,7 +54,7 @@ def write_report(
         failure=summary.get("failure"),
         pictures=pictures,
     )
-    folder.report.write_text(page, encoding="utf-8")
+    write_whole(folder.report, page)
 
 
 def told(metric: Mapping[str, Any]) -> str:

@@ -26,7 +26,7 @@ from scenarios.interruption import Interruption
 from scenarios.record import Record
 from scenarios.report import UnitRow, write_report
 from scenarios.resumption import Resumption, Spent, pack
-from scenarios.run_folder import RunFolder
+from scenarios.run_folder import RunFolder, told_if_not_written
 from scenarios.supervisor import heartbeat_of_run
 
 Progress = Callable[[float, float], None]
@@ -76,6 +76,7 @@ def carry_out(
         WiringError, ScheduleError, InvalidFmu, UnitRefused, StateNotSaved, BadRunFolder: before anything was written.
         UnitHung: a unit does not return as it is loaded or initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
+        RecordNotWritten: there is no room for what it leaves; what was recorded stays.
     """
     experiment, parameters = task.experiment, task.parameters
     spent = Spent() if resumption is None else resumption.spent
@@ -109,7 +110,8 @@ def carry_out(
         task.folder.add_to_run(failure=failure.as_data())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
-    _present(task, watch, summary, system_rows(master))
+    with told_if_not_written(task.folder.path):
+        _present(task, watch, summary, system_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
