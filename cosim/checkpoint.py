@@ -109,23 +109,29 @@ def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
     )
 
 
-def write_checkpoint(path: Path, c: Checkpoint) -> None:
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint: the file is either the former one or whole, whenever the process ends.
 
     Raises:
         OSError: it cannot be written; the former one stays.
     """
-    head = {"format": _FORMAT, "time": c.time, "rows": c.rows, "stepper": c.stepper, "units": list(c.units)}
+    head = {
+        "format": _FORMAT,
+        "time": checkpoint.time,
+        "rows": checkpoint.rows,
+        "stepper": checkpoint.stepper,
+        "units": list(checkpoint.units),
+    }
     unfinished = _unfinished(path)
     try:
         with open(unfinished, "wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
                 archive.writestr("checkpoint.json", json.dumps(head))
-                for i, name in enumerate(c.units):
-                    archive.writestr(f"{i}.state", c.units[name])
-                    archive.writestr(f"{i}.contents", pickle.dumps(c.contents[name]))
-                    archive.writestr(f"{i}.cpu", c.cpu[name])
-                archive.writestr("kept", c.kept)
+                for i, name in enumerate(checkpoint.units):
+                    archive.writestr(f"{i}.state", checkpoint.units[name])
+                    archive.writestr(f"{i}.contents", pickle.dumps(checkpoint.contents[name]))
+                    archive.writestr(f"{i}.cpu", checkpoint.cpu[name])
+                archive.writestr("kept", checkpoint.kept)
             file.flush()
             os.fsync(file.fileno())
         os.replace(unfinished, path)
@@ -162,7 +168,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 kept=archive.read("kept"),
             )
     except FileNotFoundError as e:
-        raise BadCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint EVERY") from e
+        raise BadCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
     except BadCheckpoint:
         raise
     except Exception as e:  # whatever the readers of archive, JSON and pickle make of damaged bytes

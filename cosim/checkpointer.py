@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from cosim.checkpoint import take_checkpoint, write_checkpoint
-from cosim.master import Master, Observer
+from cosim.master import Master
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 
@@ -66,13 +66,3 @@ class Checkpointer:
         while float(count * self._every) <= t:  # a time is rounded, so a multiple may seem to be not reached
             count += 1
         return float(count * self._every)
-
-
-def from_then_on(t_0: float, observe: Observer) -> Observer:
-    """Return an observer of a run that goes on from t_0, which was seen before."""
-
-    def observe_later(t: float, signals: Signals) -> None:
-        if t > t_0:
-            observe(t, signals)
-
-    return observe_later

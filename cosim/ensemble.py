@@ -16,14 +16,15 @@ from cosim.exceptions import CosimError
 from cosim.finite_check import FiniteCheck
 from cosim.fmpy_edge import unpack
 from cosim.fmu_description import FmuPort
-from cosim.heartbeat import Heartbeat
-from cosim.instance import Instance, State
+from cosim.heartbeat import Abandoned, Heartbeat
+from cosim.instance import Instance
 from cosim.narrowing import Narrowing, narrows
 from cosim.saved_states import SavedStates
 from cosim.scaled_copy import ScaledCopy
 from cosim.schedule import Slot
 from cosim.signal_buffer import Copy, joined
 from cosim.signals import Signals
+from cosim.state_calls import State
 from cosim.stepping.linear_inputs import LinearInputs
 from cosim.system import PortName, System
 
@@ -96,8 +97,8 @@ class Ensemble:
         for slot in slots:
             self.feed(slot.unit, 0.0)
             self.instances[slot.unit].exit_initialization()
-            self.publish(slot.unit)
             self._end_at_close(self.instances[slot.unit])
+            self.publish(slot.unit)
 
     def extrapolate(self, tick: Fraction) -> None:
         """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
@@ -172,9 +173,39 @@ class Ensemble:
             self.lines.publish(unit)
 
     def save(self, units: Collection[str]) -> SavedStates:
-        """Save the states of units; `restore` goes back to them, `forget` frees them."""
-        lines = self.lines.save(units) if self.lines is not None else {}
-        return SavedStates({name: self.instances[name].save_state() for name in units}, lines)
+        """Save the states of units, of all or none; `restore` goes back to them, `forget` frees them.
+
+        Raises:
+            UnitFailure: a unit does not give its state.
+        """
+        states = SavedStates({}, self.lines.save(units) if self.lines is not None else {})
+        try:
+            for name in units:
+                states[name] = self.instances[name].save_state()
+        except Exception:
+            self._forget_quietly(states)
+            raise
+        return states
+
+    @contextlib.contextmanager
+    def saved(self, units: Collection[str]) -> Generator[SavedStates, None, None]:
+        """Save the states of units for a while, and free them in the end.
+
+        After a failure, which then counts, those are freed that can be; none by a thread whose units were taken from
+        it.
+
+        Raises:
+            UnitFailure: a unit does not give its state.
+        """
+        states = self.save(units)
+        try:
+            yield states
+        except Abandoned:
+            raise
+        except BaseException:
+            self._forget_quietly(states)
+            raise
+        self.forget(states)
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
@@ -185,9 +216,11 @@ class Ensemble:
             self.publish(name)
 
     def forget(self, states: Mapping[str, State]) -> None:
-        """Free saved states."""
+        """Free saved states, but of units that must not be called any more."""
+        corrupt = self._corrupt()
         for name, state in states.items():
-            self.instances[name].free_state(state)
+            if self.system.units[name].description.path not in corrupt:
+                self.instances[name].free_state(state)
 
     def finite_check(self, unit: str) -> FiniteCheck:
         """Return the check that `publish` makes of a unit's outputs."""
@@ -206,6 +239,11 @@ class Ensemble:
                 began = ended
 
         yield charge
+
+    def _forget_quietly(self, states: Mapping[str, State]) -> None:
+        for name, state in states.items():
+            with contextlib.suppress(CosimError):
+                self.forget({name: state})
 
     def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
@@ -268,5 +306,7 @@ class Ensemble:
 
     def is_corrupt(self, instance: Instance) -> bool:
         """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
-        path = instance.description.path
-        return any(i.fatal for i in self.instances.values() if i.description.path == path)
+        return instance.description.path in self._corrupt()
+
+    def _corrupt(self) -> set[Path]:
+        return {i.description.path for i in self.instances.values() if i.fatal}

@@ -6,7 +6,8 @@ from typing import Any
 
 from cosim.exceptions import UnitFailure
 
-_STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+"""The standards' names of what calls answer, by number; Pending is FMI 2's alone."""
 _DISCARD, _FATAL = 2, 4
 
 
@@ -33,7 +34,7 @@ class UnitDiscarded(UnitFailure):
 
     def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = (), reached: float | None = None) -> None:
         self.reached = reached
-        super().__init__(unit, call, t, _STATUS[_DISCARD], log)
+        super().__init__(unit, call, t, STATUS[_DISCARD], log)
 
     @property
     def what(self) -> str:
@@ -146,7 +147,7 @@ class UnitCrashed(UnitFailure):
 
 def failure_of(unit: str, call: str, t: float, status: int, log: Sequence[str] = ()) -> UnitFailure:
     """Return the failure that an FMI status above Warning is."""
-    told = _STATUS[status] if 0 <= status < len(_STATUS) else str(status)
+    told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
     if status == _DISCARD:
         return UnitDiscarded(unit, call, t, log)
     return (UnitFatal if status == _FATAL else UnitError)(unit, call, t, told, log)

@@ -13,7 +13,7 @@ import fmpy
 import fmpy.fmi2
 
 from cosim.exceptions import InvalidFmu, one_line
-from cosim.fmpy_slaves import FMU2Unit, FMU3Unit
+from cosim.fmpy_units import FMU2Unit, FMU3Unit
 
 Logger = Callable[[int, str], None]
 """Takes an FMI status and a message."""
@@ -22,8 +22,6 @@ Begins = Callable[[str], None]
 """Told what begins to be done with a unit."""
 
 LOADING = "loading of its library"
-
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 
 def load_fmi3(

@@ -9,7 +9,6 @@ from cosim.archive_faults import STANDARD_METHODS, archive_faults, listed
 from cosim.exceptions import InvalidFmu, one_line
 
 DESCRIPTION = "modelDescription.xml"
-FOLDER_FAULT = f"a folder, not a file; zip what is in it, with {DESCRIPTION} at the top"
 NO_FILE_FAULT = "not a regular file"
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError, ValueError)
@@ -33,7 +32,7 @@ class FmuArchive:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._members = _members(path, self.kind)
+        self._members = _members(path, self.kind, self.description_name)
         faults = archive_faults(self._members, path.stat().st_size)
         if faults:
             raise InvalidFmu(path, "; ".join(faults))
@@ -126,9 +125,14 @@ class FmuArchive:
             raise InvalidFmu(self.path, f"cannot be unpacked: {one_line(e)}") from e
 
 
-def _members(path: Path, kind: str) -> list[zipfile.ZipInfo]:
+def folder_fault(wanted: str = DESCRIPTION) -> str:
+    """Return what is wrong with a folder in the place of an archive that has a file `wanted` at its top."""
+    return f"a folder, not a file; zip what is in it, with {wanted} at the top"
+
+
+def _members(path: Path, kind: str, wanted: str) -> list[zipfile.ZipInfo]:
     if path.is_dir():
-        raise InvalidFmu(path, FOLDER_FAULT)
+        raise InvalidFmu(path, folder_fault(wanted))
     if not path.is_file():
         raise InvalidFmu(path, NO_FILE_FAULT if path.exists() else "there is no such file")
     try:

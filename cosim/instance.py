@@ -8,23 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from cosim.events.discarded_step import discarded_step
 from cosim.events.event_failures import StepDiscarded
 from cosim.events.step_end import StepEnd
-from cosim.events.step_status import discarded_step
 from cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from cosim.failures import UnitEnded, failure_of
-from cosim.fmpy_loading import STATUS, load_fmi2, load_fmi3
+from cosim.failures import STATUS, UnitEnded, failure_of
+from cosim.fmpy_loading import load_fmi2, load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Abandoned, Heartbeat
 from cosim.iterating.magnitudes import Floats
 from cosim.native_step import NativeStep
 from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from cosim.start_values import numbers_of
+from cosim.state_calls import State, StateCalls
 from cosim.stepping.rate_buffer import RateBuffer
 from cosim.variable import Kind
-
-State = ctypes.c_void_p
-"""A saved state of one instance, which alone knows what it points to."""
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
@@ -51,7 +49,7 @@ class Instance:
         self._prefix = f"fmi{self._fmi}"
         self._heartbeat = heartbeat or Heartbeat()
         self._codes: dict[str, int] = {}
-        self._byte: Any = ctypes.c_char if self._fmi == 2 else ctypes.c_uint8
+        self._states = StateCalls(self._call, self._fmi)
         d = description
         try:
             self._fmu = self._load(folder)
@@ -218,9 +216,7 @@ class Instance:
         Raises:
             UnitFailure: it cannot.
         """
-        state = State()
-        self._call("GetFMUstate" if self._fmi == 2 else "GetFMUState", ctypes.byref(state))
-        return state
+        return self._states.save()
 
     def restore_state(self, state: State) -> None:
         """Go back to a saved state of this instance, which may be used again.
@@ -228,11 +224,12 @@ class Instance:
         Raises:
             UnitFailure: it cannot.
         """
-        self._call("SetFMUstate" if self._fmi == 2 else "SetFMUState", state)
+        self._states.restore(state)
 
     def free_state(self, state: State) -> None:
-        """Free a saved state."""
-        self._call("FreeFMUstate" if self._fmi == 2 else "FreeFMUState", ctypes.byref(state))
+        """Free a saved state; it is left where the unit itself has to be left, see `lost`."""
+        if not self.lost:
+            self._states.free(state)
 
     def serialise_state(self) -> bytes:
         """Return the unit's state as bytes that mean the same in another process.
@@ -240,13 +237,9 @@ class Instance:
         Raises:
             UnitFailure: it cannot.
         """
-        state, size = self.save_state(), ctypes.c_size_t()
+        state = self.save_state()
         try:
-            name = "FMUstate" if self._fmi == 2 else "FMUState"
-            self._call(f"Serialized{name}Size", state, ctypes.byref(size))
-            data = (self._byte * size.value)()
-            self._call(f"Serialize{name}", state, data, size)
-            return bytes(data)
+            return self._states.serialise(state)
         finally:
             self.free_state(state)
 
@@ -256,10 +249,7 @@ class Instance:
         Raises:
             UnitFailure: it cannot.
         """
-        state = State()
-        held = (self._byte * len(data)).from_buffer_copy(data)
-        name = "DeSerializeFMUstate" if self._fmi == 2 else "DeserializeFMUState"
-        self._call(name, held, ctypes.c_size_t(len(data)), ctypes.byref(state))
+        state = self._states.deserialise(data)
         try:
             self.restore_state(state)
         finally:
@@ -276,12 +266,12 @@ class Instance:
 
     def end(self) -> None:
         """Terminate the unit, unless a call failed: the standards forbid it then, but for Discard."""
-        if self._failed in (None, _DISCARD) and not self._abandoned:
+        if not self.failed and not self._abandoned:
             self._call("Terminate")
 
     def free(self) -> None:
         """Free the unit and its library; it is left after a fatal error, as the standards ask, or if a call hangs."""
-        if self._component is not None and not self.fatal and not self._abandoned:
+        if self._component is not None and not self.lost:
             self._component = None
             self._begins(f"{self._prefix}FreeInstance")
             self._fmu.freeInstance()
@@ -291,6 +281,16 @@ class Instance:
     def fatal(self) -> bool:
         """Whether a call was answered with Fatal."""
         return self._failed == _FATAL
+
+    @property
+    def failed(self) -> bool:
+        """Whether a call was answered in a way after which the unit cannot go on."""
+        return self._failed not in (None, _DISCARD)
+
+    @property
+    def lost(self) -> bool:
+        """Whether no call may follow, not even to free it: one was answered with Fatal, or did not return."""
+        return self.fatal or self._abandoned
 
     @property
     def _abandoned(self) -> bool:

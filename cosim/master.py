@@ -8,31 +8,18 @@ from typing import TypeVar
 
 from cosim.endings import Endings
 from cosim.ensemble import Ensemble
-from cosim.events.event_ensemble import EventEnsemble
-from cosim.events.event_options import has_events, refuse_off_grid
-from cosim.events.event_stepper import EventStepper
 from cosim.exceptions import UnitFailure, UnitRefused
 from cosim.failures import UnitHung
-from cosim.group import Group, groups_of_data_flow
 from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.iterating.fixed_point import FixedPoint
-from cosim.iterating.initial_values import InitialValues
-from cosim.iterating.interface import Interface
-from cosim.iterating.interface_newton import InterfaceNewton
-from cosim.iterating.interface_solver import InterfaceSolver
 from cosim.iterating.iteration_count import IterationCount
-from cosim.loop_refusal import refuse_circles, refuse_loops
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.plan.choice import plan_stepper, tell_general_path
+from cosim.master_options import MasterOptions
+from cosim.method import Method
+from cosim.observer import Observer
 from cosim.plan.plan_stepper import PlanStepper
-from cosim.schedule import Schedule
 from cosim.signals import Signals
-from cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
+from cosim.stepping.adaptive_stepper import AdaptiveStepper
 from cosim.stepping.coupling import Coupling
-from cosim.stepping.extrapolation import Extrapolation
 from cosim.stepping.gauss_seidel import GaussSeidel
-from cosim.stepping.grid_stepper import GridStepper
-from cosim.stepping.jacobi import Jacobi
 from cosim.stepping.pacing import Pacer
 from cosim.stepping.step_statistics import StepStatistics
 from cosim.stepping.stepper import Stepper
@@ -42,9 +29,6 @@ from cosim.watchdog import Watchdog
 T = TypeVar("T")
 
 _PLAIN = MasterOptions()
-
-Observer = Callable[[float, Signals], None]
-"""Called at every communication point with the time and the signals that hold at that time."""
 
 
 def never() -> bool:
@@ -58,8 +42,7 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Schedule`,
-            `check_control` and `refuse_off_grid`, or units make circles that cannot be solved.
+        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Method`.
         UnitRefused: a unit did not accept its parameters or did not initialise.
     """
 
@@ -67,12 +50,8 @@ class Master:
         system.check()
         self.system = system
         self.options = options
-        self.schedule = Schedule(system)
-        if options.adaptive is not None:
-            check_control(system)
-        refuse_off_grid(system, options)
-        self._continuous = self._groups()
-        refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
+        self._method = Method(system, options)
+        self.schedule = self._method.schedule
         self.heartbeat = heartbeat or Heartbeat()
         self.pacer = Pacer(options.pace) if options.pace is not None else None
         """What keeps the run in step with the wall clock, if it is to."""
@@ -81,8 +60,10 @@ class Master:
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
         self._coupling: Coupling | None = None
+        self._is_left = False
 
     def __enter__(self) -> "Master":
+        self._is_left = False
         try:
             self._watchdog.carry_out(self._start)
         except UnitHung:
@@ -106,7 +87,7 @@ class Master:
     @property
     def has_events(self) -> bool:
         """Whether steps may end off the schedule's grid; without, a run is a plain sequence of fixed steps."""
-        return has_events(self.system, self.options)
+        return self._method.has_events
 
     @property
     def ensemble(self) -> Ensemble:
@@ -130,8 +111,7 @@ class Master:
     @property
     def iterates(self) -> bool:
         """Whether units go over steps again; the steps of others are plain."""
-        going_back = self.options.algorithm is not Algorithm.JACOBI
-        return going_back and any(g.circle for g in (*self.schedule.sampled_groups, *self._continuous))
+        return self._method.iterates
 
     @property
     def steps(self) -> StepStatistics | None:
@@ -169,7 +149,10 @@ class Master:
 
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
+            ValueError: `stop` lies before the time that is reached.
+            RuntimeError: the master is left, or a unit failed before.
         """
+        self._check_can_run(stop)
         self.carry_out(lambda: self._run(stop, observers, until))
 
     def carry_out(self, job: Callable[[], T]) -> T:
@@ -181,16 +164,15 @@ class Master:
         return self._watchdog.carry_out(job)
 
     def _start(self) -> None:
-        load = EventEnsemble if self.has_events else Ensemble
-        ensemble = load(self.system, self.heartbeat, self._endings)
-        ensemble.measures_cpu = self.options.cpu_times
-        ensemble.initialize(self.schedule.slots, self._initial_values(ensemble))
-        self._coupling = self._couple(ensemble)
-        self._stepper = self._stepper_of(ensemble, self._coupling)
+        ensemble = self._method.load(self.heartbeat, self._endings)
+        self._method.initialize(ensemble)
+        self._coupling = self._method.couple(ensemble)
+        self._stepper = self._method.stepper(ensemble, self._coupling)
         self._ensemble = ensemble
 
     def _end(self) -> UnitHung | None:
         """Terminate and free all units but those that do not return; return the first of these as a failure."""
+        self._is_left = True
         first: UnitHung | None = None
         while True:
             try:
@@ -201,6 +183,15 @@ class Master:
                 break
         self._watchdog.close()
         return first
+
+    def _check_can_run(self, stop: Fraction) -> None:
+        if self._is_left:
+            raise RuntimeError("the units are freed: run inside of `with Master(system) as master:`")
+        for name, instance in self.ensemble.instances.items():
+            if instance.failed or instance.lost:
+                raise RuntimeError(f"{name} failed, and the standards forbid that it goes on: make another master")
+        if self.schedule.time(self.schedule.ticks(stop)) < self.time:
+            raise ValueError(f"a run to {float(stop):g} s, but {self.time:g} s are reached: later is right")
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
@@ -231,36 +222,3 @@ class Master:
                 self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
 
         return pause
-
-    def _stepper_of(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
-        if isinstance(ensemble, EventEnsemble) or self.options.adaptive is not None:
-            tell_general_path("steps may end anywhere")
-        if isinstance(ensemble, EventEnsemble):
-            return EventStepper(self.schedule, ensemble, coupling)
-        control = self.options.adaptive
-        if self.options.extrapolation is Extrapolation.LINEAR:
-            ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
-        if control is None:
-            plan = plan_stepper(self.schedule, ensemble, coupling, self.options, iterates=self.iterates)
-            return plan or GridStepper(self.schedule, coupling, ensemble.lines)
-        return AdaptiveStepper(self.schedule, coupling, ensemble, control, self.options.order)
-
-    def _groups(self) -> Sequence[Group]:
-        """Return the units that are not sampled, those together that have to agree at each step."""
-        if not self.options.algorithm.iterates:
-            return self.schedule.continuous_groups
-        groups = groups_of_data_flow(self.system, [s.unit for s in self.schedule.continuous], self.schedule.loops)
-        refuse_circles(self.system, groups)
-        return groups
-
-    def _initial_values(self, ensemble: Ensemble) -> InitialValues:
-        return InitialValues(ensemble, self.schedule.groups, self.schedule.initial_passes, self._solver)
-
-    def _couple(self, ensemble: Ensemble) -> Coupling:
-        if self.options.algorithm is Algorithm.JACOBI:
-            return Jacobi(ensemble)
-        return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
-
-    def _solver(self, interface: Interface) -> InterfaceSolver:
-        kind = FixedPoint if self.options.algorithm is Algorithm.FIXED_POINT else InterfaceNewton
-        return kind(interface.magnitudes(self.options.tolerance), self.options.most_iterations)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from cosim.instance import State
+from cosim.state_calls import State
 from cosim.stepping.linear_inputs import Memory
 
 

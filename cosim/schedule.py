@@ -59,11 +59,6 @@ class Schedule:
         self.continuous = self._slots(system, self.continuous_groups)
 
     @property
-    def has_loops(self) -> bool:
-        """Whether there are algebraic loops; a system without any can be stepped unit by unit."""
-        return bool(self.loops)
-
-    @property
     def groups(self) -> tuple[Group, ...]:
         """All units in the order of `slots`, those of algebraic loops together."""
         return self.continuous_groups + self.sampled_groups

@@ -13,8 +13,8 @@ from cosim.exceptions import WiringError, nearest
 from cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from cosim.linear import Linear
 from cosim.start_values import fault_of
-from cosim.unit_conversion import conversion
-from cosim.units import UNKNOWN, Unit
+from cosim.unit_conversion import conversion, pass_as_they_are
+from cosim.units import Unit
 from cosim.variable import Kind
 
 
@@ -243,7 +243,7 @@ def mismatch(a: FmuPort, b: FmuPort, transformation: Linear | None = None) -> st
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:
     """Compare what units mean, not how they are written; a variable without a unit fits any."""
-    if UNKNOWN in (a, b) or (a.symbol == b.symbol and not (a.defined and b.defined)):
+    if pass_as_they_are(a, b):
         return None
     if not (a.defined and b.defined):
         undefined = b.symbol if a.defined else a.symbol

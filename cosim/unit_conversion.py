@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 from cosim.linear import Linear
-from cosim.units import Unit
+from cosim.units import UNKNOWN, Unit
 
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 _LONG = 10**13
@@ -22,6 +22,11 @@ def conversion(source: Unit, target: Unit) -> Linear:
     """
     f_s, o_s, f_t, o_t = (meant_by(x) for x in (source.factor, source.offset, target.factor, target.offset))
     return Linear(float(f_s / f_t), float((o_s - o_t) / f_t))
+
+
+def pass_as_they_are(a: Unit, b: Unit) -> bool:
+    """Tell whether numbers need no conversion as far as is known: a unit is not told, or the same name not defined."""
+    return UNKNOWN in (a, b) or (a.symbol == b.symbol and not (a.defined and b.defined))
 
 
 def meant_by(number: float) -> Fraction:

@@ -8,6 +8,7 @@ import click
 from cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
 from fmus.binaries import NotCompiled
 from fmus.compile import CompilationError, UnknownPlatform
+from scenarios.exit_status import BAD_CALL, UNIT_FAILED
 from scenarios.parameters import BadParameter
 from scenarios.run_folder import BadRunFolder
 
@@ -15,19 +16,19 @@ from scenarios.run_folder import BadRunFolder
 class BadCall(click.ClickException):
     """A call that cannot be carried out, told in one line."""
 
-    exit_code = 2
+    exit_code = BAD_CALL
 
 
 class UnitLost(click.ClickException):
     """A unit that failed before anything ran, in another way than by refusing what it was given."""
 
-    exit_code = 3
+    exit_code = UNIT_FAILED
 
 
 class RunNotWritten(click.ClickException):
     """A run whose record or report cannot be written to its end, as on a full disk; what was written is kept."""
 
-    exit_code = 3
+    exit_code = UNIT_FAILED
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from rich.text import Text
 from cosim.check.check_fmu import check_fmu
 from cosim.check.check_report import CheckReport, Section
 from cosim.check.finding import Finding, Level
-from cosim.fmu_archive import FOLDER_FAULT, NO_FILE_FAULT
+from cosim.fmu_archive import NO_FILE_FAULT, folder_fault
 from scenarios.bad_call import BadCall
 from scenarios.console import open_console
 
@@ -63,7 +63,7 @@ def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
     for file in files:
         try:
             if file.is_dir():
-                faults.append(f"{file}: {FOLDER_FAULT}")
+                faults.append(f"{file}: {folder_fault()}")
             elif file.exists() and not file.is_file():  # opening a pipe would wait for its writer
                 faults.append(f"{file}: {NO_FILE_FAULT}")
             else:

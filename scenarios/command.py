@@ -30,9 +30,11 @@ from scenarios.parameters import parse_parameters
 from scenarios.progress import progress_bar
 from scenarios.resume_command import resume
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Task, carry_out
-from scenarios.ssp_call import Seconds, open_experiment, refuse_for_ssp, source_of, ssp_options
+from scenarios.runner import carry_out
+from scenarios.seconds import Seconds
+from scenarios.ssp_call import open_experiment, refuse_for_ssp, source_of, ssp_options
 from scenarios.ssp_run import NoParameters, is_ssp
+from scenarios.task import Task
 from scenarios.vsl_train_command import vsl_train
 
 _PATH = click.Path(path_type=Path)

@@ -11,14 +11,14 @@ from cosim.exceptions import RecordNotWritten, UnitFailure
 from cosim.failures import UnitCrashed, UnitHung
 from cosim.heartbeat import Call, Heartbeat
 from cosim.record.complete_record import complete_record
+from scenarios.ended import Ended
+from scenarios.exit_status import UNIT_FAILED
 from scenarios.experiment import Outcome
 from scenarios.listing import print_summary
 from scenarios.record import Record
 from scenarios.report import write_report
 from scenarios.run_folder import RunFolder, told_if_not_written
-from scenarios.runner import Ended
 
-_UNIT_FAILED = 3
 _BY_SIGNAL = 128  # what shells add to a signal's number
 
 
@@ -47,7 +47,7 @@ def tell_death(heartbeat: Heartbeat, number: int | None, status: int, wall: floa
                 _complete(facts, {"reason": reason, "wall_seconds": wall, "failure": data}, failure)
         except RecordNotWritten as e:
             sys.stderr.write(f"{e}\n")
-    return _UNIT_FAILED if failure is not None or "folder" in facts else _BY_SIGNAL + (number or 0)
+    return UNIT_FAILED if failure is not None or "folder" in facts else _BY_SIGNAL + (number or 0)
 
 
 def _failure(

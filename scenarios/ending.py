@@ -5,10 +5,10 @@ from typing import NoReturn
 
 import click
 
+from scenarios.ended import Ended
+from scenarios.exit_status import TASK_FAILED, UNIT_FAILED
 from scenarios.listing import print_summary
-from scenarios.runner import Ended, Task
-
-TASK_FAILED, UNIT_FAILED = 1, 3
+from scenarios.task import Task
 
 
 def end_with(ended: Ended, task: Task) -> NoReturn:

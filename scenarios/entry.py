@@ -3,9 +3,8 @@
 import sys
 from typing import NoReturn
 
+from scenarios.exit_status import ABORTED
 from scenarios.standard_streams import open_standard_streams
-
-ABORTED = 130
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may end the process that they are in."""

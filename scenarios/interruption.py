@@ -9,10 +9,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
+from scenarios.exit_status import ABORTED
 from scenarios.supervisor import leave
-
-ABORTED = 130
-"""Exit status of what Ctrl-C aborted, as shells have it."""
 
 _ENDING = [n for n in (signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
 """Signals that end a run after its step, as of a batch system or of a terminal that is closed."""
@@ -31,7 +29,8 @@ class Interruption:
     KeyboardInterrupt.
 
     Python handles signals between its own instructions. A thread that hears of them at once therefore ends the process
-    if an abort is not handled in time, as when a unit's native code hangs; such a run leaves its stream alone.
+    if an abort is not handled in time, as when a unit's native code hangs. What was recorded stays beside
+    the record, which `complete_record` makes of it, as when the run is resumed.
     """
 
     def __init__(self) -> None:

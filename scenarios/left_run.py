@@ -15,8 +15,8 @@ from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.resumption import Resumption, unpack
 from scenarios.run_folder import BadRunFolder, RunFolder, sha256_of, versions
-from scenarios.runner import Task
 from scenarios.ssp_call import open_experiment
+from scenarios.task import Task
 
 
 class LeftRun:

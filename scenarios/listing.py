@@ -17,11 +17,11 @@ from fmus.catalog import UNITS, Entry
 from scenarios.catalog import SCENARIOS, SYSTEMS
 from scenarios.console import open_console
 from scenarios.conversions import told_conversion
+from scenarios.ended import Ended
 from scenarios.experiment import Experiment
 from scenarios.master_rows import pace_report
 from scenarios.report import told
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Ended
 
 _MOST_CONVERSIONS = 8
 """Conversions of units that the end of a run tells on the terminal."""

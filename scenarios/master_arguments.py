@@ -10,7 +10,7 @@ from cosim.master_options import Algorithm, MasterOptions
 from cosim.stepping.adaptive_step import AdaptiveStep
 from cosim.stepping.extrapolation import Extrapolation
 from scenarios.bad_call import BadCall
-from scenarios.ssp_call import Seconds
+from scenarios.seconds import Seconds
 
 _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()
@@ -93,6 +93,12 @@ _OPTIONS = (
         "--largest-step", type=Seconds(), metavar="SECONDS", help="With --adaptive: the longest step.  [default: any]"
     ),
     click.option(
+        "--uncontrolled",
+        multiple=True,
+        metavar="UNIT.PORT",
+        help="With --adaptive: an output whose error is not looked at, such as noise; may be given more than once.",
+    ),
+    click.option(
         "--repeat-discarded",
         is_flag=True,
         help="Let all units go back and take a step shorter that one of them discards, as with --adaptive anyway.",
@@ -103,6 +109,7 @@ _CONTROL_FIELDS: Mapping[str, str] = {
     "first_step": "initial",
     "smallest_step": "smallest",
     "largest_step": "largest",
+    "uncontrolled": "uncontrolled",
 }
 
 
@@ -119,7 +126,7 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         BadCall: options of the control of the step are given without it. BadOptions: they contradict each other.
     """
-    limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] is not None}
+    limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] not in (None, ())}
     if given["adaptive"] is None and limits:
         told = ", ".join("--" + name.replace("_", "-") for name in limits)
         raise BadCall(f"{told}: with --adaptive only; without it, steps are fixed")

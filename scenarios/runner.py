@@ -1,70 +1,33 @@
 """Carries out one run of a scenario: everything is checked, then the folder is made, then it runs and is reported."""
 
-import math
-import statistics
-import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from fractions import Fraction
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from cosim.checkpoint import check_states, remove_checkpoint
-from cosim.checkpointer import Checkpointer, from_then_on
+from cosim.checkpointer import Checkpointer
 from cosim.exceptions import UnitFailure
 from cosim.failures import UnitHung
-from cosim.iterating.iteration_count import IterationCount
-from cosim.master import Master, Observer
-from cosim.master_options import MasterOptions
+from cosim.from_then_on import FromThenOn
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from scenarios.conversions import conversions_of
-from scenarios.experiment import Experiment, Metric, Outcome, Watch
+from scenarios.ended import Ended
+from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
 from scenarios.report import UnitRow, write_report
 from scenarios.resumption import Resumption, Spent, pack
-from scenarios.run_folder import RunFolder, told_if_not_written
+from scenarios.run_folder import told_if_not_written
+from scenarios.run_metrics import run_metrics
+from scenarios.run_summary import configuration, files_and_forms, parameter_rows, summary_of, unit_rows
 from scenarios.supervisor import heartbeat_of_run
+from scenarios.task import Task
 
 Progress = Callable[[float, float], None]
 """Told the simulated time and the time at which the run ends at the latest, in seconds."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """What to run.
-
-    Attributes:
-        experiment, parameters, seed: the scenario and what was chosen of it.
-        fmus: the FMU of each unit.
-        folder: for what it leaves.
-        formats: further forms of the record, see `RECORD_FORMATS`.
-        every: simulated seconds from checkpoint to checkpoint, if there are to be any.
-        source: what `resume` needs to find the experiment again, if it is not one of the catalog.
-        options: how its units are run.
-    """
-
-    experiment: Experiment[Any]
-    parameters: Any
-    seed: int
-    fmus: Mapping[str, Path]
-    folder: RunFolder
-    formats: Sequence[str] = ()
-    every: Fraction | None = None
-    source: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    options: MasterOptions = field(default_factory=MasterOptions)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ended:
-    """How a run ended. `failure` is set when a unit failed; the record then ends there."""
-
-    outcome: Outcome
-    summary: Mapping[str, Any]
-    failure: UnitFailure | None = None
 
 
 def carry_out(
@@ -100,19 +63,7 @@ def carry_out(
         if not began:
             raise
         failure = failure or e
-    spent = clock()
-    outcome = _outcome(watch, failure, interruption.asked)
-    metrics = {**outcome.metrics, **_speed(experiment, master)}
-    complete = failure is None and (watch.over or not interruption.asked)
-    summary = {**_summary(task, outcome, metrics, master, spent, complete), **_trouble(failure, master)}
-    task.folder.write_summary(summary)
-    if failure is not None:
-        task.folder.add_to_run(failure=failure.as_data())
-    if complete:
-        remove_checkpoint(task.folder.checkpoint)
-    with told_if_not_written(task.folder.path):
-        _present(task, watch, summary, system_rows(master))
-    return Ended(outcome=outcome, summary=summary, failure=failure)
+    return _conclude(task, master, watch, failure, interruption.asked, clock())
 
 
 @dataclass(frozen=True)
@@ -127,14 +78,14 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     if resumption is None:
         task.folder.make()
     fmus = {n: u.description.path for n, u in master.system.units.items()}
-    configuration = {**_configuration(task), **_options(task), "conversions": conversions_of(master.system)}
-    task.folder.write_run(configuration, fmus)
+    told = {**configuration(task), **files_and_forms(task), "conversions": conversions_of(master.system)}
+    task.folder.write_run(told, fmus)
     master.heartbeat.tell(
         folder=str(task.folder.path),
-        configuration=_configuration(task),
+        configuration=configuration(task),
         title=task.experiment.title,
-        parameters=_parameter_rows(task),
-        units=[(*row[:3], None, None) for row in system_rows(master)],
+        parameters=parameter_rows(task),
+        units=[(*row[:3], None, None) for row in unit_rows(master)],
     )
 
 
@@ -152,7 +103,7 @@ def _run(
 
         observers: list[Observer] = [recorder, watch, *checkpoints]
         if resumption is not None:
-            observers = [from_then_on(resumption.checkpoint.time, observe) for observe in observers]
+            observers = [FromThenOn(resumption.checkpoint.time, observe) for observe in observers]
         try:
             master.run(stop, [*observers, tell], until=lambda: watch.over or interruption.asked)
             if interruption.asked and not watch.over:
@@ -163,12 +114,6 @@ def _run(
             interruption.check()
             return e
     return None
-
-
-def _trouble(failure: UnitFailure | None, master: Master) -> dict[str, Any]:
-    """Return what a summary says of a failure and of missed deadlines."""
-    paced = {} if master.pacer is None else {"pace": master.pacer.report.as_data()}
-    return {"failure": None if failure is None else failure.as_data(), **paced}
 
 
 def _checkpoints(
@@ -183,15 +128,22 @@ def _checkpoints(
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
-def system_rows(master: Master) -> list[UnitRow]:
-    """Return what is told of each unit."""
-    rows: list[UnitRow] = []
-    for name, unit in master.system.units.items():
-        d = unit.description
-        follows = master.steps is not None and not unit.sampled
-        period = "varies" if follows else f"{float(unit.period) * 1000:.4g} ms"
-        rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
-    return rows
+def _conclude(
+    task: Task, master: Master, watch: Watch, failure: UnitFailure | None, interrupted: bool, spent: Spent
+) -> Ended:
+    """Write what is known of a run at its end, and its report."""
+    outcome = _outcome(watch, failure, interrupted)
+    metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
+    complete = failure is None and (watch.over or not interrupted)
+    summary = summary_of(task, outcome, metrics, master, spent, failure, complete)
+    task.folder.write_summary(summary)
+    if failure is not None:
+        task.folder.add_to_run(failure=failure.as_data())
+    if complete:
+        remove_checkpoint(task.folder.checkpoint)
+    with told_if_not_written(task.folder.path):
+        _present(task, watch, summary, unit_rows(master))
+    return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
 def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Outcome:
@@ -203,99 +155,11 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
     return seen
 
 
-def _speed(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
-    cycle = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
-    peak = _peak_memory()
-    units = " + ".join(experiment.cycle())
-    metrics: dict[str, Metric] = {}
-    if peak is not None:
-        metrics["peak_memory"] = Metric(peak, "B", "largest resident memory of the process")
-    if cycle:
-        metrics["cpu_per_cycle"] = Metric(sum(cycle), "s", f"median CPU time of a control cycle ({units})")
-    for name, spent in master.cpu.items():
-        total = float(np.sum(spent))
-        metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
-        unit = master.system.units[name]  # its own period says nothing of steps that follow their error
-        simulated = master.time if master.steps and not unit.sampled else len(spent) * float(unit.period)
-        metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
-    return {**metrics, **_iterations(master.iterations)}
-
-
-def _iterations(count: IterationCount) -> dict[str, Metric]:
-    if not count.steps:
-        return {}
-    told = f"mean number of iterations of a step that was iterated, {count.most} at most"
-    return {
-        "iterations": Metric(count.iterations / count.steps, "1", told),
-        "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
-    }
-
-
-def _peak_memory() -> float | None:
-    """Return the process's largest resident memory in bytes, None where the system does not tell (Windows)."""
-    try:
-        import resource
-    except ImportError:
-        return None
-    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * (1 if sys.platform == "darwin" else 1024)
-
-
-def _configuration(task: Task) -> dict[str, Any]:
-    values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
-    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed, "master": task.options.as_data()}
-
-
-def _options(task: Task) -> dict[str, Any]:
-    every = None if task.every is None else str(task.every)
-    files = {name: str(path.absolute()) for name, path in task.fmus.items()}
-    return {"source": task.source, "files": files, "formats": list(task.formats), "checkpoint": every}
-
-
-def _summary(
-    task: Task, outcome: Outcome, metrics: Mapping[str, Metric], master: Master, spent: Spent, complete: bool
-) -> dict[str, Any]:
-    return {
-        **_configuration(task),
-        "complete": complete,
-        "success": outcome.success,
-        "reason": outcome.reason,
-        "metrics": {k: _metric(m) for k, m in metrics.items()},
-        "simulated_seconds": master.time,
-        **({} if master.steps is None else {"steps": asdict(master.steps)}),
-        "wall_seconds": spent.wall,
-        "cpu_seconds": spent.cpu,
-    }
-
-
-def _metric(m: Metric) -> dict[str, Any]:
-    """Return a metric as JSON, which knows no infinity: what is not finite is null."""
-    return {"value": m.value if math.isfinite(m.value) else None, "unit": m.unit, "description": m.description}
-
-
 def _present(task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[UnitRow]) -> None:
     figures = []
     if task.folder.signals.exists():
         record = Record(task.folder.signals)
         figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
     write_report(
-        task.folder, task.experiment.title, task.experiment.headline, summary, _parameter_rows(task), units, figures
+        task.folder, task.experiment.title, task.experiment.headline, summary, parameter_rows(task), units, figures
     )
-
-
-def _parameter_rows(task: Task) -> list[tuple[str, str, str]]:
-    rows: list[tuple[str, str, str]] = []
-    for v in task.experiment.parameters():
-        value = _plain(getattr(task.parameters, v.name))
-        told = (
-            f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
-        )
-        unit = "" if v.unit.symbol == "1" else f" {v.unit.symbol}"
-        rows.append((v.name, told + unit, v.description))
-    return rows
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    name = getattr(value, "name", None)
-    return value if name is None else name.lower()

@@ -1,8 +1,6 @@
 """What a call of `handover run` says of an SSP: until when, and at which step."""
 
 import contextlib
-import re
-import sys
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -15,28 +13,10 @@ from scenarios import supervisor
 from scenarios.bad_call import BadCall
 from scenarios.experiment import Experiment
 from scenarios.run_folder import sha256_of
+from scenarios.seconds import Seconds
 from scenarios.ssp_run import UntilStop, experiment_of
 
-_SECONDS = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
-"""Larger exponents would take long to reckon with."""
-
 Command = TypeVar("Command", bound=Callable[..., Any])
-
-
-class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
-    """A positive number of seconds, such as 0.01 or 1/30, taken exactly."""
-
-    name = "seconds"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
-        """Return the number."""
-        try:
-            seconds = Fraction(value) if _SECONDS.fullmatch(value) else Fraction(0)
-        except (ValueError, ZeroDivisionError):
-            seconds = Fraction(0)
-        if not sys.float_info.min <= seconds <= sys.float_info.max:
-            self.fail(f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30", param, ctx)
-        return seconds
 
 
 def ssp_options(command: Command) -> Command:

@@ -24,6 +24,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
 COMMANDS = [line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith(".venv/")]
 PROGRAMS = [text for kind, text in BLOCKS if kind == "python"]
+OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
 
 def handover(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
@@ -39,11 +40,11 @@ def program(text: str, folder: Path) -> str:
 
 
 def test_the_readme_has_what_is_tested_here():
-    assert len([c for c in COMMANDS if " run " in c]) == 9
+    assert len([c for c in COMMANDS if " run " in c]) == 12
+    assert len([c for c in COMMANDS if " export " in c]) == 1
     assert len([c for c in COMMANDS if " build " in c]) == 2
     assert len([c for c in COMMANDS if " check " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
-    assert len(PROGRAMS) == 3
 
 
 def test_the_make_targets_exist():
@@ -100,7 +101,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_unit_runs_in_fmpy(folder: Path):
-    printed = program(PROGRAMS[0], folder)
+    printed = program(IN_FMPY, folder)
     x, y, z = (float(n) for n in printed.strip().strip("[]").split())
     assert (x, y, z) == pytest.approx((0.0, 0.0, -0.7), abs=1e-6)
 
@@ -162,9 +163,15 @@ def shell(script: str, folder: Path) -> str:
     return done.stdout
 
 
+def test_a_system_of_ones_own_is_co_simulated(tmp_path: Path):
+    printed = program(OWN_SYSTEM, tmp_path)
+    assert printed.strip() == "[0.25 0.   0.  ]"
+    assert (tmp_path / "push.parquet").is_file()
+
+
 def test_a_block_of_ones_own_is_built(tmp_path: Path):
-    (tmp_path / "spring.py").write_text(PROGRAMS[1])
-    printed = program(PROGRAMS[2], tmp_path)
+    (tmp_path / "spring.py").write_text(OWN_BLOCK)
+    printed = program(OWN_BUILD, tmp_path)
     assert (tmp_path / printed.strip()).is_file()
     (command,) = re.findall(r"`(handover build spring:Spring [^`]*)`", README)
     done = handover(command, tmp_path)
@@ -176,6 +183,7 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
 @pytest.mark.parametrize("command", [c for c in COMMANDS if " run " in c])
 def test_the_runs_succeed(command: str, tmp_path: Path):
     needed = [" build TendonArm ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
+    needed += [" export "] if ".ssp" in command else []
     for before in (c for c in COMMANDS if any(word in c for word in needed)):
         assert handover(before, tmp_path).returncode == 0
     done = handover(command, tmp_path)

@@ -12,8 +12,9 @@ from cosim.events.event_instance import EventInstance
 from cosim.events.step_end import StepEnd
 from cosim.exceptions import CosimError
 from cosim.heartbeat import Heartbeat
-from cosim.instance import Instance, State
+from cosim.instance import Instance
 from cosim.schedule import Slot
+from cosim.state_calls import State
 from cosim.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
@@ -104,13 +105,10 @@ class EventEnsemble(Ensemble):
     def _at(self, unit: str, go: Callable[[Instance], None]) -> Generator[Instance, None, None]:
         """Let a unit be in another state for a while."""
         instance = self.instances[unit]
-        here = instance.save_state()
-        try:
+        with self.saved([unit]) as here:
             go(instance)
             yield instance
-        finally:
-            instance.restore_state(here)
-            instance.free_state(here)
+            instance.restore_state(here[unit])
 
     def _repeat(self, instance: Instance, t: float, dt: float, end: StepEnd) -> StepEnd:
         """Repeat a step that was discarded, shorter: as far as the unit came, or else half as far, and so on."""
@@ -136,13 +134,12 @@ class EventEnsemble(Ensemble):
     def _forget_begins(self) -> None:
         for unit in list(self._begun):
             with contextlib.suppress(CosimError):  # ending goes on whether or not the unit agrees
-                if not self.is_corrupt(self.instances[unit]):
-                    self._forget_begin(unit)
+                self._forget_begin(unit)
 
     def _forget_begin(self, unit: str) -> None:
         if unit in self._begun:
             _, state = self._begun.pop(unit)
-            self.instances[unit].free_state(state)
+            self.forget({unit: state})
 
     def _make(self, name: str, folder: Path) -> Instance:
         unit = self.system.units[name]

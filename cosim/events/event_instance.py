@@ -1,10 +1,12 @@
 """A unit that runs in event mode: what can be set and got there, and when it wants to be there. FMI 3.0, sec. 4.2."""
 
 import ctypes
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
+
+from numpy.typing import NDArray
 
 from cosim.events.clock_calls import ClockCalls
 from cosim.events.clock_timer import ClockTimer
@@ -14,7 +16,7 @@ from cosim.fmpy_loading import load_fmi3
 from cosim.fmu_description import FmuDescription, FmuPort
 from cosim.heartbeat import Heartbeat
 from cosim.instance import Instance
-from cosim.signal_buffer import SignalBuffer
+from cosim.signal_buffer import SignalBuffer, Views
 from cosim.signal_content import content_of
 
 
@@ -68,12 +70,12 @@ class EventInstance(Instance):
     def set_inputs(self) -> None:
         """Hand over those contents of `u` that the unit takes in its present mode."""
         ports = self._settable()
-        self._transfer("Set", ports)
+        self._set(ports)
         self._hold(ports)
 
     def get_outputs(self) -> None:
         """Fetch the outputs that the unit gives in its present mode."""
-        self._transfer("Get", [p for p in self._outputs if self._is_reachable(p)])
+        self._get([p for p in self._outputs if self._is_reachable(p)])
 
     def wants_inputs(self) -> bool:
         """Whether a discrete input that can be set in event mode has another value than the unit was given last."""
@@ -160,28 +162,34 @@ class EventInstance(Instance):
         for p in ports:
             self._given[p.name] = content_of(p, self.u[p.name])
 
-    def _transfer(self, verb: str, ports: list[FmuPort]) -> None:
-        """Set or get ports; where they are not all of them, by way of buffers of their own."""
-        whole, contents = (self._setters, self.u) if verb == "Set" else (self._getters, self.y)
-        if len(ports) == len(contents):
-            self._carry_out(whole)
+    def _set(self, ports: list[FmuPort]) -> None:
+        if len(ports) == len(self.u):
+            self._carry_out(self._setters)
             return
+        parts = self._part("Set", ports)
+        for part, whole in _pairs(parts, self.u):
+            part[:] = whole
+        self._carry_out(parts)
+
+    def _get(self, ports: list[FmuPort]) -> None:
+        if len(ports) == len(self.y):
+            self._carry_out(self._getters)
+            return
+        parts = self._part("Get", ports)
+        self._carry_out(parts)
+        for part, whole in _pairs(parts, self.y):
+            whole[:] = part
+
+    def _part(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
+        """Return buffers of their own for some of the ports."""
         key = verb, tuple(p.name for p in ports)
         if key not in self._parts:
             self._parts[key] = self._buffers(verb, ports)
-        parts = self._parts[key]
-        if verb == "Set":
-            _copy(parts, contents, outwards=True)
-        self._carry_out(parts)
-        if verb == "Get":
-            _copy(parts, contents, outwards=False)
+        return self._parts[key]
 
 
-def _copy(parts: Iterable[SignalBuffer], contents: Mapping[str, Any], *, outwards: bool) -> None:
+def _pairs(parts: Iterable[SignalBuffer], whole: Mapping[str, Views]) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+    """Yield the arrays of some ports, each with the array of the same port in `u` or `y`."""
     for buffer in parts:
         for name, views in buffer.views.items():
-            for mine, theirs in zip(views, contents[name], strict=True):
-                if outwards:
-                    mine[:] = theirs
-                else:
-                    theirs[:] = mine
+            yield from zip(views, whole[name], strict=True)

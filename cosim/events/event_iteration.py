@@ -46,7 +46,7 @@ class EventIteration:
             self._tick_due(t, present, inside)
             self._exchange(t, present, inside)
             restless = {n for n in self._ordered(inside) if self._units[n].update(t)}
-            for unit in inside:
+            for unit in self._ordered(inside):
                 self._ensemble.publish(unit)
             restless |= self._disturbed(t, present)
             if not restless and not any(self._due(t, n) for n in present):
@@ -75,7 +75,7 @@ class EventIteration:
         changed = set[str]()
         for _ in range(MOST_ITERATIONS):
             joining = self._disturbed(t, present) - inside
-            for unit in joining:
+            for unit in self._ordered(joining):
                 self._enter(unit, inside)
             pending |= joining
             changed = {n for n in self._ordered(inside) if self._pass_on(t, n, pending, told, present, inside)}

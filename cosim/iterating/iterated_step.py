@@ -4,14 +4,13 @@ import time
 from collections.abc import Sequence
 
 from cosim.ensemble import Ensemble
-from cosim.failures import NotFinite, UnitDiscarded
-from cosim.instance import State
 from cosim.iterating.interface import Interface
 from cosim.iterating.interface_solver import InterfaceSolver, Unsolved
 from cosim.iterating.iteration_count import IterationCount
 from cosim.iterating.magnitudes import Floats
-from cosim.iterating.not_converged import NotConverged, not_converged
+from cosim.iterating.not_converged import not_converged
 from cosim.schedule import Slot
+from cosim.state_calls import State
 
 
 class IteratedStep:
@@ -45,13 +44,8 @@ class IteratedStep:
         Raises:
             UnitFailure: a unit's call failed. NotConverged: they do not agree.
         """
-        states = self._ensemble.save([s.unit for s in slots])
-        try:
+        with self._ensemble.saved([s.unit for s in slots]) as states:
             self._iterate(t, slots, states)
-        except (NotConverged, NotFinite, UnitDiscarded):
-            self._ensemble.forget(states)
-            raise
-        self._ensemble.forget(states)  # not after another failure: whether it still takes the call is not known
 
     def _iterate(self, t: float, slots: Sequence[Slot], states: "dict[str, State]") -> None:
         spent = {s.unit: 0.0 for s in slots}

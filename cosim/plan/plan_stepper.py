@@ -2,12 +2,15 @@
 
 import array
 import ctypes
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cosim.ensemble import Ensemble
+from cosim.from_then_on import FromThenOn
 from cosim.heartbeat import Abandoned
+from cosim.observer import Observer
 from cosim.plan import memory
 from cosim.plan.plan_maker import PlanMaker
 from cosim.record.record_block import RecordBlock
@@ -24,8 +27,6 @@ _ROOM = 2 * _LONGEST
 """CPU times of a unit that the loop can take before they are told."""
 _LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
 _FARTHEST = 2**62
-
-Observer = Callable[[float, Signals], None]
 
 
 class PlanStepper:
@@ -91,10 +92,13 @@ class PlanStepper:
     ) -> None:  # fmt: skip
         """Go on to tick `last` as `Master.run` says; `pause` is called before observers look.
 
-        The loop itself writes the rows of a recorder that stands first among the observers. Nobody else watching, it
-        takes many communication points at once.
+        The loop itself writes the rows of a recorder that stands first among the observers, be it from then on. Nobody
+        else watching, it takes many communication points at once.
         """
-        recorder = observers[0] if observers and isinstance(observers[0], Recorder) else None
+        first = observers[0] if observers else None
+        seen = first.t_0 if isinstance(first, FromThenOn) else -math.inf
+        first = first.observe if isinstance(first, FromThenOn) else first
+        recorder = first if isinstance(first, Recorder) else None
         watching = observers if recorder is None else observers[1:]
         rows = None if recorder is None else _rows_of(recorder, signals)
         watched = bool(watching) or until is not None or pause is not None
@@ -102,10 +106,13 @@ class PlanStepper:
         while True:
             self._make_room(points)
             began = time.perf_counter()
-            outcome = self._library.plan_run(self._plan, min(last, _FARTHEST), points, leave, rows)
+            written = rows if leave else None  # whether the first point was seen before is known once it is reached
+            outcome = self._library.plan_run(self._plan, min(last, _FARTHEST), points, leave, written)
             self._concluded(outcome)
-            if recorder is not None and recorder.block.filled == recorder.block.capacity:
-                recorder.flush()
+            if recorder is not None:
+                if not leave and self.time > seen:
+                    recorder(self.time, signals)
+                _flush_if_full(recorder)
             if pause is not None:
                 pause()
             for observe in watching:
@@ -175,10 +182,16 @@ class PlanStepper:
             self._times[i] = instance.time
 
 
+def _flush_if_full(recorder: Recorder) -> None:
+    if recorder.block.filled == recorder.block.capacity:
+        recorder.flush()
+
+
 def _rows_of(recorder: Recorder, signals: Signals) -> "memory.Rows":
     """Return where a recorder's rows go; it is opened if no row has been recorded yet."""
     if not recorder.is_open:
         recorder.open(signals)
+    _flush_if_full(recorder)  # where it could not be written before, the loop must not go on behind its end
     block: RecordBlock = recorder.block
     parts = (memory.Part * len(block.parts))(
         *(memory.Part(p.values.ctypes.data, p.rows.ctypes.data, p.values.nbytes) for p in block.parts)

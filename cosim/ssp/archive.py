@@ -26,8 +26,6 @@ class SspArchive:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if path.is_dir():
-            raise InvalidSsp(path, [f"a folder, not a file; zip what is in it, with {STRUCTURE} at the top"])
         with _told_of_the_ssp(path):
             self._packed = _Packed(path)
 

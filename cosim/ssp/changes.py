@@ -1,8 +1,8 @@
 """Linear changes of values one after another, and those that units need."""
 
 from cosim.linear import Linear
-from cosim.unit_conversion import conversion
-from cosim.units import UNKNOWN, Unit
+from cosim.unit_conversion import conversion, pass_as_they_are
+from cosim.units import Unit
 
 
 def applied(change: Linear, number: float) -> float:
@@ -21,7 +21,7 @@ def converted(source: Unit, target: Unit) -> Linear | None:
     Raises:
         ValueError: they differ in dimension, or one of two that differ in name is not defined.
     """
-    if UNKNOWN in (source, target) or (source.symbol == target.symbol and not (source.defined and target.defined)):
+    if pass_as_they_are(source, target):
         return None
     if not (source.defined and target.defined):
         raise ValueError(f"the unit {(target if source.defined else source).symbol!r} is not defined")

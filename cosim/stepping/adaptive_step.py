@@ -18,6 +18,7 @@ class AdaptiveStep:
         smallest, largest: limits of the step in seconds; without a largest one, only instants of sampled units and the
             stop time limit it.
         initial: the first step to try in seconds; by default the shortest step that units would take by themselves.
+        uncontrolled: outputs, `unit.port`, whose error is not looked at: such as noise, which no step makes smooth.
 
     Raises:
         BadOptions: with everything that is wrong.
@@ -28,6 +29,7 @@ class AdaptiveStep:
     smallest: Fraction = Fraction(1, 10**6)
     largest: Fraction | None = None
     initial: Fraction | None = None
+    uncontrolled: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         faults = [

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from cosim.ensemble import Ensemble
-from cosim.exceptions import ScheduleError, UnitFailure
+from cosim.exceptions import ScheduleError, UnitFailure, nearest
 from cosim.failures import NotFinite, UnitDiscarded
 from cosim.iterating.not_converged import NotConverged
 from cosim.schedule import Schedule, Slot
@@ -81,15 +81,13 @@ class AdaptiveStepper:
         self._coupling.depart(self.time, due, ())
         for slot in due:
             self._due[slot.unit] += slot.every * self._per_tick
-        states = self._ensemble.save(self._units)
-        try:
-            while not self._attempt(self._length()):
+        with self._ensemble.saved(self._units) as states:
+            try:
+                while not self._attempt(self._length()):
+                    self._ensemble.restore(states)
+            except (StepTooSmall, *_TOO_LONG):
                 self._ensemble.restore(states)
-        except (StepTooSmall, *_TOO_LONG):
-            self._ensemble.restore(states)
-            raise
-        finally:
-            self._ensemble.forget(states)
+                raise
 
     def get_state(self) -> Mapping[str, Any]:
         """Return ticks, the step wanted, and what control and inputs remember; see `Stepper`."""
@@ -142,13 +140,10 @@ class AdaptiveStepper:
         return True
 
     def _try(self, length: int) -> WorstSignal:
-        states = self._ensemble.save(self._units)
-        try:
+        with self._ensemble.saved(self._units) as states:
             self._step(self._tick, length)
             whole = self._error.values()
             self._ensemble.restore(states)
-        finally:
-            self._ensemble.forget(states)
         self._step(self._tick, length // 2)
         self._step(self._tick + length // 2, length // 2)
         return self._error.worst(whole, self._error.values())
@@ -183,11 +178,11 @@ def fine_tick(schedule: Schedule, control: AdaptiveStep) -> Fraction:
     return schedule.tick / 2**halvings
 
 
-def check_control(system: System) -> None:
+def check_control(system: System, control: AdaptiveStep) -> None:
     """Check that the step of all units that do not act at instants can be controlled.
 
     Raises:
-        ScheduleError: it cannot; all units are named that are in the way.
+        ScheduleError: it cannot; all units are named that are in the way, and signals that are not there.
     """
     units = [u for u in system.units.values() if not u.sampled]
     faults = [f"{u.name} cannot save its state" for u in units if not u.description.capabilities.saves_state]
@@ -195,5 +190,8 @@ def check_control(system: System) -> None:
     faults += [f"{u.name} takes fixed steps only" for u in units if not u.description.capabilities.varies_step]
     if not units:
         faults.append("all units act at instants, at fixed times")
+    outputs = [f"{u.name}.{port}" for u in units for port in u.description.outputs]
+    unknown = [name for name in control.uncontrolled if name not in outputs]
+    faults += [f"there is no output {name!r}: {nearest(name, outputs)}" for name in unknown]
     if faults:
         raise ScheduleError(f"the step cannot follow the error: {'; '.join(faults)}")

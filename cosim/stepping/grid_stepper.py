@@ -25,7 +25,7 @@ class GridStepper:
 
     def arrive(self, last: int) -> bool:
         """Go to the next tick at which a unit is due; see `Stepper`."""
-        self._tick = min(last, *self._due.values())
+        self._tick = min((last, *self._due.values()))
         self.time = self._schedule.time(self._tick)
         sampled = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick > self._acted[s.unit]]
         continuous = [s for s in self._schedule.continuous if self._due[s.unit] == self._tick]

@@ -1,7 +1,7 @@
 """How far a step of an ensemble is from two steps of half the length."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,13 +26,15 @@ class WorstSignal:
 class StepError:
     """Compares outputs of units: their connected real outputs that are continuous; all such where none is connected.
 
+    Outputs that are not to be controlled are left out.
+
     Richardson's estimate: if the error of one step goes with its length to the power of order + 1, two steps of half
     the length are off by |y_halves - y_whole| / (2^order - 1). It is tolerated relative to the largest magnitude that
     the signal has had, so that passing through zero asks for no more than the rest of its course.
     """
 
     def __init__(self, ensemble: Ensemble, units: Sequence[str], control: AdaptiveStep, order: int) -> None:
-        self._columns = [(unit, c) for unit in units for c in _compared(ensemble, unit)]
+        self._columns = [(unit, c) for unit in units for c in _compared(ensemble, unit, control.uncontrolled)]
         self._control = control
         self._divisor = 2.0**order - 1
         self._largest: Values = np.abs(self.values())
@@ -68,7 +70,8 @@ class StepError:
         self._largest = np.array(state, dtype=np.float64)
 
 
-def _compared(ensemble: Ensemble, unit: str) -> list[Column]:
+def _compared(ensemble: Ensemble, unit: str, uncontrolled: Collection[str]) -> list[Column]:
     columns = [c for c in ensemble.signals().columns() if c.name.startswith(f"{unit}.") and c.port.is_continuous]
+    columns = [c for c in columns if f"{unit}.{c.port.name}" not in uncontrolled]
     feeding = {c.source.port for c in ensemble.system.connections if c.source.unit == unit}
     return [c for c in columns if c.port.name in feeding] or columns

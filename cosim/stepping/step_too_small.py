@@ -19,4 +19,4 @@ class StepTooSmall(UnitFailure):
     def __init__(self, unit: str, signal: str, t: float, step: float, error: float) -> None:
         self.signal, self.error, self.step = signal, error, step
         fault = f"with a step of {step:.3g} s the error of {signal} is {error:.3g} times what is tolerated"
-        super().__init__(unit, "control of the step", t, "Error", (fault,))
+        super().__init__(unit, "control of the step", t, "Error", (f"{fault}; if it is noise, leave it uncontrolled",))

@@ -1,6 +1,5 @@
 """An output at its last two communication points."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -53,7 +52,3 @@ class Trace:
         """Go back to what `get_state` gave."""
         before, was, last, is_ = state
         self.moments = (before, np.array(was, dtype=np.float64), last, np.array(is_, dtype=np.float64))
-
-
-Traces = Mapping[str, Trace]
-"""By name of the output."""

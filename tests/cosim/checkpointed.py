@@ -7,8 +7,10 @@ from pathlib import Path
 from native_units import native_fmu
 
 from cosim.checkpoint import read_checkpoint
-from cosim.checkpointer import Checkpointer, from_then_on
-from cosim.master import Master, Observer
+from cosim.checkpointer import Checkpointer
+from cosim.from_then_on import FromThenOn
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
 from cosim.system import System
@@ -59,7 +61,7 @@ def go_on(folder: Path) -> float:
         c.restore(master)
         with Recorder(record_of(folder), ["csv"], after=c.rows) as recorder:
             write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
-            master.run(STOP, [from_then_on(c.time, observe) for observe in (recorder, write)])
+            master.run(STOP, [FromThenOn(c.time, observe) for observe in (recorder, write)])
     return c.time
 
 

@@ -1,4 +1,5 @@
 import sys
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -6,9 +7,10 @@ import pytest
 
 from fmus.build import build_block
 
-sys.path.insert(0, str(Path(__file__).parent))  # master_blocks, decay, fmu_of
+sys.path.insert(0, str(Path(__file__).parent))  # the modules beside the tests
 
 import decay
+from driven_unit import DrivenUnit, Started
 from fmu_of import FmuOf
 
 
@@ -30,3 +32,19 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> FmuOf:
 def decay_library(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """Compile the foreign unit of decay.c."""
     return decay.compiled(tmp_path_factory.mktemp("decay"))
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[Started]:
+    """Start native units without the master; free them at the end."""
+    made: list[DrivenUnit] = []
+
+    def start(name: str, fmi: int, *, event_mode: bool = False, **values: float) -> DrivenUnit:
+        unit = DrivenUnit(name, fmi, tmp_path / f"unit_{len(made)}")
+        made.append(unit)
+        unit.start(event_mode=event_mode, **values)
+        return unit
+
+    yield start
+    for unit in made:
+        unit.fmu.freeInstance()

@@ -63,7 +63,8 @@ def description2(d: Declaration, step: float, dependencies: bool, flags: Mapping
         row = ElementTree.SubElement(rows, "ScalarVariable", ends)
         ElementTree.SubElement(row, FMI2_TYPES[v.type], {**_start(v), **({"unit": v.unit} if v.unit else {})})
     structure = ElementTree.SubElement(root, "ModelStructure")
-    for group in ("Outputs", "InitialUnknowns"):
+    has_outputs = any(v.causality == OUTPUT for v in d.variables)
+    for group in ("Outputs", "InitialUnknowns") if has_outputs else ():
         unknowns = ElementTree.SubElement(structure, group)
         for v in d.variables:
             if v.causality == OUTPUT:

@@ -176,3 +176,22 @@ def test_faulty_tolerances_and_limits_are_told_at_once():
     )
     with pytest.raises(BadOptions, match="both tolerances are 0"):
         AdaptiveStep(relative=0.0, absolute=0.0)
+
+
+def test_outputs_that_are_left_uncontrolled_do_not_shorten_the_step():
+    def longest(*uncontrolled: str) -> float:
+        control = AdaptiveStep(largest=Fraction(1, 2), uncontrolled=uncontrolled)
+        with Master(PLAIN.three_units(H, 2), MasterOptions(adaptive=control)) as master:
+            master.run(Fraction(2))
+            return statistics(master).longest
+
+    outputs = [f"{name}.{port}" for name, u in PLAIN.three_units(H, 2).units.items() for port in u.description.outputs]
+    assert longest() < 0.1
+    assert longest(*outputs) == 0.5
+
+
+def test_an_uncontrolled_output_that_does_not_exist_is_refused():
+    s = System()
+    s.add("mass", native_fmu("mass"))
+    with pytest.raises(ScheduleError, match=r"there is no output 'mass\.w': did you mean mass\."):
+        Master(s, MasterOptions(adaptive=AdaptiveStep(uncontrolled=("mass.w",))))

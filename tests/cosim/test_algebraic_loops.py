@@ -119,7 +119,7 @@ def test_a_circle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCa
     s.connect(both.y.count, other.u.count_in)
     s.connect(other.y.truth, both.u.truth_in)
     schedule = Schedule(s)
-    assert not schedule.has_loops
+    assert not schedule.loops
     assert [g.units for g in schedule.groups] == [("both",), ("other",)]
     assert "both steps first where units wait for each other; it gets the former values of other" in caplog.text
     with Master(s) as master:

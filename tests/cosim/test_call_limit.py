@@ -15,6 +15,7 @@ from cosim.master import Master
 from cosim.master_options import MasterOptions
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
+from cosim.stepping.adaptive_step import AdaptiveStep
 from cosim.system import System
 from fmus.build import build_block
 from scenarios.record import Record
@@ -62,6 +63,30 @@ def test_a_unit_that_hangs_in_a_step_is_left_and_the_others_are_ended(
     number = len(called.calls)
     endless()
     assert called.calls[number:] == []  # the thread came back and touched no unit
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        MasterOptions(call_limit=LIMIT, repeat_discarded=True),
+        MasterOptions(call_limit=LIMIT, adaptive=AdaptiveStep(absolute=1e9)),
+    ],
+    ids=["events", "adaptive"],
+)
+def test_saved_states_of_a_unit_that_hangs_are_left_too(
+    options: MasterOptions, endless: Callable[[], None], tmp_path: Path
+):
+    s, called = System(), Called()
+    s.add("steady", native_fmu("integrator"), period=Fraction(1, 10))
+    s.add("endless", block("HangsInStep", tmp_path))
+    with pytest.raises(UnitHung) as caught, Master(s, options, called) as master:
+        master.run(Fraction(1))
+    assert caught.value.unit == "endless"
+    assert called.after("endless", "fmi3DoStep", "endless") == []
+    assert called.after("steady", "fmi3DoStep", "endless")[-1] == "fmi3FreeInstance"
+    number = len(called.calls)
+    endless()
+    assert called.calls[number:] == []
 
 
 def test_a_unit_that_hangs_as_it_is_initialised(endless: Callable[[], None], tmp_path: Path):

@@ -150,7 +150,7 @@ ODD = st.sampled_from(
 )
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150)
 @given(
     edits=st.lists(st.tuples(st.integers(0, len(VALUES) - 1), ODD | st.text("abc<>&'{}\t 01.", max_size=5)), max_size=4)
 )

@@ -23,10 +23,12 @@ from cosim.checkpoint import (
     take_checkpoint,
     write_checkpoint,
 )
+from cosim.from_then_on import FromThenOn
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.record.complete_record import complete_record
 from cosim.record.recorder import Recorder
+from cosim.signals import Signals
 from cosim.stepping.adaptive_step import AdaptiveStep
 from cosim.stepping.extrapolation import Extrapolation
 from cosim.system import System
@@ -82,8 +84,9 @@ def test_a_checkpoint_that_cannot_be_written_is_told_and_the_run_goes_on(
         *(MasterOptions(algorithm=algorithm, cpu_times=True) for algorithm in Algorithm),
         MasterOptions(compiled=False, extrapolation=Extrapolation.LINEAR, cpu_times=True),
         MasterOptions(adaptive=AdaptiveStep(), extrapolation=Extrapolation.LINEAR, cpu_times=True),
+        MasterOptions(repeat_discarded=True, cpu_times=True),
     ],
-    ids=[*(algorithm.value for algorithm in Algorithm), "linear", "adaptive"],
+    ids=[*(algorithm.value for algorithm in Algorithm), "linear", "adaptive", "events"],
 )
 def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, options: MasterOptions):
     points: list[Checkpoint] = []
@@ -98,6 +101,37 @@ def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, options: Mas
         rest = Record(tmp_path / "rest.parquet")
         for name in ("a.x", "b.v", "between.f1"):
             assert rest[name].tolist() == whole[name].tolist()[c.rows - 1 :], (c.time, name)
+
+
+@pytest.mark.parametrize("stops", [(Fraction(1),), (Fraction(1, 4), Fraction(1))])
+def test_a_plan_that_goes_on_writes_the_record_by_itself(
+    stops: tuple[Fraction, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Rows of Python's are the first of each run at most; 1/4 s is where no unit is due."""
+    rows: list[float] = []
+    add = Recorder.__call__
+
+    def adding(self: Recorder, t: float, signals: Signals) -> None:
+        rows.append(t)
+        add(self, t, signals)
+
+    monkeypatch.setattr(Recorder, "__call__", adding)
+    file, compare = record_of(tmp_path), tmp_path / "whole.parquet"
+    with Master(checkpointed.oscillator()) as master, Recorder(compare) as recorder:
+        for stop in (Fraction(1, 7), *stops):
+            master.run(stop, [recorder])
+    with Master(checkpointed.oscillator()) as master, Recorder(file) as recorder:
+        master.run(Fraction(1, 7), [recorder])
+        c = take_checkpoint(master, recorder.rows)
+    rows.clear()
+    with Master(checkpointed.oscillator()) as master, Recorder(tmp_path / "rest.parquet") as recorder:
+        c.restore(master)
+        for stop in stops:
+            master.run(stop, [FromThenOn(c.time, recorder)])
+    assert len(rows) <= len(stops)
+    whole, rest = Record(compare), Record(tmp_path / "rest.parquet")
+    assert [*rest.time] == [*whole.time[c.rows :]]
+    assert [*rest["a.x"]] == [*whole["a.x"][c.rows :]]
 
 
 def test_pictures_and_truths_that_a_buffer_held_are_there_again(fmu: FmuOf):

@@ -11,8 +11,9 @@ from two_masses import TwoMasses
 from cosim.exceptions import ScheduleError
 from cosim.instance import Instance
 from cosim.iterating.not_converged import NotConverged
-from cosim.master import Master, Observer
+from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
+from cosim.observer import Observer
 from cosim.system import System
 
 both = pytest.mark.parametrize("algorithm", [Algorithm.FIXED_POINT, Algorithm.NEWTON])

@@ -161,7 +161,7 @@ def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, names:
         FmuArchive(file).description()
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
 @given(data=st.data())
 def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path, data: st.DataObject):
     content = bytearray(packed("a", "b/c"))

@@ -63,6 +63,7 @@ def test_a_step_that_follows_its_error_is_told_with_what_it_came_to(ssp: Path, t
         "smallest": "1/100000",
         "largest": "1/4",
         "initial": "1/5",
+        "uncontrolled": [],
     }
     steps = summary["steps"]
     assert steps["rejected"] >= 1

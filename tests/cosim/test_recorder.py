@@ -1,5 +1,4 @@
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -155,6 +154,7 @@ def test_rows_written_into_the_block_are_recorded_as_those_of_an_observer(tmp_pa
 
 
 def test_a_full_disk_is_told_and_leaves_what_was_recorded(tmp_path: Path):
+    resource = pytest.importorskip("resource")
     file, x = tmp_path / "signals.parquet", np.zeros(1)
     recorder = Recorder(file)
     _record(recorder, x, 20)

@@ -89,7 +89,7 @@ def test_units_of_a_loop_stand_together_between_those_before_and_after():
     s = system("after b c a", plain="plant")
     connect(s, "a>b", "b>c", "c>a", "b>after")
     schedule = Schedule(s)
-    assert schedule.has_loops
+    assert schedule.loops
     assert [g.units for g in schedule.groups] == [("b", "c", "a"), ("after",), ("plant",)]
     assert schedule.groups[0].told.startswith("b.y -> c.u, c.u acts on c.y at once, c.y -> a.u")
     assert [str(c.source) for c in schedule.groups[0].back(["a", "b", "c"])] == ["a.y"]

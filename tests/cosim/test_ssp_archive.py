@@ -138,7 +138,7 @@ def test_what_is_not_supported_is_named(tmp_path: Path, element: str, told: str)
     assert told in refusal(pack_ssp(tmp_path / "a.ssp", described(system(element)), {"resources/unit.fmu": b"x"}))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_whatever_a_description_holds_it_is_refused_or_read(tmp_path: Path, data: st.DataObject):
     content = bytearray(SOUND.encode())

@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from fmus.build import cached
+from scenarios.ended import Ended
 from scenarios.experiment import Experiment, Figure
 from scenarios.interruption import Interruption
 from scenarios.parameters import parse_parameters
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Ended, Task, carry_out
+from scenarios.runner import carry_out
+from scenarios.task import Task
 
 
 def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:

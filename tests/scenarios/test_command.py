@@ -16,8 +16,6 @@ from scenarios.catalog import SCENARIOS
 from scenarios.command import main
 from scenarios.record import Record
 
-sys.path.insert(0, str(Path(__file__).parent))  # failing_arm
-
 
 def call(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, [str(a) for a in arguments])

@@ -1,15 +1,11 @@
 """The free-flyer's four handovers, on the built FMUs."""
 
 import itertools
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
-
 from flyer_runs import metric, run
 
 from cosim.schedule import Schedule

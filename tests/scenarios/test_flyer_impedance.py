@@ -1,13 +1,9 @@
 """A push against the free-flyer's gripper, on the built FMUs."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
-
 from flyer_runs import metric, run
 
 from cosim.exceptions import UnitRefused

@@ -1,12 +1,12 @@
 """What the free-flyer's code has as defaults is what its `paper.toml` tells the origin of."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tomli
+from origins import assert_every_default_has_its_origin
 
 import scenarios.free_flyer
 from controllers.flyer_handover_parameters import Params as DecisionParams
@@ -20,10 +20,6 @@ from plants.thrusters import Params as ThrustersParams
 from scenarios.free_flyer import scene
 from scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
 from scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters
-
-sys.path.insert(0, str(Path(__file__).parent))  # origins
-
-from origins import assert_every_default_has_its_origin
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 

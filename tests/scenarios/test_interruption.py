@@ -12,8 +12,6 @@ import pytest
 from fmus.build import build_block
 from scenarios.interruption import Interruption
 
-sys.path.insert(0, str(Path(__file__).parent))  # hanging_arm
-
 BLOCKS = ["HangingArm", "NativelyHangingArm"][: 2 if sys.platform.startswith("linux") else 1]
 
 

@@ -21,7 +21,8 @@ from scenarios.ir_grasp.parameters import Parameters
 from scenarios.ir_grasp.situation import Situation, asked_for
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Task, carry_out
+from scenarios.runner import carry_out
+from scenarios.task import Task
 
 
 def fmu(unit: str) -> Path:

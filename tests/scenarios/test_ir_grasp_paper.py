@@ -1,22 +1,18 @@
 """What the grasp's code has as defaults is what its `paper.toml` tells the origin of."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tomli
+from origins import assert_every_default_has_its_origin
 
 import scenarios.ir_grasp
 from controllers.reflex_parameters import Params as ReflexParams
 from plants.grasp_objects import Thing
 from plants.grasp_parameters import Params as SceneParams
 from scenarios.ir_grasp.parameters import Parameters
-
-sys.path.insert(0, str(Path(__file__).parent))  # origins
-
-from origins import assert_every_default_has_its_origin
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 

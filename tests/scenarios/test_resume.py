@@ -1,29 +1,26 @@
-import fcntl
 import json
 import pickle
 import shutil
 import signal
-import sys
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from killed_run import end_between
 
 from fmus.build import cached
 from scenarios.catalog import SCENARIOS
 from scenarios.command import main
+from scenarios.ended import Ended
 from scenarios.experiment import Outcome
 from scenarios.listing import print_summary
 from scenarios.parameters import parse_parameters
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Ended
 
-sys.path.insert(0, str(Path(__file__).parent))  # killed_run
-
-from killed_run import end_between
+fcntl = pytest.importorskip("fcntl")
 
 OF_TIME = ("cpu_", "pace_", "peak_memory")
 
@@ -182,7 +179,7 @@ def test_a_run_that_goes_on_is_refused(copy: Path):
 
 def test_a_run_without_a_checkpoint_is_refused_and_its_record_is_whole(copy: Path):
     (copy / "checkpoint.zip").unlink()
-    assert_refused(copy, "there is no checkpoint; a run writes them with --checkpoint EVERY")
+    assert_refused(copy, "there is no checkpoint; a run writes them with --checkpoint SECONDS")
     assert_record_is_whole(copy)
 
 

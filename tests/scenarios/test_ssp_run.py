@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import sys
 import zipfile
 from fractions import Fraction
 from pathlib import Path
@@ -16,8 +15,6 @@ from cosim.system import System
 from fmus.build import build_block
 from scenarios.command import main
 from scenarios.record import Record
-
-sys.path.insert(0, str(Path(__file__).parent))  # tearing_spring
 
 
 def run(file: Path, *arguments: str | Path) -> Result:

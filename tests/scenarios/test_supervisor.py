@@ -9,9 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
-
 from failing_systems import IN_TERMINAL, failing_ssp, start, wait_until
 
 from scenarios.record import Record

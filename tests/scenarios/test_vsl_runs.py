@@ -10,15 +10,18 @@ import numpy as np
 import pytest
 
 from cosim.exceptions import UnitRefused
-from cosim.master import Master, Observer
+from cosim.master import Master
+from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from fmus.build import cached
+from scenarios.ended import Ended
 from scenarios.experiment import Outcome
 from scenarios.interruption import Interruption
 from scenarios.parameters import BadParameter, parse_parameters
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder
-from scenarios.runner import Ended, Task, carry_out
+from scenarios.runner import carry_out
+from scenarios.task import Task
 from scenarios.vsl.path_experiment import PathExperiment
 from scenarios.vsl.vsl_hybrid import VslHybrid
 from scenarios.vsl.vsl_model_based import VslModelBased

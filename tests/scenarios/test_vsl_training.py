@@ -1,7 +1,6 @@
 import os
 import re
 import signal
-import sys
 import types
 import zipfile
 from collections.abc import Callable, Generator
@@ -30,8 +29,6 @@ from scenarios import vsl_train_command
 from scenarios.vsl_train_command import vsl_train
 from scenarios.vsl_training import Errors, VslTraining, content_key, split
 from scenarios.vsl_training_data import Dataset, describe_arm
-
-sys.path.insert(0, str(Path(__file__).parent))  # vsl_training_arms
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 TRAINING = VslTraining(fmu=Path("none"), kinematics=ARM, points=0, seed=0)

@@ -1,0 +1,105 @@
+"""How a system is stepped, as its options and its units ask: with which ensemble, coupling and stepper."""
+
+from collections.abc import Sequence
+
+from cosim.endings import Endings
+from cosim.ensemble import Ensemble
+from cosim.events.event_ensemble import EventEnsemble
+from cosim.events.event_options import has_events, refuse_off_grid
+from cosim.events.event_stepper import EventStepper
+from cosim.group import Group, groups_of_data_flow
+from cosim.heartbeat import Heartbeat
+from cosim.iterating.fixed_point import FixedPoint
+from cosim.iterating.initial_values import InitialValues
+from cosim.iterating.interface import Interface
+from cosim.iterating.interface_newton import InterfaceNewton
+from cosim.iterating.interface_solver import InterfaceSolver
+from cosim.loop_refusal import refuse_circles, refuse_loops
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.plan.choice import plan_stepper, tell_general_path
+from cosim.schedule import Schedule
+from cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
+from cosim.stepping.coupling import Coupling
+from cosim.stepping.extrapolation import Extrapolation
+from cosim.stepping.gauss_seidel import GaussSeidel
+from cosim.stepping.grid_stepper import GridStepper
+from cosim.stepping.jacobi import Jacobi
+from cosim.stepping.stepper import Stepper
+from cosim.system import System
+
+
+class Method:
+    """Makes what steps a system; what does not go together is refused before anything is loaded.
+
+    Attributes:
+        schedule: the grid and the order of the units.
+
+    Raises:
+        ScheduleError: see `Schedule`, `check_control` and `refuse_off_grid`, or units make circles that cannot be
+            solved.
+    """
+
+    def __init__(self, system: System, options: MasterOptions) -> None:
+        self._system, self._options = system, options
+        self.schedule = Schedule(system)
+        if options.adaptive is not None:
+            check_control(system, options.adaptive)
+        refuse_off_grid(system, options)
+        self._continuous = self._groups()
+        refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
+
+    @property
+    def has_events(self) -> bool:
+        """Whether steps may end off the schedule's grid."""
+        return has_events(self._system, self._options)
+
+    @property
+    def iterates(self) -> bool:
+        """Whether units go over steps again."""
+        going_back = self._options.algorithm is not Algorithm.JACOBI
+        return going_back and any(g.circle for g in (*self.schedule.sampled_groups, *self._continuous))
+
+    def load(self, heartbeat: Heartbeat, endings: Endings) -> Ensemble:
+        """Load the units; whoever gave `endings` carries them out, also if this fails."""
+        load = EventEnsemble if self.has_events else Ensemble
+        ensemble = load(self._system, heartbeat, endings)
+        ensemble.measures_cpu = self._options.cpu_times
+        return ensemble
+
+    def initialize(self, ensemble: Ensemble) -> None:
+        """Take the units through initialisation mode, algebraic loops solved."""
+        schedule = self.schedule
+        values = InitialValues(ensemble, schedule.groups, schedule.initial_passes, self._solver)
+        ensemble.initialize(schedule.slots, values)
+
+    def couple(self, ensemble: Ensemble) -> Coupling:
+        """Return what the algorithm does with units that are due."""
+        if self._options.algorithm is Algorithm.JACOBI:
+            return Jacobi(ensemble)
+        return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
+
+    def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
+        """Return what moves initialised units through time, as a compiled plan where that does the same."""
+        control = self._options.adaptive
+        if isinstance(ensemble, EventEnsemble) or control is not None:
+            tell_general_path("steps may end anywhere")
+        if isinstance(ensemble, EventEnsemble):
+            return EventStepper(self.schedule, ensemble, coupling)
+        if self._options.extrapolation is Extrapolation.LINEAR:
+            ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
+        if control is not None:
+            return AdaptiveStepper(self.schedule, coupling, ensemble, control, self._options.order)
+        plan = plan_stepper(self.schedule, ensemble, coupling, self._options, iterates=self.iterates)
+        return plan or GridStepper(self.schedule, coupling, ensemble.lines)
+
+    def _groups(self) -> Sequence[Group]:
+        """Return the units that are not sampled, those together that have to agree at each step."""
+        if not self._options.algorithm.iterates:
+            return self.schedule.continuous_groups
+        groups = groups_of_data_flow(self._system, [s.unit for s in self.schedule.continuous], self.schedule.loops)
+        refuse_circles(self._system, groups)
+        return groups
+
+    def _solver(self, interface: Interface) -> InterfaceSolver:
+        kind = FixedPoint if self._options.algorithm is Algorithm.FIXED_POINT else InterfaceNewton
+        return kind(interface.magnitudes(self._options.tolerance), self._options.most_iterations)

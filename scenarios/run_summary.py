@@ -1,0 +1,92 @@
+"""What a run's folder says of it: what was chosen, what came out, and the rows of its report's tables."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from cosim.exceptions import UnitFailure
+from cosim.master import Master
+from scenarios.experiment import Metric, Outcome
+from scenarios.report import UnitRow
+from scenarios.resumption import Spent
+from scenarios.task import Task
+
+
+def configuration(task: Task) -> dict[str, Any]:
+    """Return what decides on a run's signals, as JSON can hold it."""
+    values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
+    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed, "master": task.options.as_data()}
+
+
+def files_and_forms(task: Task) -> dict[str, Any]:
+    """Return what else a run needs to go on in another process, as JSON can hold it."""
+    every = None if task.every is None else str(task.every)
+    files = {name: str(path.absolute()) for name, path in task.fmus.items()}
+    return {"source": task.source, "files": files, "formats": list(task.formats), "checkpoint": every}
+
+
+def summary_of(
+    task: Task,
+    outcome: Outcome,
+    metrics: Mapping[str, Metric],
+    master: Master,
+    spent: Spent,
+    failure: UnitFailure | None,
+    complete: bool,
+) -> dict[str, Any]:
+    """Return a run's summary as JSON can hold it; a run that is not complete can go on."""
+    return {
+        **configuration(task),
+        "complete": complete,
+        "success": outcome.success,
+        "reason": outcome.reason,
+        "metrics": {k: metric_data(m) for k, m in metrics.items()},
+        "simulated_seconds": master.time,
+        **({} if master.steps is None else {"steps": asdict(master.steps)}),
+        "wall_seconds": spent.wall,
+        "cpu_seconds": spent.cpu,
+        "failure": None if failure is None else failure.as_data(),
+        **({} if master.pacer is None else {"pace": master.pacer.report.as_data()}),
+    }
+
+
+def metric_data(m: Metric) -> dict[str, Any]:
+    """Return a metric as JSON, which knows no infinity: what is not finite is null."""
+    return {"value": m.value if math.isfinite(m.value) else None, "unit": m.unit, "description": m.description}
+
+
+def parameter_rows(task: Task) -> list[tuple[str, str, str]]:
+    """Return name, value with unit, and description of each parameter."""
+    rows: list[tuple[str, str, str]] = []
+    for v in task.experiment.parameters():
+        value = _plain(getattr(task.parameters, v.name))
+        unit = "" if v.unit.symbol == "1" else f" {v.unit.symbol}"
+        rows.append((v.name, _told(value) + unit, v.description))
+    return rows
+
+
+def unit_rows(master: Master) -> list[UnitRow]:
+    """Return what is told of each unit."""
+    rows: list[UnitRow] = []
+    for name, unit in master.system.units.items():
+        d = unit.description
+        follows = master.steps is not None and not unit.sampled
+        period = "varies" if follows else f"{float(unit.period) * 1000:.4g} ms"
+        rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
+    return rows
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    name = getattr(value, "name", None)
+    return value if name is None else name.lower()
+
+
+def _told(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,108 @@
+"""Runs at the edges: nothing to run, no time to run for, and runs that cannot go on."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from native_units import native_fmu
+
+from cosim.exceptions import UnitFailure
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.record.recorder import Recorder
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.system import System
+from scenarios.record import Record
+
+OPTIONS = {
+    "plan": MasterOptions(),
+    "grid": MasterOptions(compiled=False),
+    "jacobi": MasterOptions(algorithm=Algorithm.JACOBI),
+    "newton": MasterOptions(algorithm=Algorithm.NEWTON),
+    "events": MasterOptions(repeat_discarded=True),
+    "adaptive": MasterOptions(adaptive=AdaptiveStep()),
+}
+all_ways = pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+
+
+def ramp(fmi: int = 3) -> System:
+    s = System()
+    s.add("ramp", native_fmu("integrator", fmi), u=1.0, period=Fraction(1, 4))
+    return s
+
+
+@pytest.mark.parametrize("options", [o for name, o in OPTIONS.items() if name != "adaptive"])
+def test_a_system_without_units_passes_through_time(options: MasterOptions, tmp_path: Path):
+    with Master(System(), options) as master, Recorder(tmp_path / "r.parquet") as recorder:
+        master.run(Fraction(3, 2), [recorder])
+    assert Record(tmp_path / "r.parquet").time.tolist() == [2.0]  # whole ticks, and a tick without units is 1 s
+
+
+@all_ways
+def test_a_run_to_where_it_is_shows_that_point_and_steps_nothing(options: MasterOptions):
+    times: list[float] = []
+    with Master(ramp(), options) as master:
+        for stop in (0, 0, 1, 1):
+            master.run(Fraction(stop), [lambda t, y: times.append(t + float(y["ramp.x"]))])
+        assert master.time == 1.0
+    assert times[:2] == [0.0, 0.0]
+    assert times[-1] == times[-2] == pytest.approx(2.0)
+
+
+@all_ways
+def test_time_does_not_go_back(options: MasterOptions):
+    seen: list[float] = []
+    with Master(ramp(), options) as master:
+        with pytest.raises(ValueError, match=r"a run to -1 s, but 0 s are reached"):
+            master.run(Fraction(-1), [lambda t, _: seen.append(t)])
+        master.run(Fraction(1))
+        with pytest.raises(ValueError, match=r"a run to 0.5 s, but 1 s are reached"):
+            master.run(Fraction(1, 2), [lambda t, _: seen.append(t)])
+        assert master.time == 1.0
+    assert seen == []
+
+
+@all_ways
+def test_units_that_are_freed_are_not_called(options: MasterOptions):
+    with Master(ramp(), options) as master:
+        master.run(Fraction(1))
+    with pytest.raises(RuntimeError, match="the units are freed"):
+        master.run(Fraction(2))
+    with master:  # loads them once more
+        master.run(Fraction(1, 2))
+        assert master.signals["ramp.x"] == pytest.approx(0.5)
+
+
+@all_ways
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_that_failed_does_not_go_on(fmi: int, options: MasterOptions):
+    s = System()
+    s.add("bad", native_fmu("errs", fmi), at=0.45)
+    with Master(s, options) as master:
+        with pytest.raises(UnitFailure):
+            master.run(Fraction(1))
+        with pytest.raises(RuntimeError, match="bad failed, and the standards forbid that it goes on"):
+            master.run(Fraction(1))
+
+
+@all_ways
+def test_a_run_goes_on_after_an_observer_that_raised(options: MasterOptions):
+    def alarmed(t: float, _y: object) -> None:
+        if t > 0.6:
+            raise KeyboardInterrupt
+
+    with Master(ramp(), options) as master:
+        with pytest.raises(KeyboardInterrupt):
+            master.run(Fraction(1), [alarmed])
+        master.run(Fraction(1))
+        assert master.signals["ramp.x"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_that_gives_nothing_has_a_record_of_times(fmi: int, compiled: bool, tmp_path: Path):
+    s = System()
+    s.add("sink", native_fmu("sink", fmi))
+    with Master(s, MasterOptions(compiled=compiled)) as master, Recorder(tmp_path / "r.parquet") as recorder:
+        master.run(Fraction(1, 2), [recorder])
+    assert Record(tmp_path / "r.parquet").time.tolist() == [k / 10 for k in range(6)]

@@ -1,0 +1,81 @@
+"""Every state that is saved is freed, whatever happens, but for units that must not be called any more."""
+
+import ctypes
+from collections import Counter
+from fractions import Fraction
+
+import pytest
+from called import Called
+from native_units import native_fmu
+
+from cosim.exceptions import UnitFailure
+from cosim.instance import Instance
+from cosim.master import Master
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.stepping.adaptive_step import AdaptiveStep
+from cosim.system import System
+
+OPTIONS = {
+    "newton": MasterOptions(algorithm=Algorithm.NEWTON),
+    "adaptive": MasterOptions(adaptive=AdaptiveStep()),
+    "adaptive newton": MasterOptions(algorithm=Algorithm.NEWTON, adaptive=AdaptiveStep()),
+    "events": MasterOptions(repeat_discarded=True),
+    "events newton": MasterOptions(algorithm=Algorithm.NEWTON, repeat_discarded=True),
+}
+
+
+def circle(fault: str, fmi: int, at: float = 0.4) -> System:
+    """Return a circle of an integrator and a unit that fails at a time in seconds, and one beside it."""
+    s = System()
+    steady, bad = s.add("steady", native_fmu("integrator", fmi)), s.add("bad", native_fmu(fault, fmi), at=at)
+    s.add("beside", native_fmu("integrator", fmi))
+    s.connect(steady.y.x, bad.u.u)
+    s.connect(bad.y.y, steady.u.u)
+    return s
+
+
+def kept(called: Called, fmi: int) -> dict[str, int]:
+    """Return how many states of each unit were saved and not freed."""
+    state = "FMUstate" if fmi == 2 else "FMUState"
+    count = Counter(called.calls)
+    units = {unit for unit, _ in called.calls}
+    return {u: count[u, f"fmi{fmi}Get{state}"] - count[u, f"fmi{fmi}Free{state}"] for u in sorted(units)}
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fault", ["errs", "gives_nan", "ends"])
+def test_states_are_freed_after_a_failure(fault: str, fmi: int, options: MasterOptions):
+    called = Called()
+    with pytest.raises(UnitFailure), Master(circle(fault, fmi), options, called) as master:
+        master.run(Fraction(1))
+    assert (("steady", f"fmi{fmi}GetFMU{'s' if fmi == 2 else 'S'}tate")) in called.calls
+    assert kept(called, fmi) == {"bad": 0, "beside": 0, "steady": 0}
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_is_not_called_after_fatal_to_free_its_states(fmi: int, options: MasterOptions):
+    called = Called()
+    with pytest.raises(UnitFailure), Master(circle("fatal", fmi), options, called) as master:
+        master.run(Fraction(1))
+    last = max(i for i, call in enumerate(called.calls) if call == ("bad", f"fmi{fmi}DoStep"))
+    assert "bad" not in {unit for unit, _ in called.calls[last + 1 :]}
+    left = kept(called, fmi)
+    assert left["bad"] > 0
+    assert left["steady"] == left["beside"] == 0
+
+
+@pytest.mark.parametrize("options", [OPTIONS["newton"], OPTIONS["adaptive"]], ids=["newton", "adaptive"])
+def test_states_are_freed_where_a_unit_does_not_save_its_own(options: MasterOptions, monkeypatch: pytest.MonkeyPatch):
+    called, save = Called(), Instance.save_state
+
+    def save_until_04(self: Instance) -> ctypes.c_void_p:
+        if self.name == "bad" and self.time > 0.39:
+            self.judge("fmi3GetFMUState", 3)
+        return save(self)
+
+    monkeypatch.setattr(Instance, "save_state", save_until_04)
+    with pytest.raises(UnitFailure, match="GetFMUState"), Master(circle("ends", 3, at=10.0), options, called) as master:
+        master.run(Fraction(1))
+    assert kept(called, 3) == {"bad": 0, "beside": 0, "steady": 0}
