@@ -50,7 +50,7 @@ class MasterOptions:
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
 
     Raises:
-        BadOptions: with every number that makes no sense.
+        BadOptions: with every value that makes no sense.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
@@ -70,6 +70,11 @@ class MasterOptions:
             for name in ("tolerance", "call_limit", "pace")
             if (value := getattr(self, name)) is not None and not 0 < value < math.inf
         ]
+        kinds = {"algorithm": Algorithm, "extrapolation": Extrapolation}
+        for name, kind in kinds.items():
+            if not isinstance(value := getattr(self, name), kind):
+                names = ", ".join(f"{kind.__name__}.{item.name}" for item in kind)
+                faults.append(f"{name} = {value!r}: one of {names} is right")
         if self.most_iterations < 1:
             faults.append(f"most_iterations = {self.most_iterations}: a whole number from 1 on is right")
         if faults:

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from numbers import Rational
 from pathlib import Path
 from typing import Any
 
@@ -96,26 +97,25 @@ class System:
         self._descriptions: dict[Path, FmuDescription] = {}
 
     def add(
-        self, name: str, fmu: Path, *, period: Fraction | None = None, sampled: bool | None = None, **start: Any
+        self, name: str, fmu: Path | str, *, period: Fraction | None = None, sampled: bool | None = None, **start: Any
     ) -> PlacedUnit:
         """Add a unit under a name, with start values of its parameters and inputs.
 
         `period` is its communication step in seconds, by default the step that its FMU proposes. `sampled` says whether
-        it acts at instants, by default what can be read off its FMU: see `FmuDescription`.
+        it acts at instants, by default what can be read off its FMU: see `FmuDescription`. What is returned names the
+        unit's ports for `connect`: inputs `unit.u.x`, outputs `unit.y.x`.
 
         Raises:
             InvalidFmu: the file cannot be used.
+            TypeError: the period is not exact.
         """
-        if fmu not in self._descriptions:
-            self._descriptions[fmu] = describe_fmu(fmu)
-        description = self._descriptions[fmu]
+        path = Path(fmu)
+        if path not in self._descriptions:
+            self._descriptions[path] = describe_fmu(path)
+        description = self._descriptions[path]
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
-        if period is None:
-            period = proposed_step(description.step)
-        if period is None or period <= 0:
-            self._faults.append(f"{name}: its FMU proposes no communication step; give one that is above 0 s")
-            period = Fraction(1, 100)
+        period = self._period(name, proposed_step(description.step) if period is None else period)
         unit = PlacedUnit(name, description, start, period, description.sampled if sampled is None else sampled)
         self.units[name] = unit
         return unit
@@ -125,7 +125,13 @@ class System:
 
         Real values are converted to the input's unit where both have the same dimension. A `transformation` takes the
         place of that, whatever the units; it is for real values only.
+
+        Raises:
+            TypeError: an end is not a port.
         """
+        for end in (source, target):
+            if not isinstance(end, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
         self.connections.append(Connection(source, target, transformation))
         self._sources[target.unit][target.port] = source
 
@@ -182,6 +188,16 @@ class System:
                 return None
             change = conversion(a.unit, b.unit)
         return None if change.is_identity else change
+
+    def _period(self, name: str, period: Fraction | None) -> Fraction:
+        if period is not None and not isinstance(period, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
+            exact = Fraction(str(period)) if isinstance(period, float) else "1/100"
+            raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
+        if period is not None and period > 0:
+            return Fraction(period)
+        told = "its FMU proposes no communication step" if period is None else f"its communication step is {period} s"
+        self._faults.append(f"{name}: {told}; give one that is above 0 s")
+        return Fraction(1, 100)
 
     def _connection_faults(self, c: Connection) -> list[str]:
         clocks = self._clock(c.source), self._clock(c.target)

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import click
 
-from cosim.exceptions import CosimError, UnitFailure
+from cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
 from fmus.binaries import NotCompiled
 from fmus.compile import CompilationError, UnknownPlatform
 from scenarios.exit_status import BAD_CALL, UNIT_FAILED
@@ -25,16 +25,24 @@ class UnitLost(click.ClickException):
     exit_code = UNIT_FAILED
 
 
+class RunNotWritten(click.ClickException):
+    """A run whose record or report cannot be written to its end, as on a full disk; what was written is kept."""
+
+    exit_code = UNIT_FAILED
+
+
 @contextmanager
 def told_in_one_line() -> Generator[None, None, None]:
     """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback.
 
-    A unit that does not answer at all is told as UnitLost.
+    A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten.
     """
     try:
         yield
     except UnitFailure as e:
         raise UnitLost(str(e)) from e
+    except RecordNotWritten as e:
+        raise RunNotWritten(str(e)) from e
     except (CosimError, BadParameter, BadRunFolder, NotCompiled, UnknownPlatform) as e:
         raise BadCall(str(e)) from e
     except CompilationError as e:

@@ -40,7 +40,7 @@ Exit status
   0    the task succeeded
   1    the run ended, but the task failed
   2    bad call or bad input; nothing was written
-  3    a unit failed, or the run was killed; what was recorded until then is kept
+  3    a unit failed, the run was killed, or the disk is full; what was recorded until then is kept
   130  aborted with Ctrl-C: before the run, or by a second one during it
 
 \b

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import UnitFailure
+from cosim.exceptions import RecordNotWritten, UnitFailure
 from cosim.failures import UnitCrashed, UnitHung
 from cosim.heartbeat import Call, Heartbeat
 from cosim.record.complete_record import complete_record
@@ -17,7 +17,7 @@ from scenarios.experiment import Outcome
 from scenarios.listing import print_summary
 from scenarios.record import Record
 from scenarios.report import write_report
-from scenarios.run_folder import RunFolder
+from scenarios.run_folder import RunFolder, told_if_not_written
 
 _BY_SIGNAL = 128  # what shells add to a signal's number
 
@@ -42,7 +42,11 @@ def tell_death(heartbeat: Heartbeat, number: int | None, status: int, wall: floa
     if "folder" in facts:
         data = _data(call, heartbeat.time, number, status) if failure is None else failure.as_data()
         reason = told if failure is None else f"a unit failed: {failure.cause}"
-        _complete(facts, {"reason": reason, "wall_seconds": wall, "failure": data}, failure)
+        try:
+            with told_if_not_written(Path(facts["folder"])):
+                _complete(facts, {"reason": reason, "wall_seconds": wall, "failure": data}, failure)
+        except RecordNotWritten as e:
+            sys.stderr.write(f"{e}\n")
     return UNIT_FAILED if failure is not None or "folder" in facts else _BY_SIGNAL + (number or 0)
 
 

@@ -4,6 +4,7 @@ import sys
 from typing import NoReturn
 
 from scenarios.exit_status import ABORTED
+from scenarios.standard_streams import open_standard_streams
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may end the process that they are in."""
@@ -11,6 +12,7 @@ _SUPERVISED = ("run", "resume")
 
 def main() -> None:
     """Run the command; loading it takes a second or so, in which it can be aborted like later."""
+    open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
             from scenarios.supervisor import can_supervise, run_to_end, supervise

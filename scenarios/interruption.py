@@ -1,5 +1,6 @@
 """Ctrl-C: before a run it aborts at once; during a run it first asks the run to end, then aborts it."""
 
+import functools
 import os
 import signal
 import socket
@@ -11,12 +12,17 @@ from typing import Any
 from scenarios.exit_status import ABORTED
 from scenarios.supervisor import leave
 
+_ENDING = [n for n in (signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
+"""Signals that end a run after its step, as of a batch system or of a terminal that is closed."""
+
 _GRACE = 2.0
 """How long Python gets to act on an interrupt before the process is ended, s; a unit's native code may never return."""
 
 
 class Interruption:
-    """Takes SIGINT and SIGTERM over. Use it as a context manager in the main thread; if aborted it exits with 130.
+    """Takes SIGINT, SIGTERM and SIGHUP over. Use it as a context manager in the main thread.
+
+    If aborted it exits with 130. Of the other two, one that is ignored, as under nohup, stays so.
 
     Until `begin` the first signal raises KeyboardInterrupt. After it the first only sets `asked`, so that the step
     under way is finished and the record stays whole; the second puts the former handler back and raises
@@ -55,13 +61,16 @@ class Interruption:
         ours, pythons = socket.socketpair()
         pythons.setblocking(False)
         self._before = signal.signal(signal.SIGINT, self._take)
-        term_before = signal.signal(signal.SIGTERM, self._end)
+        ending = {n: signal.getsignal(n) for n in _ENDING}
+        ending = {n: handler for n, handler in ending.items() if handler is not signal.SIG_IGN}
+        for number in ending:
+            signal.signal(number, self._end)
         wakeup_before = signal.set_wakeup_fd(pythons.fileno(), warn_on_full_buffer=False)
         listener = threading.Thread(target=self._listen, args=(ours,), daemon=True)
         listener.start()
         self._undo = [
             lambda: signal.signal(signal.SIGINT, self._before),
-            lambda: signal.signal(signal.SIGTERM, term_before),
+            *(functools.partial(signal.signal, number, handler) for number, handler in ending.items()),
             lambda: signal.set_wakeup_fd(wakeup_before),
             pythons.close,  # which ends the listener
             listener.join,
@@ -89,7 +98,7 @@ class Interruption:
         raise KeyboardInterrupt
 
     def _end(self, number: int, frame: FrameType | None) -> None:
-        """Let SIGTERM, as of a batch system, end a run that has begun as one Ctrl-C does."""
+        """Let one of `_ENDING` end a run that has begun as one Ctrl-C does."""
         if self._running:
             self.asked = True
         else:

@@ -75,6 +75,8 @@ class LeftRun:
             raise BadRunFolder(self.folder.path, "the run still goes on") from e
         except FileNotFoundError:  # it ended before it recorded
             return 0
+        except OSError as e:
+            raise BadRunFolder(self.folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 
     def _check_versions(self, before: Mapping[str, str]) -> None:
         here = versions()

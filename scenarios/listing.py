@@ -7,19 +7,24 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from cosim.block_description import describe
 from cosim.start_values import range_of
-from cosim.stepping.pacing import PaceReport
 from cosim.variable import Causality, Kind, Variable
 from fmus.build import import_block
 from fmus.catalog import UNITS, Entry
 from scenarios.catalog import SCENARIOS, SYSTEMS
 from scenarios.console import open_console
+from scenarios.conversions import told_conversion
 from scenarios.ended import Ended
 from scenarios.experiment import Experiment
+from scenarios.master_rows import pace_report
 from scenarios.report import told
 from scenarios.run_folder import RunFolder
+
+_MOST_CONVERSIONS = 8
+"""Conversions of units that the end of a run tells on the terminal."""
 
 
 def print_catalog() -> None:
@@ -70,11 +75,19 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
     rows = [(metrics[n]["description"] or n, told(metrics[n])) for n in headline if n in metrics]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
     if summary.get("pace"):
-        rows.append(("deadlines missed", str(PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"}))))
+        rows.append(("deadlines missed", str(pace_report(summary))))
+    rows += _conversion_rows(folder)
     _print_rows(console, rows)
     console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
     if folder.checkpoint.exists():
         console.print(f"to go on: handover resume {shlex.quote(str(folder.path))}", markup=False, soft_wrap=True)
+
+
+def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
+    told = [told_conversion(c) for c in folder.read_run().get("conversions", [])]
+    left = len(told) - _MOST_CONVERSIONS
+    more = [(f"{left} conversions more", "in the report")] if left > 0 else []
+    return [(f"converted: {ends}", change) for ends, change in told[:_MOST_CONVERSIONS]] + more
 
 
 def _allowed(v: Variable) -> str:
@@ -95,7 +108,7 @@ def _start_of(v: Variable) -> str:
 def _print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
     table = Table.grid(padding=(0, 2))
     for row in rows:
-        table.add_row("", *row)
+        table.add_row("", *map(Text, row))  # brackets in names are no markup
     console.print(table)
 
 

@@ -7,8 +7,16 @@ from typing import Any
 
 import jinja2
 
+from scenarios.conversions import told_conversion
 from scenarios.experiment import Figure
-from scenarios.run_folder import RunFolder
+from scenarios.master_rows import master_rows
+from scenarios.run_folder import RunFolder, write_whole
+
+UnitRow = tuple[str, str, str, int | None, float | None]
+"""Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
+
+_IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")
+"""Metrics that have a place in other tables."""
 
 
 def write_report(
@@ -17,18 +25,18 @@ def write_report(
     headline: Sequence[str],
     summary: Mapping[str, Any],
     parameters: Sequence[tuple[str, str, str]],
-    units: Sequence[tuple[str, str, str, int, float]],
+    units: Sequence[UnitRow],
     figures: Sequence[Figure],
 ) -> None:
-    """Write `report.html`: verdict, figures of merit, parameters, units with their CPU time, and the figures.
+    """Write `report.html`: verdict, failure, figures of merit, parameters, units with their CPU time, master, figures.
 
     Args:
-        folder: the run's folder; the figures are in it.
+        folder: the run's folder, with `run.json`; the figures are in it.
         title: the scenario's.
         headline: names of the figures of merit that are shown first.
         summary: what is in `summary.json`.
         parameters: name, value with unit, and description of each parameter.
-        units: name, FMU, step, number of steps and CPU seconds of each unit.
+        units: see `UnitRow`.
         figures: names and captions.
     """
     source = resources.files("scenarios").joinpath("report.html").read_text(encoding="utf-8")
@@ -41,9 +49,12 @@ def write_report(
         summary=summary,
         parameters=parameters,
         units=units,
+        master=master_rows(summary),
+        conversions=[told_conversion(c) for c in folder.read_run().get("conversions", [])],
+        failure=summary.get("failure"),
         pictures=pictures,
     )
-    folder.report.write_text(page, encoding="utf-8")
+    write_whole(folder.report, page)
 
 
 def told(metric: Mapping[str, Any]) -> str:
@@ -61,9 +72,9 @@ def told(metric: Mapping[str, Any]) -> str:
 
 
 def _in_order(metrics: Mapping[str, Any], headline: Sequence[str]) -> list[tuple[str, Any]]:
-    """Return the headline's metrics, then the others but the units' CPU times, which have a table of their own."""
+    """Return the headline's metrics, then the others but those that have a place in other tables."""
     first = [n for n in headline if n in metrics]
-    others = [n for n in metrics if n not in headline and not n.startswith(("cpu_", "pace_"))]
+    others = [n for n in metrics if n not in headline and not n.startswith(_IN_TABLES)]
     return [(n, metrics[n]) for n in first + others]
 
 

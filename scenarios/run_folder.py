@@ -10,7 +10,7 @@ from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from cosim.exceptions import one_line
+from cosim.exceptions import RecordNotWritten, one_line
 from cosim.record.file_lock import FileLocked, folder_locked
 
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
@@ -110,7 +110,7 @@ class RunFolder:
             yield
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
-        """Write `summary.json`."""
+        """Write `summary.json`; this and what follows raise `RecordNotWritten` where they cannot."""
         _write_json(self.path / "summary.json", summary)
 
     def write_run(self, configuration: Mapping[str, Any], fmus: Mapping[str, Path]) -> None:
@@ -155,6 +155,31 @@ class RunFolder:
         return cast(dict[str, Any], content)
 
 
+@contextlib.contextmanager
+def told_if_not_written(path: Path) -> Generator[None, None, None]:
+    """Tell as RecordNotWritten that a file could not be written."""
+    try:
+        yield
+    except OSError as e:
+        raise RecordNotWritten(path, e.strerror or str(e)) from e
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file that is whole or as it was, whenever the process ends.
+
+    Raises:
+        RecordNotWritten: it cannot be written.
+    """
+    unfinished = path.with_name(path.name + ".part")
+    with told_if_not_written(path):
+        try:
+            unfinished.write_text(text, encoding="utf-8")
+            os.replace(unfinished, path)
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
+
+
 def sha256_of(file: Path) -> str:
     """Return a file's hash."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
@@ -173,7 +198,4 @@ def _version(package: str) -> str:
 
 
 def _write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a file that is whole or not there, whenever the process ends."""
-    unfinished = path.with_name(path.name + ".part")
-    unfinished.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    os.replace(unfinished, path)
+    write_whole(path, json.dumps(content, indent=2, allow_nan=False) + "\n")

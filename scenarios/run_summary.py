@@ -10,6 +10,7 @@ import numpy as np
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
 from scenarios.experiment import Metric, Outcome
+from scenarios.report import UnitRow
 from scenarios.resumption import Spent
 from scenarios.task import Task
 
@@ -67,12 +68,13 @@ def parameter_rows(task: Task) -> list[tuple[str, str, str]]:
     return rows
 
 
-def unit_rows(master: Master) -> list[tuple[str, str, str, int, float]]:
-    """Return name, FMU, period, number of steps and CPU seconds of each unit."""
-    rows: list[tuple[str, str, str, int, float]] = []
+def unit_rows(master: Master) -> list[UnitRow]:
+    """Return what is told of each unit."""
+    rows: list[UnitRow] = []
     for name, unit in master.system.units.items():
         d = unit.description
-        period = f"{float(unit.period) * 1000:.4g} ms"
+        follows = master.steps is not None and not unit.sampled
+        period = "varies" if follows else f"{float(unit.period) * 1000:.4g} ms"
         rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
     return rows
 

@@ -13,12 +13,14 @@ from cosim.master import Master
 from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
+from scenarios.conversions import conversions_of
 from scenarios.ended import Ended
 from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
-from scenarios.report import write_report
+from scenarios.report import UnitRow, write_report
 from scenarios.resumption import Resumption, Spent, pack
+from scenarios.run_folder import told_if_not_written
 from scenarios.run_metrics import run_metrics
 from scenarios.run_summary import configuration, files_and_forms, parameter_rows, summary_of, unit_rows
 from scenarios.supervisor import heartbeat_of_run
@@ -37,6 +39,7 @@ def carry_out(
         WiringError, ScheduleError, InvalidFmu, UnitRefused, StateNotSaved, BadRunFolder: before anything was written.
         UnitHung: a unit does not return as it is loaded or initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
+        RecordNotWritten: there is no room for what it leaves; what was recorded stays.
     """
     experiment, parameters = task.experiment, task.parameters
     spent = Spent() if resumption is None else resumption.spent
@@ -75,13 +78,14 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     if resumption is None:
         task.folder.make()
     fmus = {n: u.description.path for n, u in master.system.units.items()}
-    task.folder.write_run({**configuration(task), **files_and_forms(task)}, fmus)
+    told = {**configuration(task), **files_and_forms(task), "conversions": conversions_of(master.system)}
+    task.folder.write_run(told, fmus)
     master.heartbeat.tell(
         folder=str(task.folder.path),
         configuration=configuration(task),
         title=task.experiment.title,
         parameters=parameter_rows(task),
-        units=unit_rows(master),
+        units=[(*row[:3], None, None) for row in unit_rows(master)],
     )
 
 
@@ -137,7 +141,8 @@ def _conclude(
         task.folder.add_to_run(failure=failure.as_data())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
-    _present(task, watch, summary, unit_rows(master))
+    with told_if_not_written(task.folder.path):
+        _present(task, watch, summary, unit_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
@@ -150,9 +155,7 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
     return seen
 
 
-def _present(
-    task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[tuple[str, str, str, int, float]]
-) -> None:
+def _present(task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[UnitRow]) -> None:
     figures = []
     if task.folder.signals.exists():
         record = Record(task.folder.signals)

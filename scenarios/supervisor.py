@@ -53,7 +53,7 @@ def supervise(command: Callable[[], Any]) -> NoReturn:
     began = time.monotonic()
     alive, lives = os.pipe()
     parent_alive, parent_lives = os.pipe()
-    heard = [signal.SIGINT, signal.SIGTERM, signal.SIGTSTP, signal.SIGCONT]
+    heard = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGCONT]
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
     child = os.fork()
     if child == 0:
@@ -116,6 +116,8 @@ def _pass_on(child: int) -> None:
 
     signal.signal(signal.SIGINT, tell)
     signal.signal(signal.SIGTERM, tell)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+        signal.signal(signal.SIGHUP, tell)
     if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL:
         signal.signal(signal.SIGTSTP, stop)
 

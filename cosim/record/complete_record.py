@@ -65,8 +65,12 @@ def finish_record(path: Path, formats: Sequence[str], batches: Batches) -> int:
     for name in dict.fromkeys(("parquet", *formats)):
         made = path if name == "parquet" else path.with_suffix(f".{name}")
         unfinished = made.with_name(made.name + ".part")
-        RECORD_FORMATS[name](unfinished, schema, batches())
-        os.replace(unfinished, made)
+        try:
+            RECORD_FORMATS[name](unfinished, schema, batches())
+            os.replace(unfinished, made)
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
     stream_of(path).unlink()
     return _rows_in(path)
 

@@ -3,12 +3,13 @@ import zipfile
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
 
-from cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused, WiringError
+from cosim.exceptions import BadOptions, InvalidFmu, UnitFailure, UnitRefused, WiringError
 from cosim.master import Master
 from cosim.master_options import Algorithm, MasterOptions
 from cosim.record.recorder import Recorder
@@ -258,3 +259,9 @@ def test_pictures_and_numbers_can_be_read_after_the_run(fmu: FmuOf):
     del master
     assert signals["counter.picture"].tolist() == [5] * 24
     assert int(signals["counter.n"]) == 5
+
+
+def test_an_algorithm_is_told_from_its_name():
+    name: Any = "newton"
+    with pytest.raises(BadOptions, match=r"algorithm = 'newton': one of Algorithm\.JACOBI, .* is right"):
+        MasterOptions(algorithm=name)

@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -148,3 +149,21 @@ def test_a_proposed_step_is_taken_as_it_is_meant(told: float, meant: Fraction):
 def test_large_integers_keep_their_digits():
     seed = Variable(name="seed", kind=Kind.INTEGER, causality=Causality.PARAMETER, start=0)
     assert numbers_of(seed, 2**53 + 1).tolist() == [2**53 + 1]
+
+
+def test_a_port_is_told_from_a_name(fmu: FmuOf):
+    s = System()
+    mass = s.add("mass", str(fmu("Mass")))
+    wrong: Any = "mass.x"
+    with pytest.raises(TypeError, match=r"'mass\.x' is not a port: give unit\.y\.NAME"):
+        s.connect(wrong, mass.u.f)
+    assert not s.connections
+
+
+def test_a_period_must_be_exact_and_above_0(fmu: FmuOf):
+    s = System()
+    inexact: Any = 0.01
+    with pytest.raises(TypeError, match=r"mass: period = 0\.01 is not exact.*give Fraction\('1/100'\)"):
+        s.add("mass", fmu("Mass"), period=inexact)
+    s.add("mass", fmu("Mass"), period=Fraction(0))
+    assert faults_of(s) == ("mass: its communication step is 0 s; give one that is above 0 s",)

@@ -74,6 +74,25 @@ def test_during_a_run_the_first_interrupt_asks_and_the_second_aborts():
     assert caught.value.code == 130
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no such signal")
+def test_a_terminal_that_is_closed_ends_a_run_unless_it_was_told_to_ignore_that():
+    before = signal.getsignal(signal.SIGHUP)
+    with Interruption() as interruption:
+        interruption.begin()
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert interruption.asked
+    assert signal.getsignal(signal.SIGHUP) is before
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        with Interruption() as interruption:
+            interruption.begin()
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not interruption.asked
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_without_an_interrupt_nothing_changes():
     before = signal.getsignal(signal.SIGINT)
     with Interruption() as interruption:

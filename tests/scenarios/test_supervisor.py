@@ -58,7 +58,7 @@ def test_a_parent_that_is_killed_takes_its_child_with_it(arguments: tuple[str | 
     assert not lives(child)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_to_the_parent_ends_the_run_after_its_step(
     number: signal.Signals, arguments: tuple[str | Path, ...], tmp_path: Path
 ):

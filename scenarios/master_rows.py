@@ -1,0 +1,42 @@
+"""How a run's units were coupled, and how that went, in rows that one reads."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from cosim.master_options import Algorithm
+from cosim.stepping.pacing import PaceReport
+
+
+def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return name and value of what `summary.json` says of the master."""
+    master, metrics = summary["master"], summary["metrics"]
+    rows = [("algorithm", master["algorithm"]), ("extrapolation", master["extrapolation"])]
+    if "iterations" in metrics or Algorithm(master["algorithm"]).iterates:
+        rows.append(("tolerance of iterations", f"{master['tolerance']:g}, after at most {master['iterations']}"))
+    if "iterations" in metrics:
+        mean, rollbacks = (metrics[name]["value"] for name in ("iterations", "rollbacks"))
+        rows.append(("iterations", f"{mean:.3g} a step, {rollbacks:.0f} rollbacks"))
+    control = master["adaptive"]
+    if control:
+        tolerated = f"{control['relative']:g}, and {control['absolute']:g} of nominal values"
+        rows.append(("tolerated step error", tolerated))
+    if summary.get("steps"):
+        rows.append(("steps", _steps(summary["steps"])))
+    if master["repeat_discarded"]:
+        rows.append(("steps that a unit discards", "repeated shorter by all"))
+    if summary.get("pace"):
+        report = pace_report(summary)
+        rows += [("pace", f"{report.pace:g} x real time"), ("deadlines missed", str(report))]
+    return rows
+
+
+def pace_report(summary: Mapping[str, Any]) -> PaceReport:
+    """Return how a run kept its pace, of which `summary.json` tells."""
+    return PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"})
+
+
+def _steps(steps: Mapping[str, Any]) -> str:
+    told = f"{steps['accepted']} accepted, {steps['rejected']} rejected"
+    if not steps["accepted"]:
+        return told
+    return f"{told}, {steps['shortest'] * 1000:.3g} to {steps['longest'] * 1000:.3g} ms"

@@ -1,0 +1,40 @@
+"""A disk that is full at one of the files of a run: told in a line, with status 3, and nothing is half there."""
+
+import errno
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
+
+from failing_systems import failing_ssp
+
+from scenarios.command import main
+from scenarios.record import Record
+
+FILES = ["run.json", "signals.csv", "summary.json", "report.html"]
+
+
+@pytest.mark.parametrize("full", FILES)
+def test_a_full_disk_is_told_and_what_was_recorded_is_kept(full: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    replace = os.replace
+
+    def refuse(source: Any, target: Any) -> None:
+        if Path(target).name == full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(source), str(target))
+        replace(source, target)
+
+    file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
+    monkeypatch.setattr(os, "replace", refuse)
+    result = CliRunner().invoke(main, ["run", str(file), "--format", "csv", "--out", str(out)])
+    told = out / ("signals.parquet" if full == "signals.csv" else full)
+    assert (result.exit_code, result.output) == (3, f"Error: {told} cannot be written: No space left on device\n")
+    there = {p.name for p in out.iterdir()}
+    assert full not in there
+    assert not any(name.endswith(".part") for name in there)
+    if full != "run.json":
+        assert Record(out / "signals.parquet").time[-1] == 1.0

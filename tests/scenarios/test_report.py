@@ -1,0 +1,129 @@
+"""What the end of a run and its report tell of the master: conversions, steps, pace, failures."""
+
+import json
+import sys
+from fractions import Fraction
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
+
+from failing_systems import failing_ssp, native_fmu
+
+from cosim.ssp.writing import write_ssp
+from cosim.system import System
+from scenarios.command import main
+from scenarios.master_rows import master_rows
+from scenarios.report import write_report
+from scenarios.run_folder import RunFolder
+
+
+class Page(HTMLParser):
+    """The rows of a page's tables, its headings, and its other texts."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.headings: list[str] = []
+        self.pre = ""
+        self._tag = ""
+        self.feed(file.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:  # noqa: ARG002
+        self._tag = tag
+        if tag == "tr":
+            self.rows.append([])
+
+    def handle_endtag(self, tag: str) -> None:  # noqa: ARG002
+        self._tag = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._tag in ("td", "th"):
+            self.rows[-1].append(data)
+        elif self._tag == "h2":
+            self.headings.append(data)
+        elif self._tag == "pre":
+            self.pre += data
+
+
+def run(file: Path, out: Path, *arguments: str) -> str:
+    done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.mark.parametrize("pairs", [1, 4])
+def test_conversions_are_told_in_run_json_terminal_and_report(pairs: int, tmp_path: Path):
+    s = System()
+    for i in range(pairs):
+        a, b = s.add(f"a{i}", native_fmu("workshop", 3)), s.add(f"b{i}", native_fmu("si", 3))
+        for name in ("angle", "length", "temperature"):
+            s.connect(getattr(a.y, name), getattr(b.u, f"{name}_in"))
+    file = write_ssp(s, tmp_path / "x.ssp", "x", Fraction(1))
+    shown = run(file, tmp_path / "out")
+    told = json.loads((tmp_path / "out" / "run.json").read_text())["conversions"]
+    assert len(told) == 3 * pairs
+    assert told[0] == {
+        "source": "a0.angle",
+        "unit": "deg",
+        "target": "b0.angle_in",
+        "target_unit": "rad",
+        "factor": 0.017453292519943295,
+        "offset": 0.0,
+    }
+    lines = [" ".join(line.split()) for line in shown.splitlines()]
+    assert "converted: a0.angle (deg) -> b0.angle_in (rad) times 0.0174533" in lines
+    assert sum(line.startswith("converted: ") for line in lines) == min(3 * pairs, 8)
+    assert ("4 conversions more in the report" in lines) == (pairs == 4)
+    rows = Page(tmp_path / "out" / "report.html").rows
+    assert ["a0.temperature (degC) -> b0.temperature_in (K)", "plus 273.15"] in rows
+    assert sum(" -> " in row[0] for row in rows if row) == 3 * pairs
+
+
+def test_the_report_tells_how_units_were_coupled(tmp_path: Path):
+    file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
+    run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear")
+    page, summary = Page(out / "report.html"), json.loads((out / "summary.json").read_text())
+    rows = dict(row for row in page.rows if len(row) == 2)
+    assert rows["algorithm"] == "gauss-seidel"
+    assert rows["extrapolation"] == "linear"
+    assert rows["tolerated step error"].startswith("0.001, and 1e-06")
+    assert rows["steps"].startswith(
+        f"{summary['steps']['accepted']} accepted, {summary['steps']['rejected']} rejected, "
+    )
+    assert rows["pace"] == "1000 x real time"
+    assert f"of {summary['pace']['deadlines']}" in rows["deadlines missed"]
+    assert "Parameters" not in page.headings
+    assert {row[2] for row in page.rows if len(row) == 5} == {"step", "varies"}
+
+
+def test_iterations_are_told_once():
+    metrics = {"iterations": {"value": 2.5}, "rollbacks": {"value": 7.0}}
+    master = {"algorithm": "newton", "tolerance": 1e-8, "iterations": 100, "extrapolation": "hold", "adaptive": None,
+              "repeat_discarded": True}  # fmt: skip
+    assert master_rows({"master": master, "metrics": metrics})[2:] == [
+        ("tolerance of iterations", "1e-08, after at most 100"),
+        ("iterations", "2.5 a step, 7 rollbacks"),
+        ("steps that a unit discards", "repeated shorter by all"),
+    ]
+
+
+def test_a_failure_s_log_is_shown_and_what_is_not_known_is_not_zero(tmp_path: Path):
+    folder = RunFolder(tmp_path / "out")
+    folder.make()
+    folder.write_run({}, {})
+    master = {"algorithm": "jacobi", "tolerance": 1e-8, "iterations": 100, "extrapolation": "hold", "adaptive": None,
+              "repeat_discarded": False}  # fmt: skip
+    summary = {
+        "scenario": "x.ssp", "seed": 0, "simulated_seconds": 0.2, "wall_seconds": 1.0, "success": False,
+        "reason": "a unit failed", "metrics": {}, "master": master,
+        "failure": {"instance": "arm", "log": ["tendon <3> tore", "sorry"]},
+    }  # fmt: skip
+    write_report(folder, "x", (), summary, (), [("arm", "Arm (FMI 3)", "10 ms", None, None)], ())
+    page = Page(folder.report)
+    assert page.pre == "tendon <3> tore\nsorry"
+    assert page.headings == ["What arm logged last", "Master", "Units"]
+    assert ["arm", "Arm (FMI 3)", "10 ms", "–", "–"] in page.rows
