@@ -19,7 +19,7 @@ from scenarios.console import open_console
 from scenarios.conversions import told_conversion
 from scenarios.ended import Ended
 from scenarios.experiment import Experiment
-from scenarios.master_rows import pace_report
+from scenarios.master_rows import pace_rows
 from scenarios.report import told
 from scenarios.run_folder import RunFolder
 
@@ -74,8 +74,7 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
     metrics = summary["metrics"]
     rows = [(metrics[n]["description"] or n, told(metrics[n])) for n in headline if n in metrics]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
-    if summary.get("pace"):
-        rows.append(("deadlines missed", str(pace_report(summary))))
+    rows += pace_rows(summary)
     rows += _conversion_rows(folder)
     _print_rows(console, rows)
     console.print(f"report: {folder.report}", markup=False, soft_wrap=True)

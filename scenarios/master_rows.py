@@ -24,15 +24,16 @@ def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         rows.append(("steps", _steps(summary["steps"])))
     if master["repeat_discarded"]:
         rows.append(("steps that a unit discards", "repeated shorter by all"))
-    if summary.get("pace"):
-        report = pace_report(summary)
-        rows += [("pace", f"{report.pace:g} x real time"), ("deadlines missed", str(report))]
-    return rows
+    return rows + pace_rows(summary)
 
 
-def pace_report(summary: Mapping[str, Any]) -> PaceReport:
-    """Return how a run kept its pace, of which `summary.json` tells."""
-    return PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"})
+def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return name and value of how a run kept its pace, if it was to keep one."""
+    if not summary.get("pace"):
+        return []
+    report = PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"})
+    reached = "" if report.reached is None else f" asked for, {report.reached:.3g} x reached"
+    return [("pace", f"{report.pace:g} x real time{reached}"), ("deadlines missed", str(report))]
 
 
 def _steps(steps: Mapping[str, Any]) -> str:

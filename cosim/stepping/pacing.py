@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 _SLICE = 0.1  # s, after which a wait asks whether the run is to end
@@ -18,6 +18,7 @@ class PaceReport:
         missed: those that were reached too late.
         largest_lateness: seconds of wall time by which the worst of them was late; 0 where none was.
         latest_at: simulated time of that one in seconds; None where none was late.
+        reached: simulated seconds per second of wall time until the last deadline; None before the first.
     """
 
     pace: float
@@ -25,6 +26,7 @@ class PaceReport:
     missed: int
     largest_lateness: float
     latest_at: float | None
+    reached: float | None = None
 
     @property
     def share(self) -> float:
@@ -38,10 +40,10 @@ class PaceReport:
     def __str__(self) -> str:
         if not self.missed:
             return f"none of {self.deadlines}"
-        return (
-            f"{self.missed} of {self.deadlines} ({self.share:.1%}), "
-            f"at most {self.largest_lateness * 1000:.3g} ms late, at t = {self.latest_at:.6g} s"
-        )
+        late = self.largest_lateness
+        told = f"{late * 1000:.3g} ms" if late < 0.1 else f"{late:.2f} s"
+        share = f"{self.missed} of {self.deadlines} ({self.share:.1%})"
+        return f"{share}, at most {told} late, at t = {self.latest_at:.6g} s"
 
 
 class Pacer:
@@ -81,6 +83,9 @@ class Pacer:
         while left > 0 and not ended():
             self._sleep(min(left, _SLICE))
             left = deadline - self._clock()
+        spent = self._clock() - self._w_0
+        if spent > 0:
+            self._report = replace(self._report, reached=(t - self._t_0) / spent)
 
     def _count(self, t: float, lateness: float) -> None:
         r = self._report

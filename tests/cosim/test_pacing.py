@@ -64,6 +64,19 @@ def test_a_missed_deadline_is_counted_and_the_others_stay_where_they_are():
     assert "2 of 6 (33.3%), at most 7" in str(report)
 
 
+@pytest.mark.parametrize(
+    ("work", "told"), [(0.0604, "at most 10.4 ms late"), (1.11, "at most 1.06 s late"), (2000.0, "1999.95 s late")]
+)
+def test_lateness_is_told_in_a_unit_that_reads_well(work: float, told: str):
+    assert told in str(paced([work])[0])
+
+
+def test_it_tells_how_fast_it_went():
+    assert paced([0.01] * 100)[0].reached == pytest.approx(1.0, abs=0.001)
+    assert paced([0.2] * 10)[0].reached == pytest.approx(0.05 / 0.2)
+    assert paced([])[0].reached is None
+
+
 def test_it_sleeps_until_the_deadline_at_once_and_not_in_a_loop():
     _, _, clock = paced([0.01] * 100)
     assert len(clock.slept) == 100
