@@ -104,7 +104,7 @@ def run(
             seed=seed,
             fmus=fmus,
             folder=folder,
-            formats=formats,
+            formats=tuple(dict.fromkeys(formats)),
             every=every,
             source=source,
             options=options,

@@ -36,7 +36,7 @@ def error_at_end(out: Path) -> float:
 
 def test_what_is_chosen_is_done_and_told(ssp: Path, tmp_path: Path):
     chosen = ("--algorithm", "newton", "--tolerance", "1e-6", "--iterations", "20", "--extrapolation", "linear")
-    result = run(ssp, tmp_path / "chosen", *chosen)
+    result = run(ssp, tmp_path / "chosen", *chosen, "--format", "csv", "--format", "csv")
     assert result.exit_code == 0, result.output
     assert error_at_end(tmp_path / "chosen") < 0.005  # it is 0.5 with the defaults
     expected = {
@@ -48,6 +48,7 @@ def test_what_is_chosen_is_done_and_told(ssp: Path, tmp_path: Path):
         "repeat_discarded": False,
     }
     assert read(tmp_path / "chosen", "run.json")["master"] == expected
+    assert read(tmp_path / "chosen", "run.json")["formats"] == ["csv"]
     assert read(tmp_path / "chosen", "summary.json")["master"] == expected
     assert "steps" not in read(tmp_path / "chosen", "summary.json")
 
