@@ -85,7 +85,7 @@ class Interruption:
         for undo in self._undo:
             undo()
         if self._aborted:
-            _say("aborted")
+            _say("Aborted!")
             raise SystemExit(ABORTED) from None
 
     def _take(self, _number: int, _frame: FrameType | None) -> None:
@@ -113,10 +113,14 @@ class Interruption:
             if not aborts:
                 _say("ending after this step; Ctrl-C again to abort")
             elif not self._handled.wait(_GRACE):
-                _say("aborted; a unit did not return")
+                _say("Aborted! A unit did not return.")
                 leave(ABORTED)
 
 
 def _say(line: str) -> None:
-    """Write to standard error past its buffer, which the signal may have interrupted."""
-    os.write(2, f"\n{line}\n".encode())
+    """Write to standard error past its buffer, which the signal may have interrupted.
+
+    On a terminal it begins a line, as ^C or a progress bar is on the one before.
+    """
+    begin = "\n" if os.isatty(2) else ""
+    os.write(2, f"{begin}{line}\n".encode())

@@ -61,6 +61,12 @@ def test_the_first_interrupt_before_a_run_aborts():
     assert caught.value.code == 130
 
 
+def test_what_is_said_takes_a_line_and_none_before(capfd: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit):
+        interrupt(1)
+    assert capfd.readouterr().err == "Aborted!\n"
+
+
 def test_an_interrupt_that_was_taken_for_a_failure_aborts_all_the_same():
     with pytest.raises(SystemExit) as caught:
         swallow()
@@ -125,5 +131,5 @@ def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path,
     os.kill(going.pid, signal.SIGINT)
     _, errors = going.communicate(timeout=60)
     assert going.returncode == 130
-    assert "aborted" in errors
+    assert "Aborted!" in errors
     assert "Traceback" not in errors

@@ -86,7 +86,7 @@ def test_ctrl_c_in_a_terminal_is_heard_once(arguments: tuple[str | Path, ...], t
     os.close(here)
     assert going.wait(60) == 1, shown
     assert shown.count(b"ending after this step") == 1
-    assert b"aborted" not in shown
+    assert b"Aborted" not in shown
     assert b"simulated" in shown
 
 
