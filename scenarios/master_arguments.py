@@ -71,8 +71,10 @@ _OPTIONS = (
         "--adaptive",
         type=_Above0(),
         metavar="ERROR",
-        help="Let the step follow its error, with rollback: what a step may be wrong by, relative to a signal's"
-        " magnitude, such as 1e-4.  [default: fixed steps]",
+        help="Let the step follow its error, with rollback: what one step may be wrong by, relative to a signal's"
+        " magnitude, such as 1e-4; errors of steps add up over a run. Looked at are connected real outputs (all where"
+        " none is). `--extrapolation linear` pays here, with longer steps for the same error."
+        "  [default: fixed steps]",
     ),
     _step_option(
         "--adaptive-absolute",

@@ -21,7 +21,7 @@ from scenarios.ssp_run import UntilStop, experiment_of
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
 _STOP = _option(
     "--stop",
-    help="The run ends at the first communication point that is not before.  [default: the file's own stop time]",
+    help="When the run ends: at the first communication point at or after it.  [default: the file's own stop time]",
 )
 _STEP = _option("--step", help="Communication step of all units.  [default: what each FMU proposes]")
 
