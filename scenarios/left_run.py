@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from cosim.checkpoint import BadCheckpoint
 from cosim.exceptions import nearest
@@ -33,7 +33,7 @@ class LeftRun:
         if folder.read_summary().get("complete"):
             raise BadRunFolder(folder.path, "the run is complete; there is nothing to go on with")
         rows = self._complete()
-        self._check_versions(self._told.get("versions", {}))
+        self._check_versions(self._object("versions"))
         self.resumption: Resumption = unpack(folder.checkpoint)
         if rows < self.resumption.checkpoint.rows:
             counted = self.resumption.checkpoint.rows
@@ -67,6 +67,12 @@ class LeftRun:
             raise BadRunFolder(self.folder.path, f"its run.json is damaged: {type(e).__name__} {e}") from e
         self._check_fmus(task)
         return task
+
+    def _object(self, name: str) -> Mapping[str, Any]:
+        found = self._told.get(name, {})
+        if not isinstance(found, dict):
+            raise BadRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
+        return cast(Mapping[str, Any], found)
 
     def _complete(self) -> int:
         try:
@@ -104,7 +110,7 @@ class LeftRun:
     def _check_fmus(self, task: Task) -> None:
         system = task.experiment.build(task.parameters, task.seed, lambda unit: task.fmus[unit])
         here = {name: unit.description.path for name, unit in system.units.items()}
-        before = {name: unit.get("sha256") for name, unit in self._told["units"].items()}
+        before = {name: unit.get("sha256") for name, unit in self._object("units").items()}
         other = [f"{name} ({here[name]})" for name in here if before.get(name) != sha256_of(here[name])]
         if other:
             raise BadRunFolder(

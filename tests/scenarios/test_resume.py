@@ -163,6 +163,8 @@ def test_a_damaged_configuration_is_refused(copy: Path):
     assert_refused(copy, "its run.json is damaged")
     (copy / "run.json").write_text("[]")
     assert_refused(copy, "its run.json is damaged: it holds no JSON object")
+    (copy / "run.json").write_text('{"versions": []}')
+    assert_refused(copy, "its run.json is damaged: 'versions' is no object")
     (copy / "run.json").write_text("{}")
     assert_refused(copy, "the run began with other versions: python None (here ")
 
