@@ -21,7 +21,8 @@ _LEAST_ROWS, _MOST_ROWS = 256, 2**16
 def write_parquet(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> None:
     """Write Parquet; units, descriptions and enumerations' items are in the columns' metadata."""
     # Reals hardly repeat: a dictionary of them takes thrice the time and makes the file larger.
-    repeating: Any = [f.name for f in schema if not pa.types.is_floating(f.type)] or False
+    types: list[tuple[str, Any]] = list(zip(schema.names, schema.types, strict=True))
+    repeating: Any = [name for name, kind in types if not pa.types.is_floating(kind)] or False
     with pq.ParquetWriter(path, schema, use_dictionary=repeating) as file:
         for group in _row_groups(schema, batches):
             file.write_table(group, row_group_size=group.num_rows)
