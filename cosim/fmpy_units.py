@@ -7,15 +7,33 @@ import fmpy.fmi3
 
 
 def _read_once(base: Any) -> Any:
-    """Return a class of FMPy's that reads the types of its functions off itself once, not for each instance anew."""
+    """Return a class of FMPy's that looks its functions up once for a library, and their types once at all."""
     signatures: dict[str, tuple[Any, Any, Any]] = {}
+    loaded: dict[int, tuple[Any, Any]] = {}  # a library that units have loaded, and its functions, by its handle
+    users: dict[int, int] = {}
 
     class Unit(base):
         def _loadFunctions(self) -> None:
-            if not signatures:
+            handle: int = self.dll._handle
+            if handle in loaded:
+                self.dll, self._functions = loaded[handle]
+            elif signatures:
+                self._look_up()
+            else:
                 super()._loadFunctions()
                 signatures.update({n: (f.argnames, f.argtypes, f.restype) for n, f in self._functions.items()})
-                return
+            loaded.setdefault(handle, (self.dll, self._functions))
+            users[handle] = users.get(handle, 0) + 1
+
+        def freeLibrary(self) -> None:
+            handle: int = self.dll._handle
+            if handle in users:
+                users[handle] -= 1
+                if not users[handle]:  # what is loaded next may get the same handle
+                    del users[handle], loaded[handle]
+            super().freeLibrary()
+
+        def _look_up(self) -> None:
             for name, (names, types, returned) in signatures.items():
                 function = getattr(self.dll, name)
                 function.argnames, function.argtypes, function.restype = names, types, returned

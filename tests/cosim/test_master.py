@@ -154,7 +154,7 @@ def test_a_record_has_all_scalars_with_their_units(fmu: FmuOf, tmp_path: Path):
     assert record["counter.odd"].tolist() == [k % 2 == 1 for k in range(21)]
     assert record["counter.light"].tolist() == [1 + k % 2 for k in range(21)]
     assert record.unit("mass.v") == "m/s"
-    with pytest.raises(KeyError, match=r"did you mean mass\.x or mass\.v"):
+    with pytest.raises(KeyError, match=r"did you mean mass\.v or mass\.x"):
         record["mass.w"]
 
 
