@@ -2,7 +2,7 @@
 
 import enum
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from fractions import Fraction
 from typing import Any
 
@@ -65,18 +65,17 @@ class MasterOptions:
     pace: float | None = None
 
     def __post_init__(self) -> None:
-        faults = [
-            f"{name} = {value}: a finite number above 0 is right"
-            for name in ("tolerance", "call_limit", "pace")
-            if (value := getattr(self, name)) is not None and not 0 < value < math.inf
-        ]
-        kinds = {"algorithm": Algorithm, "extrapolation": Extrapolation}
-        for name, kind in kinds.items():
-            if not isinstance(value := getattr(self, name), kind):
-                names = ", ".join(f"{kind.__name__}.{item.name}" for item in kind)
-                faults.append(f"{name} = {value!r}: one of {names} is right")
-        if self.most_iterations < 1:
-            faults.append(f"most_iterations = {self.most_iterations}: a whole number from 1 on is right")
+        given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        right = {
+            "algorithm": (isinstance(given["algorithm"], Algorithm), f"one of {_names(Algorithm)}"),
+            "extrapolation": (isinstance(given["extrapolation"], Extrapolation), f"one of {_names(Extrapolation)}"),
+            "adaptive": (isinstance(given["adaptive"], AdaptiveStep | None), "None, or such as AdaptiveStep()"),
+            "most_iterations": (_is_above_0(given["most_iterations"], int), "a whole number from 1 on"),
+            "tolerance": (_is_above_0(given["tolerance"], int | float), "a finite number above 0"),
+            "call_limit": (_is_above_0(given["call_limit"], int | float, None), "None, or a finite number above 0"),
+            "pace": (_is_above_0(given["pace"], int | float, None), "None, or a finite number above 0"),
+        }
+        faults = [f"{name} = {given[name]!r}: {told} is right" for name, (fits, told) in right.items() if not fits]
         if faults:
             raise BadOptions(faults)
 
@@ -98,3 +97,11 @@ class MasterOptions:
     def order(self) -> int:
         """The power of the step with which the error of a run goes: see `Extrapolation`."""
         return 2 if self.extrapolation is Extrapolation.LINEAR else 1
+
+
+def _names(kind: type[enum.Enum]) -> str:
+    return ", ".join(f"{kind.__name__}.{item.name}" for item in kind)
+
+
+def _is_above_0(value: Any, kind: Any, *others: None) -> bool:
+    return value in others or (isinstance(value, kind) and 0 < value < math.inf)

@@ -35,7 +35,8 @@ class AdaptiveStepper:
     once.
 
     Communication points are whole ticks of a grid that divides the schedule's by a power of two, and every instant of
-    a sampled unit and the stop time is one of them.
+    a sampled unit and the stop time is one of them. What observers see there ends the second half: an output that is a
+    mean over the step is the mean over that half.
 
     Raises:
         StepTooSmall: from `depart`; the units are where the step began.

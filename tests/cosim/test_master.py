@@ -261,7 +261,15 @@ def test_pictures_and_numbers_can_be_read_after_the_run(fmu: FmuOf):
     assert int(signals["counter.n"]) == 5
 
 
-def test_an_algorithm_is_told_from_its_name():
-    name: Any = "newton"
-    with pytest.raises(BadOptions, match=r"algorithm = 'newton': one of Algorithm\.JACOBI, .* is right"):
-        MasterOptions(algorithm=name)
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("algorithm", "newton", r"algorithm = 'newton': one of Algorithm\.JACOBI, .* is right"),
+        ("adaptive", 1e-4, r"adaptive = 0\.0001: None, or such as AdaptiveStep\(\) is right"),
+        ("most_iterations", 2.5, r"most_iterations = 2\.5: a whole number"),
+        ("tolerance", "x", r"tolerance = 'x': a finite number"),
+    ],
+)
+def test_a_value_of_another_kind_is_told_with_what_would_be_right(option: str, value: Any, told: str):
+    with pytest.raises(BadOptions, match=told):
+        MasterOptions(**{option: value})
