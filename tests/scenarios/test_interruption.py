@@ -81,20 +81,16 @@ def test_during_a_run_the_first_interrupt_asks_and_the_second_aborts():
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows has no such signal")
-def test_a_terminal_that_is_closed_ends_a_run_unless_it_was_told_to_ignore_that():
-    before = signal.getsignal(signal.SIGHUP)
-    with Interruption() as interruption:
-        interruption.begin()
-        os.kill(os.getpid(), signal.SIGHUP)
-        assert interruption.asked
-    assert signal.getsignal(signal.SIGHUP) is before
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+@pytest.mark.parametrize(("handler", "asked"), [(signal.SIG_DFL, True), (signal.SIG_IGN, False)])
+def test_a_terminal_that_is_closed_ends_a_run_unless_that_is_ignored(handler: signal.Handlers, asked: bool):
+    """As under nohup, which ignores it for what it starts."""
+    before = signal.signal(signal.SIGHUP, handler)
     try:
         with Interruption() as interruption:
             interruption.begin()
             os.kill(os.getpid(), signal.SIGHUP)
-            assert not interruption.asked
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+            assert interruption.asked is asked
+        assert signal.getsignal(signal.SIGHUP) is handler
     finally:
         signal.signal(signal.SIGHUP, before)
 
