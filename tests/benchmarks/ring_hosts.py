@@ -19,7 +19,9 @@ from typing import Any, NamedTuple
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 
-STEPS, WARMING, REPEATS = 10_000, 500, 3
+STEPS, WARMING = 10_000, 500
+LEAST_REPEATS, MOST_REPEATS, ENOUGH = 3, 40, 0.5
+"""A host is measured again until that has taken enough seconds of CPU: what takes milliseconds is easily disturbed."""
 H = Fraction(1, 128)
 REFERENCE_U, REFERENCE_Y = 1, 2
 
@@ -218,14 +220,14 @@ HOSTS: dict[str, Host] = {
 def measured(host: Host, n: int, fmu: Path) -> dict[str, float]:
     """Return us of CPU per unit and macro step: of a step, the best of the repeats, and of ending it all."""
     spent: list[float] = []
-    steps = WARMING + REPEATS * STEPS
     with tempfile.TemporaryDirectory() as folder:
         with host(n, fmu, Path(folder)) as ring:
             ring.advance(WARMING)
-            for _ in range(REPEATS):
+            while len(spent) < LEAST_REPEATS or (len(spent) < MOST_REPEATS and sum(spent) < ENOUGH):
                 began = time.process_time()
                 ring.advance(STEPS)
                 spent.append(time.process_time() - began)
+            steps = WARMING + len(spent) * STEPS
             assert steps <= ring.read() <= steps + 1, f"{host.__name__}: {ring.read()} after {steps} steps"
             began = time.process_time()
         ended = time.process_time() - began

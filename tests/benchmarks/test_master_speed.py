@@ -65,9 +65,12 @@ def test_ring(benchmark: BenchmarkFixture, environment: dict[str, str], native_f
     for name, costs in spent.items():
         print(f"  {name:24}{costs['step']:8.3f}{costs['end']:8.3f}")
     benchmark.extra_info.update({name: costs["step"] for name, costs in spent.items()})
-    assert spent["ours, FMI 2"]["step"] <= TARGET
-    assert spent["ours, FMI 3"]["step"] <= TARGET
-    assert spent["ours, recorded"]["step"] <= TARGET_RECORDED
+    assert spent["ours, FMI 2"]["step"] <= spent["Ecos"]["step"] / 2
+    assert spent["ours, recorded"]["step"] <= spent["Ecos, CSV"]["step"] / 2
+    if benchmark.enabled:  # else other tests run beside it
+        assert spent["ours, FMI 2"]["step"] <= TARGET
+        assert spent["ours, FMI 3"]["step"] <= TARGET
+        assert spent["ours, recorded"]["step"] <= TARGET_RECORDED
 
 
 def test_memory_of_a_long_record(
