@@ -101,6 +101,7 @@ class UnitFailure(CosimError):
 
     Attributes:
         kind: which way, as one word for programs that read a run's summary.
+        verdict: what came of it, in words that a run's reason begins with.
         unit: the instance.
         call: the FMI call, or what else was done with the unit.
         t: simulated time in seconds.
@@ -109,6 +110,7 @@ class UnitFailure(CosimError):
     """
 
     kind: ClassVar[str] = "failure"
+    verdict: ClassVar[str] = "a unit failed"
 
     def __init__(self, unit: str, call: str, t: float, status: str, log: Sequence[str] = ()) -> None:
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)

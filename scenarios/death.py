@@ -41,7 +41,7 @@ def tell_death(heartbeat: Heartbeat, number: int | None, status: int, wall: floa
     sys.stderr.write(f"{told}\n")
     if "folder" in facts:
         data = _data(call, heartbeat.time, number, status) if failure is None else failure.as_data()
-        reason = told if failure is None else f"a unit failed: {failure.cause}"
+        reason = told if failure is None else f"{failure.verdict}: {failure.cause}"
         try:
             with told_if_not_written(Path(facts["folder"])):
                 _complete(facts, {"reason": reason, "wall_seconds": wall, "failure": data}, failure)

@@ -68,6 +68,8 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
     """The catalogued unit behind each of the system's units, by name in the system."""
     headline: ClassVar[tuple[str, ...]]
     """Names of the metrics that are told first, in their order; a run need not have all of them."""
+    is_seeded: ClassVar[bool] = True
+    """Whether its random numbers follow from a seed."""
 
     @classmethod
     def parameters(cls) -> tuple[Variable, ...]:

@@ -53,7 +53,7 @@ class LeftRun:
             task = Task(
                 experiment=experiment,
                 parameters=self.resumption.parameters,
-                seed=int(told["seed"]),
+                seed=int(told["seed"] or 0),
                 fmus=fmus,
                 folder=self.folder,
                 formats=tuple(told["formats"]),

@@ -18,7 +18,8 @@ from scenarios.task import Task
 def configuration(task: Task) -> dict[str, Any]:
     """Return what decides on a run's signals, as JSON can hold it."""
     values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
-    return {"scenario": task.experiment.name, "parameters": values, "seed": task.seed, "master": task.options.as_data()}
+    seed = task.seed if task.experiment.is_seeded else None
+    return {"scenario": task.experiment.name, "parameters": values, "seed": seed, "master": task.options.as_data()}
 
 
 def files_and_forms(task: Task) -> dict[str, Any]:

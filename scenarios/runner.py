@@ -149,7 +149,7 @@ def _conclude(
 def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Outcome:
     seen = watch.outcome()
     if failure is not None:
-        return Outcome(success=False, reason=f"a unit failed: {failure.cause}", metrics=seen.metrics)
+        return Outcome(success=False, reason=f"{failure.verdict}: {failure.cause}", metrics=seen.metrics)
     if interrupted and not watch.over:
         return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
     return seen

@@ -61,6 +61,7 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
         parameters_type: ClassVar[type[Any]] = NoParameters
         units: ClassVar[Mapping[str, str]] = {}
         headline: ClassVar[tuple[str, ...]] = ()
+        is_seeded: ClassVar[bool] = False
 
         def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:  # noqa: ARG002
             return ssp.system
@@ -93,7 +94,8 @@ def _drawn(system: System, record: Record, folder: Path) -> list[Figure]:
                 values = record[f"{name}.{port.name}"].reshape(len(record.time), -1)
                 for k, colour in enumerate(COLOURS[: values.shape[1]]):
                     ax.plot(record.time, values[:, k], color=colour, lw=1.0)
-                ax.set_ylabel(f"{port.name}\n{port.unit.symbol}")
-            axes[-1].set_xlabel("time, s")
+                unit = "" if port.unit.symbol in ("", "1") else f"\n({port.unit.symbol})"
+                ax.set_ylabel(port.name + unit)
+            axes[-1].set_xlabel("time (s)")
         figures.append(Figure(file, f"Outputs of {name} over time."))
     return figures

@@ -23,6 +23,7 @@ class NotConverged(UnitFailure):
     """
 
     kind: ClassVar[str] = "not_converged"
+    verdict: ClassVar[str] = "units did not come to agree"
 
     def __init__(
         self,

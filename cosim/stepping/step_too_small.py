@@ -15,8 +15,21 @@ class StepTooSmall(UnitFailure):
     """
 
     kind: ClassVar[str] = "step_too_small"
+    verdict: ClassVar[str] = "the step could not follow its error"
 
     def __init__(self, unit: str, signal: str, t: float, step: float, error: float) -> None:
         self.signal, self.error, self.step = signal, error, step
-        fault = f"with a step of {step:.3g} s the error of {signal} is {error:.3g} times what is tolerated"
-        super().__init__(unit, "control of the step", t, "Error", (f"{fault}; if it is noise, leave it uncontrolled",))
+        super().__init__(unit, "control of the step", t, "no step is short enough")
+
+    @property
+    def what(self) -> str:
+        """What happened, to be read after the call."""
+        return f"found none that is short enough: {self.told}"
+
+    @property
+    def told(self) -> str:
+        """The signal with the largest error, and what may help."""
+        return (
+            f"with a step of {self.step:.3g} s the error of {self.signal} is {self.error:.3g} times what is tolerated; "
+            "if it is noise, leave it uncontrolled"
+        )

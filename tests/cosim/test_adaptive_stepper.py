@@ -157,6 +157,8 @@ def test_a_step_below_the_smallest_names_the_signal_with_the_largest_error():
     assert e.error > 1
     assert e.step == pytest.approx(1e-3, rel=0.25)
     assert f"the error of {e.signal} is" in str(e)
+    assert not e.log  # the unit said nothing, and did not fail
+    assert e.verdict == "the step could not follow its error"
 
 
 def test_faulty_tolerances_and_limits_are_told_at_once():

@@ -125,5 +125,5 @@ def test_a_failure_s_log_is_shown_and_what_is_not_known_is_not_zero(tmp_path: Pa
     write_report(folder, "x", (), summary, (), [("arm", "Arm (FMI 3)", "10 ms", None, None)], ())
     page = Page(folder.report)
     assert page.pre == "tendon <3> tore\nsorry"
-    assert page.headings == ["What arm logged last", "Master", "Units"]
+    assert page.headings == ["What was told of arm", "Master", "Units"]
     assert ["arm", "Arm (FMI 3)", "10 ms", "–", "–"] in page.rows

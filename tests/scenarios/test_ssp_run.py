@@ -45,6 +45,8 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["success"], summary["simulated_seconds"]) == (True, 2.0)
     told = json.loads((out / "run.json").read_text())
+    assert told["seed"] is None
+    assert "seed" not in (out / "report.html").read_text()
     sha256 = hashlib.sha256((tmp_path / "springs.ssp").read_bytes()).hexdigest()
     assert (told["source"]["sha256"], told["source"]["stop"]) == (sha256, "2")
     units = told["units"]
