@@ -62,11 +62,8 @@ def figure(
 def shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64], names: Mapping[int, str]) -> None:
     """Shade every second phase and write the names of phases, where `names` has them.
 
-    A name stands over its phase if it is narrower; else upright at the top of the axes, with a line to its phase. Of a
-    run that ended where it began there is nothing to shade.
+    A name stands over its phase if it is narrower; else upright at the top of the axes, with a line to its phase.
     """
-    if t[-1] <= t[0]:
-        return
     edges = np.flatnonzero(np.diff(phase)) + 1
     starts = [0, *edges.tolist()]
     ends = [*edges.tolist(), len(t) - 1]

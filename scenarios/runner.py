@@ -157,8 +157,8 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
 
 def _present(task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[UnitRow]) -> None:
     figures = []
-    if task.folder.signals.exists():
-        record = Record(task.folder.signals)
+    record = Record(task.folder.signals) if task.folder.signals.exists() else None
+    if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
         figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
     write_report(
         task.folder, task.experiment.title, task.experiment.headline, summary, parameter_rows(task), units, figures

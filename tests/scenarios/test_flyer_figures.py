@@ -48,10 +48,3 @@ def test_a_robot_that_drifts_away_stays_large_in_the_scene(tmp_path: Path):
     apart, together = (image.imread(tmp_path / name / "scene.png") for name in ("apart", "together"))
     assert apart.shape == together.shape
     assert np.mean(apart[..., :3] < 0.9) > 0.9 * np.mean(together[..., :3] < 0.9)
-
-
-def test_a_run_that_ended_where_it_began_is_drawn_without_phases(tmp_path: Path):
-    with figure(tmp_path / "instant", 1) as (axes,):
-        axes.plot([0.0], [1.0], marker="o")
-        shade_phases(axes, np.zeros(1), np.zeros(1, dtype=np.int64), NAMES)
-        assert not axes.texts

@@ -73,6 +73,14 @@ def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(sprin
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
 
 
+def test_of_a_run_that_ended_where_it_began_nothing_is_drawn(spring: Path, tmp_path: Path):
+    out = tmp_path / "out"
+    assert run(packed(spring, tmp_path, Fraction(2), tears=-1.0), "--out", out).exit_code == 3
+    assert Record(out / "signals.parquet").time.tolist() == [0.0]
+    assert not list((out / "figures").glob("*"))
+    assert "data:image" not in (out / "report.html").read_text()
+
+
 def test_without_a_stop_time_one_is_asked_for(spring: Path, tmp_path: Path):
     result = run(packed(spring, tmp_path), "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
