@@ -1,7 +1,7 @@
 """What a scenario is: parameters, a system of units, a verdict, figures."""
 
 import abc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +12,9 @@ from cosim.signals import Signals
 from cosim.system import System
 from cosim.variable import Causality, Variable
 from scenarios.record import Record
+from scenarios.reporting.camera_picture import CameraPicture
+from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 FmuOf = Callable[[str], Path]
 """Gives a unit's FMU by the unit's name in the system."""
@@ -49,6 +52,10 @@ class Watch(abc.ABC):
 
     def finish(self, signals: Signals) -> None:  # noqa: B027 (many watches need nothing of it)
         """Look at the signals once more when the run has ended, however it did."""
+
+    def pictures(self) -> Sequence[CameraPicture]:
+        """Return what cameras saw at moments that tell of the run, in the order of time; none by default."""
+        return ()
 
     @abc.abstractmethod
     def outcome(self) -> Outcome:
@@ -95,6 +102,14 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
     @abc.abstractmethod
     def draw(self, parameters: Any, watch: AnyWatch, record: Record, folder: Path) -> list["Figure"]:
         """Draw the run's figures into a folder."""
+
+    def plots(self, parameters: Any, record: Record) -> Sequence[TimePlot]:  # noqa: ARG002
+        """Return what the report draws over time before all other signals; nothing by default."""
+        return ()
+
+    def replay(self, parameters: Any, record: Record) -> Replay | None:  # noqa: ARG002
+        """Return what the report shows in space; nothing by default."""
+        return None
 
 
 @dataclass(frozen=True)
