@@ -1,4 +1,4 @@
-"""Writes a page: one HTML file with its script, its style and its data inside, that opens offline and asks for nothing."""
+"""Writes a page: one HTML file with scripts, style and data inside, that opens offline and asks for nothing."""
 
 import base64
 import functools
@@ -57,7 +57,7 @@ def template(name: str) -> jinja2.Template:
 
 def asset(name: str) -> str:
     """Return the text of a file of `scenarios/reporting/page/`."""
-    return resources.files("scenarios.reporting").joinpath("page", name).read_text(encoding="utf-8")
+    return resources.files("scenarios.reporting").joinpath("page").joinpath(name).read_text(encoding="utf-8")
 
 
 @functools.lru_cache

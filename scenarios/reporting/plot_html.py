@@ -1,10 +1,13 @@
 """Puts a Plotly figure into a page: the page's script draws it in the page's colours and width."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import plotly.graph_objects as go
+import plotly.io.json
 from markupsafe import Markup, escape
-from plotly.io.json import to_json_plotly
+
+_packed = cast(Callable[[Any], str], plotly.io.json.to_json_plotly)
 
 
 def plot_html(figure: Any, height: int = 320, label: str = "") -> Markup:
@@ -19,7 +22,7 @@ def plot_html(figure: Any, height: int = 320, label: str = "") -> Markup:
         label: what one hears who cannot see it.
     """
     assert isinstance(figure, go.Figure)
-    told = figure.to_dict()
+    told = cast(dict[str, Any], figure.to_dict())
     told["layout"].pop("template", None)  # of paper-white figures
     return Markup(
         f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{json_html(told)}</div>'
@@ -31,6 +34,6 @@ def json_html(content: Any, name: str = "") -> Markup:
 
     `name` is the element's class, if it has one.
     """
-    data = str(to_json_plotly(content)).replace("<", "\\u003c")
+    data = _packed(content).replace("<", "\\u003c")
     of = f' class="{escape(name)}"' if name else ""
     return Markup(f'<script type="application/json"{of}>{data}</script>')
