@@ -52,8 +52,8 @@ class RunFacts:
         _check(folder, "run.json", run)
         ended = bool(summary)
         if not ended:
-            told = {k: run[k] for k in ("scenario", "parameters", "seed", "master") if k in run}
-            summary = {**told, "success": False, "reason": _KILLED, "metrics": {}, "complete": False}
+            summary = {"success": False, "reason": _KILLED, "metrics": dict[str, Any](), "complete": False}
+            summary |= {k: run[k] for k in ("scenario", "parameters", "seed", "master") if k in run}
         _check(folder, "summary.json", summary)
         _check_metrics(folder, summary["metrics"])
         named = SCENARIOS.get(run["scenario"])

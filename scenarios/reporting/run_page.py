@@ -44,7 +44,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
 
 
 def _record(folder: RunFolder) -> Record | None:
-    """Return the record; None where there is none, or of less than two rows: of one instant nothing is seen over time."""
+    """Return the record; None where there is none, or one of less than two rows, which shows nothing over time."""
     if not folder.signals.exists():
         return None
     try:
