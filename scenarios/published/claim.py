@@ -62,5 +62,6 @@ class Claim:
             KeyError, TypeError, ValueError: it is of another form.
         """
         interval = data["interval"]
+        rest: dict[str, Any] = {k: v for k, v in data.items() if k not in ("interval", "verdict")}
         low_high = None if interval is None else (float(interval[0]), float(interval[1]))
-        return cls(**{**data, "interval": low_high, "verdict": Verdict(data["verdict"])})
+        return cls(interval=low_high, verdict=Verdict(data["verdict"]), **rest)

@@ -1,19 +1,15 @@
 """An experiment of a paper: the campaign that it needs, and what its runs say of the paper's claims."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
 from scenarios.experiment import Figure
 from scenarios.published.claim import Claim
 from scenarios.published.comparison_table import ComparisonTable
-
-if TYPE_CHECKING:
-    from scenarios.campaign.campaign_table import CampaignTable
 
 
 class PublishedExperiment(abc.ABC):
