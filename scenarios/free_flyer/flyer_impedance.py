@@ -1,6 +1,6 @@
 """A push against the gripper, and the robot's yielding to it. [Fernandes2020] sec. 4.1.3."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -12,9 +12,11 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.free_flyer.impedance_figures import draw_push
 from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from scenarios.free_flyer.published import published_of_push
 from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from scenarios.paper import paper_values
 from scenarios.record import Record
+from scenarios.reporting.published_value import PublishedValue
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):
@@ -84,6 +86,10 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing."""
         return ("impedance",)
+
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return how far robot and impedance model differ at most."""
+        return published_of_push(parameters)
 
     def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""

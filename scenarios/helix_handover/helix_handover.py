@@ -1,6 +1,6 @@
 """A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -11,9 +11,11 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.published import published_of
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
+from scenarios.reporting.published_value import PublishedValue
 
 
 class HelixHandover(Experiment[HandoverWatch]):
@@ -96,6 +98,10 @@ class HelixHandover(Experiment[HandoverWatch]):
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: seeing and controlling."""
         return ("vision", "servo")
+
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return what table 1 and fig. 9 tell."""
+        return published_of(parameters)
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw errors, paths and tendons over time, and the camera pictures of three moments."""

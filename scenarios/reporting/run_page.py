@@ -10,6 +10,7 @@ from scenarios.parameters import BadParameter, parameters_of
 from scenarios.record import Record
 from scenarios.reporting.explorer_section import explorer_section
 from scenarios.reporting.page import write_page
+from scenarios.reporting.published_section import published_section
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_lead import run_lead
 from scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
@@ -33,6 +34,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     record = _record(folder)
     sections = [
         metrics_section(facts),
+        published_section(facts.summary, facts.run),
         *_seen(facts, record),
         None if record is None else explorer_section(record),
         parameters_section(facts),
