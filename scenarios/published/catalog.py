@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 
+from scenarios.published.ir_table import IrTable
 from scenarios.published.published_experiment import PublishedExperiment
 
-_ALL: tuple[type[PublishedExperiment], ...] = ()
+_ALL: tuple[type[PublishedExperiment], ...] = (IrTable,)
 
 EXPERIMENTS: Mapping[str, type[PublishedExperiment]] = {e.name: e for e in _ALL}
