@@ -48,6 +48,8 @@ class CampaignPlan:
         repetitions: runs of each point.
         seed: the campaign's; each run's is derived from it.
         paired: whether all points of a repetition share a seed, so that their runs can be compared one by one.
+        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share none,
+            so that their runs can be counted together.
         units: files of FMUs that take the place of units, by the units' names.
         options: how units are run.
         experiment: name of the published experiment that it is of; "" if it is of none.
@@ -59,6 +61,7 @@ class CampaignPlan:
     repetitions: int = 1
     seed: int = 0
     paired: bool = False
+    scenes: Sequence[str] = ()
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     options: MasterOptions = field(default_factory=MasterOptions)
     experiment: str = ""
@@ -80,11 +83,18 @@ class CampaignPlan:
                 point=point,
                 repetition=repetition,
                 parameters={**self.fixed, **self.points[point]},
-                seed=run_seed(self.seed, None if self.paired else point, repetition),
+                seed=run_seed(self.seed, self._seeded_as(point), repetition),
             )
             for point in range(len(self.points))
             for repetition in range(self.repetitions)
         )
+
+    def _seeded_as(self, point: int) -> int | None:
+        """Return the first point that shares its seeds with a point, None if all do."""
+        if not self.paired:
+            return point
+        scenes = [tuple(p.get(name) for name in self.scenes) for p in self.points]
+        return scenes.index(scenes[point]) if self.scenes else None
 
     def _name(self, point: int, repetition: int) -> str:
         """Return such as `007_alpha=0.2_r0003`: point, what is varied as far as there is room, repetition."""

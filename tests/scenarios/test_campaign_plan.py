@@ -53,3 +53,12 @@ def test_a_campaign_that_varies_nothing_has_plain_names():
         "000_r0000",
         "000_r0001",
     ]
+
+
+def test_paired_points_of_different_scenes_share_no_seed():
+    points = [{"thing": thing, "strategy": s} for thing in ("cylinder", "baby_cup_a") for s in ("reflex", "blind")]
+    plan = CampaignPlan(scenario="ir_grasp", points=points, repetitions=3, paired=True, scenes=("thing",))
+    seeds = [[r.seed for r in plan.runs() if r.point == point] for point in range(4)]
+    assert seeds[0] == seeds[1]
+    assert seeds[2] == seeds[3]
+    assert len({*seeds[0], *seeds[2]}) == 6
