@@ -1,7 +1,7 @@
 """Turns `name=value` texts into a scenario's parameters; every fault is told at once, with what would be right."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 
@@ -47,6 +47,15 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     return experiment.parameters_type(**values)
 
 
+def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) -> Any:
+    """Return the scenario's parameters as `run.json` keeps them.
+
+    Raises:
+        BadParameter: it keeps some that the scenario does not have, or values that they cannot take.
+    """
+    return parse_parameters(experiment, [f"{name}={_as_text(value)}" for name, value in kept.items()])
+
+
 def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
     """Return a parameter's value from its text, and what is wrong with it, saying what would be right, or None."""
     value: Any = text
@@ -88,3 +97,9 @@ def text_of(variable: Variable, value: Any) -> str:
 def _number_text(number: float) -> str:
     short = f"{number:g}"
     return short if float(short) == number else repr(number)
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, list):
+        return ",".join(_as_text(v) for v in cast(list[Any], value))
+    return repr(value) if isinstance(value, float) else str(value)
