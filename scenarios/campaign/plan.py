@@ -48,8 +48,8 @@ class CampaignPlan:
         repetitions: runs of each point.
         seed: the campaign's; each run's is derived from it.
         paired: whether all points of a repetition share a seed, so that their runs can be compared one by one.
-        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share
-            none, so that their runs can be counted together.
+        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share none,
+            so that their runs can be counted together.
         units: files of FMUs that take the place of units, by the units' names.
         options: how units are run.
         experiment: name of the published experiment that it is of; "" if it is of none.
@@ -91,10 +91,12 @@ class CampaignPlan:
 
     def _seeded_as(self, point: int) -> int | None:
         """Return the first point that shares its seeds with a point, None if all do."""
-        if not self.paired or not self.scenes:
-            return None if self.paired else point
-        scene = [self.points[point].get(name) for name in self.scenes]
-        return next(n for n, p in enumerate(self.points) if [p.get(name) for name in self.scenes] == scene)
+        if not self.paired:
+            return point
+        if not self.scenes:
+            return None
+        scenes = [tuple(p.get(name) for name in self.scenes) for p in self.points]
+        return scenes.index(scenes[point])
 
     def _name(self, point: int, repetition: int) -> str:
         """Return such as `007_alpha=0.2_r0003`: point, what is varied as far as there is room, repetition."""
