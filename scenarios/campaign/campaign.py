@@ -7,20 +7,17 @@ import shutil
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from cosim.exceptions import RecordNotWritten
-from fmus.build import cached
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.plan import CampaignPlan, PlannedRun
-from scenarios.campaign.plan_check import check_units, checked_plan
+from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.run_row import RunRow, row_of
 from scenarios.campaign.table_writer import TableWriter
 from scenarios.campaign.tally import CampaignProgress, Tally
-from scenarios.chosen import fmus_of, replacements, scenario_named
 from scenarios.run_folder import told_if_not_written
 
 
@@ -31,7 +28,7 @@ def check_campaign(plan: CampaignPlan, folder: CampaignFolder) -> CampaignPlan:
         BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError: it cannot be carried out so.
     """
     plan = checked_plan(plan)
-    fmus = _fmus(plan)
+    fmus = unit_fmus(plan)
     check_units(plan, fmus)
     folder.check(plan, fmus)
     return plan
@@ -51,7 +48,7 @@ def carry_out_campaign(
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
     plan = check_campaign(plan, folder)
-    with folder.opened(plan, _fmus(plan)) as fmus:
+    with folder.opened(plan, unit_fmus(plan)) as fmus:
         work = _Work(plan, folder, progress)
         try:
             work.give_to(crew, fmus)
@@ -134,14 +131,3 @@ class _Work:
         self._count[row.status] += 1
         self.table.add(row)
         self.progress(self.tally)
-
-
-def _fmus(plan: CampaignPlan) -> dict[str, Path]:
-    """Return the FMU of each unit: that of the plan, or the catalog's.
-
-    Raises:
-        BadCall: the plan has one for a unit that the scenario does not have.
-    """
-    experiment: Any = scenario_named(plan.scenario)
-    others = replacements(experiment, [f"{name}={file}" for name, file in plan.units.items()])
-    return fmus_of(experiment, others, lambda unit: cached(unit, 3))

@@ -22,6 +22,7 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
         "repetitions": plan.repetitions,
         "seed": plan.seed,
         "paired": plan.paired,
+        "scenes": list(plan.scenes),
         "units": {name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
         "master": options,
         "versions": versions(),

@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+from fmus.build import cached
 from scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
-from scenarios.chosen import scenario_named
+from scenarios.chosen import fmus_of, replacements, scenario_named
 from scenarios.experiment import Experiment
 from scenarios.parameters import BadParameter, parse_parameters, text_of
 
@@ -42,6 +43,17 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
     if faults:
         raise BadParameter(tuple(faults))
     return replace(plan, points=points, fixed=fixed)
+
+
+def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
+    """Return the FMU of each unit: that of the plan, or the catalog's.
+
+    Raises:
+        BadCall: the plan has one for a unit that the scenario does not have, or the catalog's cannot be built.
+    """
+    experiment = scenario_named(plan.scenario)
+    others = replacements(experiment, [f"{name}={file}" for name, file in plan.units.items()])
+    return fmus_of(experiment, others, lambda unit: cached(unit, 3))
 
 
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
