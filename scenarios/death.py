@@ -18,6 +18,7 @@ from scenarios.listing import print_summary
 from scenarios.record import Record
 from scenarios.report import write_report
 from scenarios.run_folder import RunFolder, told_if_not_written
+from scenarios.run_summary import unit_data
 
 _BY_SIGNAL = 128  # what shells add to a signal's number
 
@@ -105,6 +106,7 @@ def _complete(facts: dict[str, Any], known: dict[str, Any], failure: UnitFailure
         "metrics": dict[str, Any](),
         "simulated_seconds": simulated,
         "cpu_seconds": spent.ru_utime + spent.ru_stime,
+        "units": unit_data(facts["units"]),
         **known,
     }
     folder.write_summary(summary)
