@@ -147,8 +147,9 @@ def _conclude(
         task.folder.add_to_run(failure=failure.as_data())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
-    with told_if_not_written(task.folder.path):
-        _present(task, watch, summary, unit_rows(master))
+    if task.presented:
+        with told_if_not_written(task.folder.path):
+            _present(task, watch, summary, unit_rows(master))
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
