@@ -18,6 +18,7 @@ from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
 from scenarios.report import UnitRow, write_report
+from scenarios.reporting.kept_pictures import write_pictures
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import told_if_not_written
 from scenarios.run_metrics import run_metrics
@@ -145,6 +146,7 @@ def _conclude(
     task.folder.write_summary(summary)
     if failure is not None:
         task.folder.add_to_run(failure=failure.as_data())
+    write_pictures(task.folder.pictures, watch.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
     if task.presented:
