@@ -74,8 +74,8 @@ def faceted(mesh: Mesh) -> Mesh:
     """Return a mesh whose sides share no vertices, so that shading changes at their edges; coplanar triangles do."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     normals: Floats = np.cross(b - a, c - a)
-    units: Floats = np.round(normals / np.linalg.norm(normals, axis=1, keepdims=True), 6) + 0.0  # no -0.0
-    side = np.unique(units, axis=0, return_inverse=True)[1]
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    side = np.unique(np.rint(1e6 * normals).astype(np.int64), axis=0, return_inverse=True)[1]
     corners = np.column_stack([np.repeat(side.reshape(-1), 3), mesh.triangles.reshape(-1)])
     kept, indices = np.unique(corners, axis=0, return_inverse=True)
     return Mesh(mesh.vertices[kept[:, 1]], indices.reshape(-1, 3).astype(np.int64))
