@@ -1,7 +1,7 @@
 """Turns `name=value` texts into a scenario's parameters; every fault is told at once, with what would be right."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 
@@ -45,6 +45,21 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     if faults:
         raise BadParameter(faults)
     return experiment.parameters_type(**values)
+
+
+def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) -> Any:
+    """Return the scenario's parameters as `run.json` keeps them.
+
+    Raises:
+        BadParameter: it keeps some that the scenario does not have, or values that they cannot take.
+    """
+    return parse_parameters(experiment, [f"{name}={_as_text(value)}" for name, value in kept.items()])
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, list):
+        return ",".join(_as_text(v) for v in cast(list[Any], value))
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def _parse(variable: Variable, text: str) -> tuple[Any, str | None]:

@@ -33,7 +33,9 @@ def summary_of(folder: Path) -> dict[str, Any]:
     """Return all of a summary that measures no time."""
     told = json.loads((folder / "summary.json").read_text())
     metrics = {k: v for k, v in told["metrics"].items() if not k.startswith(OF_TIME)}
-    return {k: v for k, v in told.items() if k not in ("wall_seconds", "cpu_seconds")} | {"metrics": metrics}
+    units = [{k: v for k, v in unit.items() if k != "cpu_seconds"} for unit in told["units"]]
+    others = {k: v for k, v in told.items() if k not in ("wall_seconds", "cpu_seconds")}
+    return others | {"metrics": metrics, "units": units}
 
 
 def assert_same(joined: Path, whole: Path) -> None:

@@ -2,7 +2,9 @@
 //   page.colours()          the page's colours by their names in page.css: {ink, soft, line, card, c0, ...}
 //   page.onColours(act)     calls `act` when they have changed
 //   page.draw(div, figure)  draws a Plotly figure, and again when the colours change; returns a promise
-//   page.array(packed)      a typed array of what plot_html.json_html has packed: {dtype, bdata}
+//   page.onDraw(change)     calls `change(div, layout)` before a figure is drawn
+//   page.onReady(act)       calls `act` when the figures that are in the page have been drawn; waits for its promise
+//   page.array(packed)      a typed array of one that Plotly has packed: {dtype, bdata}
 //   page.data(element)      the content of the JSON script within an element
 "use strict";
 const page = (() => {
@@ -10,7 +12,7 @@ const page = (() => {
     "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
   const touch = matchMedia("(pointer: coarse)").matches;
   const figures = new Map();
-  const listeners = [];
+  const listeners = [], changes = [], starts = [];
 
   function colours() {
     const style = getComputedStyle(document.documentElement);
@@ -62,6 +64,7 @@ const page = (() => {
     const shown = {...layout, template: template(), autosize: true};
     if (kept) shown.xaxis = {...shown.xaxis, range: kept, autorange: false};
     if (div.clientWidth < 560) narrow(shown);
+    for (const change of changes) change(div, shown);
     return Plotly.react(div, data, shown, {...settings, ...config}).then(() => {
       if (isNew) follow(div);
       return fit(div);
@@ -133,12 +136,15 @@ const page = (() => {
       await draw(div, figure);
       await new Promise(done => setTimeout(done));  // the page answers between figures
     }
+    for (const start of starts) await start();
     document.documentElement.dataset.drawn = "all";
   }
 
-  if (document.querySelector(".plot") && typeof Plotly === "object") drawAll();
-  else document.documentElement.dataset.drawn = "all";
+  document.addEventListener("DOMContentLoaded", drawAll);  // when the page's other scripts have run
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   matchMedia("print").addEventListener("change", redraw);
-  return {colours, onColours: act => listeners.push(act), draw, array, data, redraw};
+  return {
+    colours, draw, array, data,
+    onColours: act => listeners.push(act), onDraw: act => changes.push(act), onReady: act => starts.push(act),
+  };
 })();
