@@ -13,10 +13,12 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.free_flyer.handover_figures import draw_handover
 from scenarios.free_flyer.handover_parameters import Parameters
 from scenarios.free_flyer.handover_watch import HandoverWatch
+from scenarios.free_flyer.replay import replay_handover
 from scenarios.free_flyer.rig import arm, expected_lag, wire_handover
 from scenarios.paper import paper_values
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""
@@ -115,6 +117,10 @@ class FlyerHandover(Experiment[HandoverWatch]):
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw paths, gripper, thrust over time, and the scene at three moments."""
         return draw_handover(parameters, watch, record, folder)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return robot, hand and object in space."""
+        return replay_handover(record)
 
 
 def _check_reach(p_WG: Floats) -> None:

@@ -13,10 +13,12 @@ from scenarios.free_flyer.impedance_figures import draw_push
 from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from scenarios.free_flyer.published import published_of_push
+from scenarios.free_flyer.replay import replay_push
 from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from scenarios.paper import paper_values
 from scenarios.record import Record
 from scenarios.reporting.published_value import PublishedValue
+from scenarios.reporting.replay import Replay
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):
@@ -94,3 +96,7 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
     def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
         return draw_push(parameters, watch, record, folder)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return the robot, its gripper's place of rest and the push in space."""
+        return replay_push(record)

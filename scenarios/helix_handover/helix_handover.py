@@ -12,10 +12,12 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
 from scenarios.helix_handover.published import published_of
+from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
 from scenarios.reporting.published_value import PublishedValue
+from scenarios.reporting.replay import Replay
 
 
 class HelixHandover(Experiment[HandoverWatch]):
@@ -104,5 +106,9 @@ class HelixHandover(Experiment[HandoverWatch]):
         return published_of(parameters)
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw errors, paths and tendons over time, and the camera pictures of three moments."""
-        return draw_handover(parameters, watch.snapshots, record, folder)
+        """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
+        return draw_handover(parameters, watch.pictures(), record, folder)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return arm, gripper, hand, ball and cameras in space."""
+        return replay_handover(record)

@@ -12,11 +12,13 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.ir_grasp.figures import draw_grasp
 from scenarios.ir_grasp.parameters import Parameters
 from scenarios.ir_grasp.published import published_of
+from scenarios.ir_grasp.replay import replay_grasp
 from scenarios.ir_grasp.situation import Situation
 from scenarios.ir_grasp.watch import GraspWatch
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
 from scenarios.reporting.published_value import PublishedValue
+from scenarios.reporting.replay import Replay
 
 
 class IrGrasp(Experiment[GraspWatch]):
@@ -108,3 +110,7 @@ class IrGrasp(Experiment[GraspWatch]):
     def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments, distances and cost, and the commands."""
         return draw_grasp(parameters, watch.moments, record, folder)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return hand, object and beams in space."""
+        return replay_grasp(parameters, record)

@@ -11,8 +11,10 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 from scenarios.vsl.figures import draw_path_run
 from scenarios.vsl.parameters import Parameters
+from scenarios.vsl.replay import replay_path
 from scenarios.vsl.watch import PathWatch
 
 _MORE = 5
@@ -112,3 +114,7 @@ class PathExperiment(Experiment[PathWatch]):
     def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
         return draw_path_run(parameters, watch, record, folder)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return arm, load, path and the tip's way in space."""
+        return replay_path(parameters, record, hybrid=self.hybrid)
