@@ -21,7 +21,7 @@ FAST = {
     "flyer_robot_to_human": {("behaviour=compliant",): 3},
     "flyer_human_to_robot": {(): 1},
 }
-HELIX = {("alpha=0.1", "patience=600", "tuning=thesis", "control_period=1.38"): 5}
+HELIX = {("alpha=0.4",): 2}
 
 
 def values_of(scenario: str, given: tuple[str, ...]) -> list[PublishedValue]:
