@@ -10,6 +10,7 @@ from scenarios.catalog import SCENARIOS
 from scenarios.check_command import check
 from scenarios.export_command import export_command
 from scenarios.listing import print_catalog, print_scenario, print_unit
+from scenarios.report_command import report
 from scenarios.resume_command import resume
 from scenarios.run_command import run
 from scenarios.vsl_train_command import vsl_train
@@ -27,6 +28,7 @@ Run
   handover run helix_handover            one run; leaves a folder with a report
   handover run x.ssp --stop 5            a system from another tool, for 5 s
   handover resume runs/long              goes on with a run with checkpoints
+  handover report runs/long              its page anew, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -73,6 +75,7 @@ def list_(name: str | None) -> None:
 main.add_command(build_command)
 main.add_command(check)
 main.add_command(export_command)
+main.add_command(report)
 main.add_command(resume)
 main.add_command(run)
 main.add_command(vsl_train)

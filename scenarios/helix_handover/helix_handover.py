@@ -1,6 +1,6 @@
 """A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -15,6 +15,7 @@ from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
+from scenarios.reporting.camera_picture import CameraPicture
 from scenarios.reporting.replay import Replay
 
 
@@ -94,6 +95,10 @@ class HelixHandover(Experiment[HandoverWatch]):
     def watch(self, parameters: Parameters) -> HandoverWatch:
         """Return the judge of one handover."""
         return HandoverWatch(parameters)
+
+    def watch_of_record(self, parameters: Parameters, pictures: Sequence[CameraPicture]) -> HandoverWatch:
+        """Return an observer with the pictures that the run's folder keeps."""
+        return HandoverWatch(parameters, pictures)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: seeing and controlling."""
