@@ -16,6 +16,7 @@ from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
+from scenarios.reporting.camera_picture import CameraPicture
 from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
 
@@ -96,6 +97,10 @@ class HelixHandover(Experiment[HandoverWatch]):
     def watch(self, parameters: Parameters) -> HandoverWatch:
         """Return the judge of one handover."""
         return HandoverWatch(parameters)
+
+    def watch_of_record(self, parameters: Parameters, pictures: Sequence[CameraPicture]) -> HandoverWatch:
+        """Return an observer with the pictures that the run's folder keeps."""
+        return HandoverWatch(parameters, pictures)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: seeing and controlling."""

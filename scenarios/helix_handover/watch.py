@@ -29,11 +29,16 @@ class HandoverWatch(Watch):
 
     Attributes:
         phases: the controller's phases and when each was first entered, in s.
+
+    Args:
+        parameters: the scenario's.
+        pictures: what the cameras saw, where signals hold no pictures; else they are taken.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
         self.parameters = parameters
-        self._pictures: list[CameraPicture] = []
+        self._pictures = list(pictures or ())
+        self._takes = pictures is None
         self.phases: dict[str, float] = {}
         self._t = 0.0
         self._phase = ""
@@ -81,7 +86,7 @@ class HandoverWatch(Watch):
         return tuple(self._pictures)
 
     def _keep(self, role: str, signals: Signals) -> None:
-        if all(picture.t != self._t for picture in self._pictures):
+        if self._takes and all(picture.t != self._t for picture in self._pictures):
             self._pictures += take_pictures(self._t, role, self.parameters, signals)
 
     def _hides(self, t: float) -> bool:
