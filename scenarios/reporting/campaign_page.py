@@ -22,11 +22,12 @@ from scenarios.reporting.success_section import success_section
 from scenarios.run_folder import told_if_not_written
 
 
-def write_campaign_page(folder: CampaignFolder | Path) -> None:
-    """Write a campaign's, or a paper's, `report.html` and `figures/`; the campaign need not be complete.
+def write_campaign_page(folder: CampaignFolder | Path, file: Path | None = None) -> None:
+    """Write a campaign's, or a paper's, page and its `figures/`; the campaign need not be complete.
 
     Args:
         folder: the campaign's.
+        file: where the page goes; by default `report.html` in the folder, beside which the runs' pages are linked.
 
     Raises:
         BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
@@ -54,4 +55,4 @@ def write_campaign_page(folder: CampaignFolder | Path) -> None:
         setting_section(results),
     ]
     title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
-    write_page(there.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
+    write_page(file or there.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
