@@ -61,11 +61,12 @@ def test_metrics_that_are_not_numbers_leave_gaps(tmp_path: Path):
 
 def test_a_parameter_that_some_points_leave_alone_is_told_as_a_gap(tmp_path: Path):
     points = [
-        {"strategy": "reflex"},
-        {"strategy": "forward", "forward": "0.03"},
-        {"strategy": "forward", "forward": "0.04"},
+        {"strategy": "reflex", "thing": "cylinder"},
+        {"strategy": "reflex", "thing": "baby_cup_a"},
+        {"strategy": "forward", "thing": "cylinder", "forward": "0.03"},
+        {"strategy": "forward", "thing": "cylinder", "forward": "0.04"},
     ]
-    html = page_of(tmp_path, told("ir_grasp", points), table_of(points))
+    html = page_of(tmp_path, told("ir_grasp", points, paired=True), table_of(points))
     assert "<td>reflex</td><td>cylinder</td><td>–</td>" in html
     assert "<td>forward</td><td>cylinder</td><td data-key='0.04'>40 mm</td>" in html
     assert "<td>reflex</td><td>cylinder</td><td>baby cup a</td>" in html
