@@ -11,7 +11,8 @@ import click
 
 from cosim.exceptions import RecordNotWritten
 from cosim.master_options import MasterOptions
-from scenarios.bad_call import BadCall, RunNotWritten, told_in_one_line
+from scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
+from scenarios.campaign.bad_crew import CrewLost
 from scenarios.campaign.campaign import carry_out_campaign, check_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_interruption import CampaignInterruption
@@ -173,9 +174,11 @@ def _carry_out(
     try:
         with workforce() as crew, progress:
             return carry_out_campaign(plan, folder, crew, progress)
-    except RecordNotWritten as e:
-        done = f"; {told_done(progress.tally)}; the same call goes on when there is room" if progress.tally else ""
-        raise RunNotWritten(f"{e}{done}") from e
+    except (RecordNotWritten, CrewLost) as e:
+        if progress.tally is None:
+            raise
+        stopped = WorkersLost if isinstance(e, CrewLost) else RunNotWritten
+        raise stopped(f"{e}; {told_done(progress.tally)}; the same call goes on") from e
 
 
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:

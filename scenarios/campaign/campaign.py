@@ -43,12 +43,14 @@ def carry_out_campaign(
     also if a unit failed in it. Lost runs are tried again by the next call.
 
     Raises:
-        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError: before anything was written.
+        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError, BadCrew: before anything was
+            written.
         RecordNotWritten: there is no room.
+        CrewLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
     plan = check_campaign(plan, folder)
-    with folder.opened(plan, unit_fmus(plan)) as fmus:
+    with folder.opened(plan, unit_fmus(plan), crew.check) as fmus:
         work = _Work(plan, folder, progress)
         try:
             work.give_to(crew, fmus)
