@@ -13,7 +13,7 @@ from cosim.exceptions import RecordNotWritten
 from cosim.master_options import MasterOptions
 from scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
 from scenarios.campaign.bad_crew import CrewLost
-from scenarios.campaign.campaign import carry_out_campaign, check_campaign
+from scenarios.campaign.campaign import carry_out_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_interruption import CampaignInterruption
 from scenarios.campaign.campaign_place import place_of
@@ -23,7 +23,7 @@ from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.grid import parse_grid, set_parameters
 from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
-from scenarios.campaign.plan_check import checked_plan, unit_fmus
+from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from scenarios.chosen import replacements, scenario_named
 from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
 from scenarios.headed_options import HeadedCommand, HeadedOption
@@ -149,8 +149,10 @@ def _sweep(plan: CampaignPlan, out: Path | None, workforce: _Workforce, *, repor
     try:
         with CampaignInterruption(), told_in_one_line():
             plan = checked_plan(plan)
-            folder = CampaignFolder(out) if out else place_of(plan, unit_fmus(plan))
-            check_campaign(plan, folder)
+            fmus = unit_fmus(plan)
+            check_units(plan, fmus)
+            folder = CampaignFolder(out) if out else place_of(plan, fmus)
+            folder.check(plan, fmus)  # before workers are started
             table = _carry_out(plan, folder, workforce, progress)
             if report:
                 _write_report(folder)
