@@ -14,6 +14,7 @@ from scenarios.helix_handover.watch import HandoverWatch
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
 P_WG = np.array([0.16, 0.0, -0.6])
+CALIBRATED = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
 
 
 def signals(phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0) -> Signals:
@@ -21,7 +22,7 @@ def signals(phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, alo
     reals = {
         "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
         "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along])},
-        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG},
+        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
     }
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
         unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
@@ -91,3 +92,10 @@ def test_a_run_that_timed_out_has_a_start_and_an_end():
 def test_a_moment_is_shown_once():
     watch = follow((0.0, signals(Phase.WAIT)))
     assert list(watch.snapshots) == ["start"]
+
+
+def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to_close():
+    metrics = follow((7.9, signals(Phase.DESCEND)), (8.0, signals(Phase.GRASP))).outcome().metrics
+    assert metrics["model_travel"].value == pytest.approx(0.0, abs=1e-12)
+    assert metrics["model_mismatch"].value == metrics["arm_travel"].value == pytest.approx(np.hypot(0.16, 0.1))
+    assert "model_mismatch" not in follow((7.9, signals(Phase.DESCEND))).outcome().metrics

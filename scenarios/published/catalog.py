@@ -1,0 +1,10 @@
+"""The published experiments by name."""
+
+from collections.abc import Mapping
+
+from scenarios.published.helix_1 import Helix1
+from scenarios.published.published_experiment import PublishedExperiment
+
+_ALL: tuple[type[PublishedExperiment], ...] = (Helix1,)
+
+EXPERIMENTS: Mapping[str, type[PublishedExperiment]] = {e.name: e for e in _ALL}
