@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from cosim.signals import Signals
 from cosim.ssp.ssp_file import SspFile
+from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
 from scenarios.plotting import COLOURS, figure
 from scenarios.record import Record
