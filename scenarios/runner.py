@@ -16,6 +16,7 @@ from scenarios.ended import Ended
 from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
+from scenarios.reporting.kept_pictures import write_pictures
 from scenarios.reporting.run_page import write_run_page
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import told_if_not_written
@@ -135,6 +136,7 @@ def _conclude(
     task.folder.write_summary(summary)
     if failure is not None:
         task.folder.add_to_run(failure=failure.as_data())
+    write_pictures(task.folder.pictures, watch.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
     if task.presented:

@@ -100,8 +100,8 @@ class HelixHandover(Experiment[HandoverWatch]):
         return ("vision", "servo")
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw errors, paths and tendons over time, and the camera pictures of three moments."""
-        return draw_handover(parameters, watch.snapshots, record, folder)
+        """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
+        return draw_handover(parameters, watch.pictures(), record, folder)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return arm, gripper, hand, ball and cameras in space."""

@@ -44,6 +44,8 @@ def assert_same(joined: Path, whole: Path) -> None:
     assert summary_of(joined) == summary_of(whole)
     names = {str(p.relative_to(whole)) for p in whole.rglob("*")}
     assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
+    for picture in whole.glob("pictures/*"):
+        assert (joined / "pictures" / picture.name).read_bytes() == picture.read_bytes(), picture.name
     told, wanted = (json.loads((folder / "run.json").read_text()) for folder in (joined, whole))
     assert told | {"checkpoint": None} == wanted
 
