@@ -11,10 +11,12 @@ from cosim.exceptions import UnitFailure
 from cosim.master import Master
 from scenarios.conversions import conversions_of
 from scenarios.experiment import Metric, Outcome
-from scenarios.report import UnitRow
 from scenarios.resumption import Spent
 from scenarios.task import Task
 from scenarios.told_system import told_system
+
+UnitRow = tuple[str, str, str, int | None, float | None]
+"""Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
 
 
 def configuration(task: Task) -> dict[str, Any]:

@@ -14,10 +14,12 @@ from scenarios.free_flyer.handover_figures import draw_handover
 from scenarios.free_flyer.handover_parameters import Parameters
 from scenarios.free_flyer.handover_plots import plot_handover
 from scenarios.free_flyer.handover_watch import HandoverWatch
+from scenarios.free_flyer.replay import replay_handover
 from scenarios.free_flyer.rig import arm, expected_lag, wire_handover
 from scenarios.paper import paper_values
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
 _FLIGHT = 120
@@ -121,6 +123,10 @@ class FlyerHandover(Experiment[HandoverWatch]):
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return the gripper's place, speed and angle, who holds the object, and thrust over time."""
         return plot_handover(parameters, record, self.receivers)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return robot, hand and object in space."""
+        return replay_handover(record)
 
 
 def _check_reach(p_WG: Floats) -> None:

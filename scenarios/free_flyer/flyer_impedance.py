@@ -13,9 +13,11 @@ from scenarios.free_flyer.impedance_figures import draw_push
 from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from scenarios.free_flyer.impedance_plots import plot_push
 from scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from scenarios.free_flyer.replay import replay_push
 from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from scenarios.paper import paper_values
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
 
@@ -94,3 +96,7 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return errors actual and calculated, push and thrust over time."""
         return plot_push(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return the robot, its gripper's place of rest and the push in space."""
+        return replay_push(record)

@@ -12,9 +12,11 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
 from scenarios.helix_handover.plots import plot_handover
+from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
 
@@ -106,3 +108,7 @@ class HelixHandover(Experiment[HandoverWatch]):
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distance to the goal, positions, tendons and gripper over time."""
         return plot_handover(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return arm, gripper, hand, ball and cameras in space."""
+        return replay_handover(record)

@@ -12,10 +12,12 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.ir_grasp.figures import draw_grasp
 from scenarios.ir_grasp.parameters import Parameters
 from scenarios.ir_grasp.plots import plot_grasp
+from scenarios.ir_grasp.replay import replay_grasp
 from scenarios.ir_grasp.situation import Situation
 from scenarios.ir_grasp.watch import GraspWatch
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
 
@@ -108,3 +110,7 @@ class IrGrasp(Experiment[GraspWatch]):
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distances, cost, and wrist, heading and closure over time."""
         return plot_grasp(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return hand, object and beams in space."""
+        return replay_grasp(parameters, record)

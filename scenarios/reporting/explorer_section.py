@@ -2,6 +2,7 @@
 
 import base64
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -51,10 +52,14 @@ def _signal(record: Record, name: str, time: NDArray[np.float32], most: int) -> 
         "about": record.description(name),
         "items": record.items(name) or ({0: "false", 1: "true"} if values.dtype == np.bool_ else {}),
         "columns": [
-            {"of": ",".join(str(i + 1) for i in index), **_column(flat[:, k], time, most)}
-            for k, index in enumerate(np.ndindex(values.shape[1:]))
+            {"of": of, **_column(flat[:, k], time, most)} for k, of in enumerate(_subscripts(values.shape[1:]))
         ],
     }
+
+
+def _subscripts(shape: tuple[int, ...]) -> list[str]:
+    """Return the subscripts of an array's elements, counted from 1 as in a record; [""] for a scalar."""
+    return [",".join(str(i + 1) for i in index) for index in product(*map(range, shape))]
 
 
 def _column(values: Floats, time: NDArray[np.float32], most: int) -> Mapping[str, Any]:

@@ -10,6 +10,7 @@ from scenarios.parameters import BadParameter, parameters_of
 from scenarios.record import Record
 from scenarios.reporting.explorer_section import explorer_section
 from scenarios.reporting.page import write_page
+from scenarios.reporting.replay_section import replay_section
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_lead import run_lead
 from scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
@@ -44,7 +45,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
 
 
 def _record(folder: RunFolder) -> Record | None:
-    """Return the record; None where there is none, or of less than two rows: of one instant nothing is seen over time."""
+    """Return the record; None where there is none, or one of less than two rows, which shows nothing over time."""
     if not folder.signals.exists():
         return None
     try:
@@ -60,7 +61,11 @@ def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
         return ()
     try:
         parameters: Any = parameters_of(type(facts.experiment), facts.run["parameters"])
-        return [time_plots_section(facts.experiment.plots(parameters, record), record)]
+        plots, replay = facts.experiment.plots(parameters, record), facts.experiment.replay(parameters, record)
+        return [
+            time_plots_section(plots, record),
+            None if replay is None else replay_section(replay, record),
+        ]
     except (BadParameter, KeyError) as e:
         why = e.args[0] if e.args else e
         html = Markup("<p>The run is of another version of {}, so its plots and its replay are left out: {}.</p>")

@@ -62,8 +62,8 @@ def files_section(facts: RunFacts) -> Section:
     """Return what is in the run's folder, and the versions that it ran with."""
     path = facts.folder.path
     there = [(name, what) for name, what in _FILES.items() if _is_something(path / name)]
-    units = {name: u.get("fmu", "") for name, u in facts.run.get("units", {}).items() if isinstance(u, dict)}
-    html = template("run_files.html").render(files=there, units=units, versions=facts.run.get("versions", {}))
+    versions, units = facts.run.get("versions", {}), facts.run.get("units", {})
+    html = template("run_files.html").render(files=there, units=units, versions=versions)
     return Section(anchor="files", title="Files", html=Markup(html))
 
 

@@ -26,7 +26,7 @@ def rows_of_curve(values: Floats, most: int) -> Rows:
 
 
 def rows_of_steps(values: Floats, most: int) -> Rows:
-    """Return the rows where a value that is held changes, the first and the last one; a curve's if they are too many."""
+    """Return the rows where a value that is held changes, the first and the last; a curve's if they are too many."""
     if len(values) == 0:
         return np.zeros(0, np.int64)
     changes = changes_of(values)

@@ -1,6 +1,7 @@
 """Draws what a scenario gives to be drawn over time."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def time_plots_section(plots: Sequence[TimePlot], record: Record) -> Section | N
 
 
 def time_figure(plot: TimePlot, record: Record) -> go.Figure:
-    """Return a plot as a figure: units in the axis' title and in what is told of a point; phases are the page's to draw."""
+    """Return a plot as a figure, with its unit at the axis and at each value told; the page draws the phases."""
     colours = _colours(plot.curves)
     meta: dict[str, Any] = {"time": True}
     if plot.phases:
@@ -88,19 +89,23 @@ def _line(value: float) -> dict[str, Any]:
 
 def _name(label: str, value: float, logarithmic: bool) -> dict[str, Any]:
     place = {"xref": "paper", "x": 1, "xanchor": "right", "y": np.log10(value) if logarithmic else value}
-    return {**place, "yanchor": "bottom", "text": label, "showarrow": False, "font": {"color": "var(--soft)", "size": 12}}
+    return {
+        **place,
+        "yanchor": "bottom",
+        "text": label,
+        "showarrow": False,
+        "font": {"color": "var(--soft)", "size": 12},
+    }
 
 
 def _phases(record: Record, signal: str) -> list[dict[str, Any]]:
     """Return when each phase began and ended, s, and its name; the longest ones where there are too many to be seen."""
     values, names, time = record[signal], record.items(signal), record.time
     edges = [0, *changes_of(values.astype(np.float64)).tolist(), len(time) - 1]
-    spans = [
-        {"from": float(time[a]), "to": float(time[b]), "name": _told(names, int(values[a]))}
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    longest = sorted(pairwise(edges), key=lambda span: float(time[span[0]] - time[span[1]]))[:_MOST_PHASES]
+    return [
+        {"from": float(time[a]), "to": float(time[b]), "name": _told(names, int(values[a]))} for a, b in sorted(longest)
     ]
-    kept = sorted(spans, key=lambda s: s["from"] - s["to"])[:_MOST_PHASES]
-    return sorted(kept, key=lambda s: s["from"])
 
 
 def _told(names: dict[int, str], value: int) -> str:

@@ -11,10 +11,12 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 from scenarios.vsl.figures import draw_path_run
 from scenarios.vsl.parameters import Parameters
 from scenarios.vsl.plots import plot_path_run
+from scenarios.vsl.replay import replay_path
 from scenarios.vsl.watch import PathWatch
 
 _MORE = 5
@@ -118,3 +120,7 @@ class PathExperiment(Experiment[PathWatch]):
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return error and place of the tip, joints, pressures and currents over time."""
         return plot_path_run(parameters, record, hybrid=self.hybrid)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return arm, load, path and the tip's way in space."""
+        return replay_path(parameters, record, hybrid=self.hybrid)
