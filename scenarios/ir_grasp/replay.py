@@ -8,7 +8,7 @@ from plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
 from plants.grasp_objects import outlines
 from scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
 from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.plots import FINGERS
+from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.record import Record
 from scenarios.reporting.meshes import Mesh, merged, prism
 from scenarios.reporting.replay import Body, Line, Replay
