@@ -117,7 +117,8 @@ def _errors(arm: Helix1Arm, alpha: float, runs: Path) -> list[Floats]:
             continue
         record = Record(path)
         amid = (np.arange(round(row["steps"]), dtype=np.float64) + 0.5) * row["control_period"]  # between two updates
-        index = np.minimum(np.searchsorted(record.time, amid), len(record.time) - 1)
+        after = np.asarray(np.searchsorted(record.time, amid), dtype=np.int64)
+        index = np.minimum(after, len(record.time) - 1)
         seen: NDArray[np.bool_] = record["servo.phase"][index] != int(Phase.WAIT)
         found.append(np.where(seen, record["servo.error"][index], np.nan))
     return found

@@ -91,13 +91,12 @@ def test_two_runs_are_too_few_for_a_mean():
 @pytest.mark.parametrize(("length", "verdict"), [(0.14, Verdict.NOT_COMPARABLE), (0.08, Verdict.NOT_REPRODUCED)])
 def test_a_mismatch_that_the_arm_was_fitted_to_can_only_fail(length: float, verdict: Verdict):
     same = {"model_mismatch": length, "arm_travel": 0.2, "model_travel": 0.28}
-    assert judged(table_of(PUBLISHED, **same), "model's gripper").verdict is verdict
+    assert judged(table_of(PUBLISHED, "thesis", **same), "model's gripper").verdict is verdict
 
 
 def test_our_settings_are_judged_beyond_the_paper_and_last():
-    ours, theirs = (
-        table_of(PUBLISHED, tuning, grasp_offset_lateral=d).table for tuning, d in (("own", 0.004), ("thesis", 0.02))
-    )
+    ours = table_of(PUBLISHED, "own", grasp_offset_lateral=0.004).table
+    theirs = table_of(PUBLISHED, "thesis", grasp_offset_lateral=0.02).table
     claims = Helix1().claims(CampaignTable(pa.concat_tables([ours, theirs])))
     assert [c.beyond for c in claims] == [False] * (len(claims) - 2) + [True, True]
     assert claims[-1].measured == "0.0040 m against 0.0200 m (medians)"
