@@ -1,67 +1,85 @@
-"""What is left to do when the process of a run has died: its record is completed, and it is told what happened."""
+"""How the process of a run died, and what it left, which is completed."""
 
-import resource
 import shutil
 import signal
-import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import RecordNotWritten, UnitFailure
+from cosim.exceptions import UnitFailure
 from cosim.failures import UnitCrashed, UnitHung
 from cosim.heartbeat import Call, Heartbeat
 from cosim.record.complete_record import complete_record
 from scenarios.ended import Ended
-from scenarios.exit_status import UNIT_FAILED
 from scenarios.experiment import Outcome
-from scenarios.listing import print_summary
+from scenarios.forked_child import ChildEnd
 from scenarios.record import Record
-from scenarios.report import write_report
 from scenarios.run_folder import RunFolder, told_if_not_written
 
-_BY_SIGNAL = 128  # what shells add to a signal's number
 
-
-def tell_death(heartbeat: Heartbeat, number: int | None, status: int, wall: float, *, hung: bool) -> int:
-    """Complete what a run has left, tell what it died of, and return the exit status that says so.
+class Death:
+    """The death of a run's process. What the run had for its time alone is removed.
 
     Args:
         heartbeat: what the run told while it lived.
-        number: the signal that ended it, None where it ended itself.
-        status: its exit status then.
+        end: how its process ended.
         wall: seconds that it lived.
-        hung: whether it was ended because a unit's call did not return.
+
+    Attributes:
+        failure: how the unit failed in whose call the process ended; None where it was not a unit.
+        told: what happened, in a line.
+        facts: what the run told for this case.
+        folder: of the run, None if there was none yet.
     """
-    facts = heartbeat.facts
-    for folder in facts.get("scratch", []):
-        shutil.rmtree(folder, ignore_errors=True)
-    call = heartbeat.under_way
-    failure = _failure(heartbeat, call, number, status, hung=hung)
-    told = _how_it_ended(call, heartbeat.time, number, status) if failure is None else str(failure)
-    sys.stderr.write(f"{told}\n")
-    if "folder" in facts:
-        data = _data(call, heartbeat.time, number, status) if failure is None else failure.as_data()
-        reason = told if failure is None else f"{failure.verdict}: {failure.cause}"
-        try:
-            with told_if_not_written(Path(facts["folder"])):
-                _complete(facts, {"reason": reason, "wall_seconds": wall, "failure": data}, failure)
-        except RecordNotWritten as e:
-            sys.stderr.write(f"{e}\n")
-    return UNIT_FAILED if failure is not None or "folder" in facts else _BY_SIGNAL + (number or 0)
+
+    def __init__(self, heartbeat: Heartbeat, end: ChildEnd, wall: float) -> None:
+        self.facts = heartbeat.facts
+        for folder in self.facts.get("scratch", []):
+            shutil.rmtree(folder, ignore_errors=True)
+        self._end, self._wall, self._time, self._call = end, wall, heartbeat.time, heartbeat.under_way
+        self.failure = _failure(heartbeat, self._call, end)
+        self.told = _how_it_ended(self._call, self._time, end) if self.failure is None else str(self.failure)
+        self.folder = RunFolder.left_at(Path(self.facts["folder"])) if "folder" in self.facts else None
+
+    @property
+    def was_killed(self) -> bool:
+        """Whether it was killed from outside, and not because it hung."""
+        return self._end.signal == signal.SIGKILL and not self._end.hung
+
+    def complete(self, folder: RunFolder) -> Ended:
+        """Complete the record in the run's folder as far as it goes, and write the summary.
+
+        Raises:
+            RecordNotWritten: there is no room for it.
+        """
+        failure = self.failure
+        data = _data(self._call, self._time, self._end) if failure is None else failure.as_data()
+        reason = self.told if failure is None else f"{failure.verdict}: {failure.cause}"
+        with told_if_not_written(folder.path):
+            summary: dict[str, Any] = {
+                **self.facts["configuration"],
+                "complete": False,
+                "success": False,
+                "metrics": dict[str, Any](),
+                "simulated_seconds": _simulated(folder),
+                "cpu_seconds": self._end.cpu,
+                "reason": reason,
+                "wall_seconds": self._wall,
+                "failure": data,
+            }
+            folder.write_summary(summary)
+            folder.add_to_run(failure=data)
+        return Ended(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
 
 
-def _failure(
-    heartbeat: Heartbeat, call: Call | None, number: int | None, status: int, *, hung: bool
-) -> UnitFailure | None:
-    """Return how the unit failed in whose call the process ended; None where it was not a unit."""
+def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFailure | None:
     if call is None:
         return None
     log = heartbeat.log_of(call.unit)
-    if hung:
+    if end.hung:
         return UnitHung(*call, heartbeat.limit, log)
-    if number == signal.SIGKILL:
+    if end.signal == signal.SIGKILL:
         return None
-    how = f"it ended the process with status {status}" if number is None else _meaning(number)
+    how = f"it ended the process with status {end.status}" if end.signal is None else _meaning(end.signal)
     return UnitCrashed(*call, how, log)
 
 
@@ -69,46 +87,30 @@ def _meaning(number: int) -> str:
     return (signal.strsignal(number) or f"signal {number}").lower()
 
 
-def _how_it_ended(call: Call | None, t: float, number: int | None, status: int) -> str:
+def _how_it_ended(call: Call | None, t: float, end: ChildEnd) -> str:
     within = f", in {call.call} of {call.unit}" if call is not None else ", outside of its units"
-    if number == signal.SIGKILL:
+    if end.signal == signal.SIGKILL:
         return f"the run was killed at t = {t:.6g} s{within}: by someone, or by the system for want of memory"
-    how = f"ended with status {status}" if number is None else _meaning(number)
+    how = f"ended with status {end.status}" if end.signal is None else _meaning(end.signal)
     return f"the run crashed at t = {t:.6g} s{within}: {how}"
 
 
-def _data(call: Call | None, t: float, number: int | None, status: int) -> dict[str, Any]:
+def _data(call: Call | None, t: float, end: ChildEnd) -> dict[str, Any]:
     return {
-        "kind": "killed" if number == signal.SIGKILL else "crash",
+        "kind": "killed" if end.signal == signal.SIGKILL else "crash",
         "instance": call.unit if call is not None else None,
         "call": call.call if call is not None else None,
         "time": t,
-        "status": f"status {status}" if number is None else _meaning(number),
+        "status": f"status {end.status}" if end.signal is None else _meaning(end.signal),
         "log": [],
     }
 
 
-def _complete(facts: dict[str, Any], known: dict[str, Any], failure: UnitFailure | None) -> None:
-    folder = RunFolder.left_at(Path(facts["folder"]))
+def _simulated(folder: RunFolder) -> float:
+    """Complete a record and return the time at which it ends, s."""
     try:
         complete_record(folder.signals)
     except FileNotFoundError:  # it died before it recorded
-        simulated = 0.0
-    else:
-        time = Record(folder.signals).time
-        simulated = float(time[-1]) if len(time) else 0.0
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    summary: dict[str, Any] = {
-        **facts["configuration"],
-        "complete": False,
-        "success": False,
-        "metrics": dict[str, Any](),
-        "simulated_seconds": simulated,
-        "cpu_seconds": spent.ru_utime + spent.ru_stime,
-        **known,
-    }
-    folder.write_summary(summary)
-    folder.add_to_run(failure=known["failure"])
-    write_report(folder, facts["title"], (), summary, facts["parameters"], facts["units"], ())
-    outcome = Outcome(success=False, reason=known["reason"])
-    print_summary(Ended(outcome=outcome, summary=summary, failure=failure), (), folder)
+        return 0.0
+    time = Record(folder.signals).time
+    return float(time[-1]) if len(time) else 0.0

@@ -20,7 +20,7 @@ from scenarios.conversions import told_conversion
 from scenarios.ended import Ended
 from scenarios.experiment import Experiment
 from scenarios.master_rows import pace_rows
-from scenarios.report import told
+from scenarios.reporting.told_metric import told
 from scenarios.run_folder import RunFolder
 
 _MOST_CONVERSIONS = 8

@@ -10,9 +10,11 @@ import numpy as np
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
 from scenarios.experiment import Metric, Outcome
-from scenarios.report import UnitRow
 from scenarios.resumption import Spent
 from scenarios.task import Task
+
+UnitRow = tuple[str, str, str, int | None, float | None]
+"""Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
 
 
 def configuration(task: Task) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """Carries out one run of a scenario: everything is checked, then the folder is made, then it runs and is reported."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer
@@ -18,11 +17,11 @@ from scenarios.ended import Ended
 from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
-from scenarios.report import UnitRow, write_report
+from scenarios.reporting.run_page import write_run_page
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import told_if_not_written
 from scenarios.run_metrics import run_metrics
-from scenarios.run_summary import configuration, files_and_forms, parameter_rows, summary_of, unit_rows
+from scenarios.run_summary import configuration, files_and_forms, summary_of, unit_rows
 from scenarios.supervisor import heartbeat_of_run
 from scenarios.task import Task
 
@@ -83,8 +82,6 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     master.heartbeat.tell(
         folder=str(task.folder.path),
         configuration=configuration(task),
-        title=task.experiment.title,
-        parameters=parameter_rows(task),
         units=[(*row[:3], None, None) for row in unit_rows(master)],
     )
 
@@ -141,8 +138,9 @@ def _conclude(
         task.folder.add_to_run(failure=failure.as_data())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
-    with told_if_not_written(task.folder.path):
-        _present(task, watch, summary, unit_rows(master))
+    if task.presented:
+        with told_if_not_written(task.folder.path):
+            _present(task, watch)
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
@@ -155,11 +153,8 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
     return seen
 
 
-def _present(task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[UnitRow]) -> None:
-    figures = []
+def _present(task: Task, watch: Watch) -> None:
     record = Record(task.folder.signals) if task.folder.signals.exists() else None
     if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
-        figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
-    write_report(
-        task.folder, task.experiment.title, task.experiment.headline, summary, parameter_rows(task), units, figures
-    )
+        task.experiment.draw(task.parameters, watch, record, task.folder.figures)
+    write_run_page(task.folder)

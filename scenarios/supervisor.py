@@ -5,7 +5,6 @@ Only where processes can be forked, thus not on Windows. What is imported here i
 
 import contextlib
 import os
-import select
 import signal
 import sys
 import threading
@@ -14,13 +13,9 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from cosim.heartbeat import Heartbeat
-from cosim.stillness import Stillness
+from scenarios.forked_child import ChildEnd, ForkedChild
 
-_LOOK = 0.25  # s
-_GRACE = 5.0
-"""How much later than the child itself the parent gives up a call, s; only a child that cannot act is late."""
-
-_ORDERS = (
+ORDERS = (
     () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
 )
 """Signals that ask a process to end: no crash."""
@@ -39,6 +34,19 @@ def heartbeat_of_run() -> Heartbeat:
     return heartbeat
 
 
+def begin_child() -> None:
+    """Tell that this process is a child, whose parent reads `heartbeat`."""
+    global _in_child
+    _in_child = True
+
+
+def renew_heartbeat() -> Heartbeat:
+    """Return the heartbeat of the next run in a child of this process."""
+    global heartbeat
+    heartbeat = Heartbeat()
+    return heartbeat
+
+
 def can_supervise() -> bool:
     """Return whether this process can be forked: the system does it, and no thread would be lost."""
     return hasattr(os, "fork") and threading.active_count() == 1
@@ -51,28 +59,21 @@ def supervise(command: Callable[[], Any]) -> NoReturn:
     child hears of each once. If the parent dies, so does the child.
     """
     began = time.monotonic()
-    alive, lives = os.pipe()
-    parent_alive, parent_lives = os.pipe()
     heard = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGCONT]
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
-    child = os.fork()
-    if child == 0:
-        global _in_child
-        _in_child = True
-        os.close(alive)
-        os.close(parent_lives)
-        os.setpgid(0, 0)
+
+    def begin() -> NoReturn:
+        begin_child()
         signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # a group in the background may write to the terminal
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        threading.Thread(target=_die_with_parent, args=(parent_alive,), daemon=True).start()
         run_to_end(command)
-    os.close(lives)
-    os.close(parent_alive)
-    with contextlib.suppress(OSError):  # it has done so itself, or is gone
-        os.setpgid(child, child)
-    _pass_on(child)
+
+    child = ForkedChild(begin, heartbeat)
+    _pass_on(child.pid)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    _end_as(*_wait(child, alive), began)
+    end = child.wait()
+    assert end is not None  # it watched nothing else
+    _end_as(end, time.monotonic() - began)
 
 
 def run_to_end(command: Callable[[], Any]) -> NoReturn:
@@ -99,11 +100,6 @@ def leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _die_with_parent(parent_alive: int) -> None:
-    os.read(parent_alive, 1)
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 def _pass_on(child: int) -> None:
     def tell(number: int, _frame: Any) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -122,30 +118,14 @@ def _pass_on(child: int) -> None:
         signal.signal(signal.SIGTSTP, stop)
 
 
-def _wait(child: int, alive: int) -> tuple[int, bool]:
-    """Return the child's status as `os.waitpid` has it, and whether it was ended because a call did not return."""
-    stillness = Stillness(heartbeat, 2 * _LOOK)
-    hung = False
-    while True:
-        gone, _, _ = select.select([alive], [], [], _LOOK)
-        pid, status = os.waitpid(child, 0 if gone else os.WNOHANG)
-        if pid:
-            return status, hung
-        if heartbeat.limit and stillness.look() >= heartbeat.limit + _GRACE:
-            hung = True
-            os.kill(child, signal.SIGKILL)
-
-
-def _end_as(status: int, hung: bool, began: float) -> NoReturn:
+def _end_as(end: ChildEnd, wall: float) -> NoReturn:
     """End as the child did; where it was not done, tell what it died of."""
-    number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else None
-    if number is not None and number in _ORDERS:
-        signal.signal(number, signal.SIG_DFL)
-        os.kill(os.getpid(), number)
+    if end.signal is not None and end.signal in ORDERS:
+        signal.signal(end.signal, signal.SIG_DFL)
+        os.kill(os.getpid(), end.signal)
     if heartbeat.status is not None:
-        sys.exit(heartbeat.status if number is not None else os.WEXITSTATUS(status))
-    from scenarios.death import tell_death
+        sys.exit(heartbeat.status if end.signal is not None else end.status)
+    from scenarios.tell_death import tell_death
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    code = 0 if number is not None else os.WEXITSTATUS(status)
-    sys.exit(tell_death(heartbeat, number, code, time.monotonic() - began, hung=hung))
+    sys.exit(tell_death(heartbeat, end, wall))

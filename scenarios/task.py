@@ -23,6 +23,7 @@ class Task:
         every: simulated seconds from checkpoint to checkpoint, if there are to be any.
         source: what `resume` needs to find the experiment again, if it is not one of the catalog.
         options: how its units are run.
+        presented: whether figures are drawn and a report is written at the end.
     """
 
     experiment: Experiment[Any]
@@ -34,3 +35,4 @@ class Task:
     every: Fraction | None = None
     source: Mapping[str, Any] = field(default_factory=dict[str, Any])
     options: MasterOptions = field(default_factory=MasterOptions)
+    presented: bool = True

@@ -93,8 +93,10 @@ class CampaignPlan:
         """Return the first point that shares its seeds with a point, None if all do."""
         if not self.paired:
             return point
+        if not self.scenes:
+            return None
         scenes = [tuple(p.get(name) for name in self.scenes) for p in self.points]
-        return scenes.index(scenes[point]) if self.scenes else None
+        return scenes.index(scenes[point])
 
     def _name(self, point: int, repetition: int) -> str:
         """Return such as `007_alpha=0.2_r0003`: point, what is varied as far as there is room, repetition."""

@@ -1,0 +1,33 @@
+"""Tells what the process of a run died of, when what it left is completed."""
+
+import sys
+
+from cosim.exceptions import RecordNotWritten
+from cosim.heartbeat import Heartbeat
+from scenarios.death import Death
+from scenarios.exit_status import UNIT_FAILED
+from scenarios.forked_child import ChildEnd
+from scenarios.listing import print_summary
+from scenarios.reporting.run_page import write_run_page
+from scenarios.run_folder import told_if_not_written
+
+_BY_SIGNAL = 128  # what shells add to a signal's number
+
+
+def tell_death(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
+    """Complete what a run has left, tell what it died of, and return the exit status that says so.
+
+    For the arguments see `Death`.
+    """
+    death = Death(heartbeat, end, wall)
+    sys.stderr.write(f"{death.told}\n")
+    if death.folder is None:
+        return UNIT_FAILED if death.failure is not None else _BY_SIGNAL + (end.signal or 0)
+    try:
+        ended = death.complete(death.folder)
+        with told_if_not_written(death.folder.path):
+            write_run_page(death.folder)
+        print_summary(ended, (), death.folder)
+    except RecordNotWritten as e:
+        sys.stderr.write(f"{e}\n")
+    return UNIT_FAILED
