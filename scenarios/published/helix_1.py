@@ -15,7 +15,7 @@ from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.helix_1_arm import Helix1Arm
 from scenarios.published.helix_1_claims import own_claims, thesis_claims
 from scenarios.published.helix_1_figures import draw_errors, draw_times
-from scenarios.published.helix_1_tables import by_place, steps, table_1
+from scenarios.published.helix_1_tables import by_place, fig_9, steps, table_1
 from scenarios.published.published_experiment import PublishedExperiment
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ class Helix1(PublishedExperiment):
             fixed={"patience": str(_PATIENCE)},
             repetitions=1 if quick else repetitions,
             seed=1,
+            experiment=self.name,
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
@@ -65,9 +66,9 @@ class Helix1(PublishedExperiment):
         return [*thesis_claims(thesis), *own_claims(thesis, own)]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
-        """Return table 1, its steps and its times by place, for both settings."""
+        """Return table 1, its steps, its times by place and the lengths of fig. 9, for both settings."""
         arms = [Helix1Arm.of(table, tuning) for tuning in (Tuning.THESIS, Tuning.OWN)]
-        return [made(arm) for arm in arms if arm.tried for made in (table_1, steps, by_place)]
+        return [made(arm) for arm in arms if arm.tried for made in (table_1, steps, by_place, fig_9)]
 
     def draw(self, table: CampaignTable, folder: Path) -> Sequence[Figure]:
         """Draw the times by step size, and the error over time as in fig. 8."""

@@ -8,9 +8,10 @@ from scipy.stats import page_trend_test, ttest_ind_from_stats
 
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import FEWEST, missing, p_text, published, too_few
+from scenarios.published.helix_1_telling import FEWEST, missing, published, too_few
 from scenarios.published.ratio_interval import ratio_interval
 from scenarios.published.statistics import LEVEL, time_interval
+from scenarios.published.verdict_rules import told_p
 
 
 def time_claims(arm: Helix1Arm) -> list[Claim]:
@@ -37,7 +38,7 @@ def _falls(arm: Helix1Arm) -> Claim:
         measured=", ".join(f"{m:.1f}" if np.isfinite(m) else "never" for m in ours) + " s (medians)",
         verdict=Verdict.REPRODUCED if falls else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if the medians fall, and Page's exact test of a trend within places rejects: p = "
-        f"{p_text(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as longer "
+        f"{told_p(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as longer "
         "than any.",
     )
 
@@ -86,7 +87,7 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
         interval=(interval.low, interval.high),
         unit="s",
         verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {p_text(p)}, {len(x)} runs against "
+        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {told_p(p)}, {len(x)} runs against "
         f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}",
     )
 

@@ -36,7 +36,7 @@ def test_one_ball_that_was_not_taken_is_one_too_many():
     assert (claim.measured, claim.verdict) == ("23 of 24", Verdict.NOT_REPRODUCED)
     assert claim.interval is not None
     assert claim.interval[1] < 1.0
-    assert "p = 1.000" in claim.reason
+    assert claim.reason.endswith("p = 1.")
 
 
 def test_a_gripper_that_closed_beside_the_ball_has_moved_its_arm():
