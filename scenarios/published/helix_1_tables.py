@@ -15,8 +15,8 @@ Floats = NDArray[np.float64]
 
 _ON_EQUAL_BOUNDS = (
     " The thesis's ε_pose,bound and ε_control are both 5 mm. One iteration of the Jacobian loop leaves about "
-    "ε_pose,bound, so that the last digits decide whether the loop goes on. Where it does, it takes that much back from "
-    "the step, and the error stalls near ε_pose,bound / α: at α = 0.1 that is 50 mm, the threshold itself."
+    "ε_pose,bound, so that the last digits decide whether the loop goes on. Where it does, it takes that much back "
+    "from the step, and the error stalls near ε_pose,bound / α: at α = 0.1 that is 50 mm, the threshold itself."
 )
 
 
@@ -82,8 +82,8 @@ def fig_9(arm: Helix1Arm) -> ComparisonTable:
     header = ["m", "α = 0.1, published", *(f"α = {alpha}, ours" for alpha in arm.alphas)]
     note = (
         "When the gripper begins to close, in m, means of the runs: gripper of the commanded state to the measured "
-        "one, and both from where the gripper hangs after calibration. The arm's stiffness and masses were chosen for these "
-        "three lengths in one state at rest, and the ball's place is assumed: 0.19 m from there."
+        "one, and both from where the gripper hangs after calibration. The arm's stiffness and masses were chosen for "
+        "these three lengths in one state at rest, and the ball's place is assumed: 0.19 m from there."
     )
     return ComparisonTable(title=f"Model and arm as in fig. 9, {arm.title}", header=header, rows=rows, note=note)
 
