@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
@@ -20,7 +20,6 @@ from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_summary import print_campaign
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
-from scenarios.campaign.dask_crew import crew_at, embedded_crew
 from scenarios.campaign.grid import parse_grid, set_parameters
 from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
 from scenarios.campaign.plan_check import checked_plan, unit_fmus
@@ -29,7 +28,6 @@ from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
 from scenarios.headed_options import HeadedCommand, HeadedOption
 from scenarios.limit_arguments import limit_options, limits
 from scenarios.master_arguments import coupling_of, master_options
-from scenarios.reporting.campaign_page import write_campaign_page
 from scenarios.scenario_arguments import scenario_options
 from scenarios.ssp_run import is_ssp
 
@@ -131,13 +129,19 @@ def sweep(
             units={name: str(file) for name, file in replacements(experiment, replaced).items()},
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
-    workforce = embedded_crew(workers) if scheduler is None else crew_at(scheduler)
-    _sweep(plan, out, workforce, report=not no_report)
+    _sweep(plan, out, lambda: _workforce(workers, scheduler), report=not no_report)
 
 
-def _sweep(
-    plan: CampaignPlan, out: Path | None, workforce: contextlib.AbstractContextManager[Crew], *, report: bool
-) -> NoReturn:
+def _workforce(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Crew]:
+    from scenarios.campaign.dask_crew import crew_at, embedded_crew  # loading Dask takes half a second
+
+    return embedded_crew(workers) if scheduler is None else crew_at(scheduler)
+
+
+_Workforce = Callable[[], contextlib.AbstractContextManager[Crew]]
+
+
+def _sweep(plan: CampaignPlan, out: Path | None, workforce: _Workforce, *, report: bool) -> NoReturn:
     """Carry out a campaign, tell how it went, and exit with the status that says so."""
     progress = CampaignProgress(sys.stderr)
     folder = None
@@ -148,7 +152,7 @@ def _sweep(
             check_campaign(plan, folder)
             table = _carry_out(plan, folder, workforce, progress)
             if report:
-                write_campaign_page(folder.path)
+                _write_report(folder)
     except KeyboardInterrupt:
         _end_interrupted(folder, progress)
     tally = progress.tally
@@ -157,14 +161,17 @@ def _sweep(
     sys.exit(UNIT_FAILED if tally.failed or tally.lost else 0)
 
 
+def _write_report(folder: CampaignFolder) -> None:
+    from scenarios.reporting.campaign_page import write_campaign_page  # what draws takes long to load
+
+    write_campaign_page(folder.path)
+
+
 def _carry_out(
-    plan: CampaignPlan,
-    folder: CampaignFolder,
-    workforce: contextlib.AbstractContextManager[Crew],
-    progress: CampaignProgress,
+    plan: CampaignPlan, folder: CampaignFolder, workforce: _Workforce, progress: CampaignProgress
 ) -> CampaignTable:
     try:
-        with workforce as crew, progress:
+        with workforce() as crew, progress:
             return carry_out_campaign(plan, folder, crew, progress)
     except RecordNotWritten as e:
         done = f"; {told_done(progress.tally)}; the same call goes on when there is room" if progress.tally else ""

@@ -48,8 +48,8 @@ class CampaignPlan:
         repetitions: runs of each point.
         seed: the campaign's; each run's is derived from it.
         paired: whether all points of a repetition share a seed, so that their runs can be compared one by one.
-        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share none,
-            so that their runs can be counted together.
+        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share
+            none, so that their runs can be counted together.
         units: files of FMUs that take the place of units, by the units' names.
         options: how units are run.
         experiment: name of the published experiment that it is of; "" if it is of none.
