@@ -114,12 +114,12 @@ def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
     )
     if min(len(theirs), len(ours)) < FEWEST:
         return too_few(told, f"{len(theirs)} and {len(ours)} balls taken")
-    low, high = ratio_interval(ours, theirs, np.median)
+    interval = ratio_interval(ours, theirs, np.median)
     return Claim(
         **told,
         measured=f"{np.median(ours):.4f} m against {np.median(theirs):.4f} m (medians)",
-        interval=(low, high),
-        verdict=Verdict.REPRODUCED if high < 1.0 else Verdict.NOT_REPRODUCED,
+        interval=interval,
+        verdict=Verdict.REPRODUCED if interval and interval[1] < 1.0 else Verdict.NOT_REPRODUCED,
         reason="Reproduced if the bootstrap's interval of the ratio of medians, ours to the thesis's, lies below 1.",
     )
 

@@ -54,13 +54,16 @@ def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
     x, y = arm.times(small), arm.times(large)
     if min(len(x), len(y)) < FEWEST:
         return too_few(told, f"{len(x)} and {len(y)} runs")
-    low, high = ratio_interval(x, y, np.median)
+    interval = ratio_interval(x, y, np.median)
+    if interval is None:
+        return too_few(told, "no times to divide by")
+    low, high = interval
     halves, stays = low <= half <= high, low <= 1.0 <= high
     verdict = Verdict.REPRODUCED if halves else Verdict.NOT_REPRODUCED
     return Claim(
         **told,
         measured=f"{np.median(x) / np.median(y):.2f} times (medians)",
-        interval=(low, high),
+        interval=interval,
         verdict=Verdict.NOT_COMPARABLE if halves and stays else verdict,
         reason="Reproduced if the bootstrap's interval of the ratio of medians holds 2 and not 1; not comparable if it "
         f"holds both, as the runs are then too few to tell.{missing(arm, small, large)}",
@@ -102,16 +105,16 @@ def _narrows(arm: Helix1Arm) -> Claim:
     times = [arm.times(alpha) for alpha in arm.alphas]
     if min(map(len, times)) < FEWEST:
         return too_few(told, f"{min(map(len, times))} runs at a step size")
-    low, high = ratio_interval(times[0], times[-1], _spread)
+    interval = ratio_interval(times[-1], times[0], _spread)
     ours = [float(np.std(x, ddof=1)) for x in times]
-    narrows = all(a > b for a, b in pairwise(ours)) and low > 1.0
+    narrows = all(a > b for a, b in pairwise(ours)) and interval is not None and interval[1] < 1.0
     return Claim(
         **told,
         measured=", ".join(f"{s:.1f}" for s in ours) + " s (standard deviations)",
-        interval=(low, high),
+        interval=interval,
         verdict=Verdict.REPRODUCED if narrows else Verdict.NOT_REPRODUCED,
-        reason="Reproduced if the standard deviations fall and the bootstrap's interval of the ratio of the first to "
-        f"the last lies above 1.{missing(arm, *arm.alphas)}",
+        reason="Reproduced if the standard deviations fall and the bootstrap's interval of the ratio of the last to "
+        f"the first lies below 1.{missing(arm, *arm.alphas)}",
     )
 
 

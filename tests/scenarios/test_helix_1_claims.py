@@ -1,3 +1,4 @@
+import json
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -92,6 +93,12 @@ def test_two_runs_are_too_few_for_a_mean():
 def test_a_mismatch_that_the_arm_was_fitted_to_can_only_fail(length: float, verdict: Verdict):
     same = {"model_mismatch": length, "arm_travel": 0.2, "model_travel": 0.28}
     assert judged(table_of(PUBLISHED, "thesis", **same), "model's gripper").verdict is verdict
+
+
+def test_runs_that_all_take_alike_have_no_interval_that_json_cannot_hold():
+    alike = table_of({0.1: [40.0] * 8, 0.2: [20.0] * 8, 0.4: [20.0] * 8})
+    assert json.dumps([c.as_data() for c in Helix1().claims(alike)], allow_nan=False)
+    assert judged(alike, "spread").interval is None
 
 
 def test_our_settings_are_judged_beyond_the_paper_and_last():
