@@ -15,9 +15,10 @@ from rich.text import Text
 
 from cosim.exceptions import nearest
 from scenarios.bad_call import BadCall
+from scenarios.campaign_arguments import campaign_options
 from scenarios.campaign_call import call_campaign, workforce
 from scenarios.console import open_console
-from scenarios.headed_options import HeadedCommand, HeadedOption
+from scenarios.headed_options import HeadedCommand
 
 if TYPE_CHECKING:
     from scenarios.campaign.campaign_folder import CampaignFolder
@@ -44,31 +45,12 @@ Exit status
   130  aborted with Ctrl-C: before the first run, or by a second one
 """
 
-_worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
-
 
 @click.command("paper", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("experiment", required=False, metavar="[EXPERIMENT]")
 @click.option("--quick", is_flag=True, help="A fraction of the runs; most claims need all.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of the campaign.  [default: the experiment's]")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Folder of the campaign; one that is there goes on.  [default: one of its own in campaigns/]",
-)
-@click.option("--no-report", is_flag=True, help="Write no report page at the end.")
-@click.help_option("-h", "--help")
-@_worker_option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Runs at the same time, on this machine.  [default: one a core]",
-)
-@_worker_option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Dask scheduler whose workers carry out the runs; they see this folder under the same path.",
-)
+@campaign_options
 def paper(
     experiment: str | None,
     quick: bool,

@@ -16,7 +16,7 @@ from scenarios.campaign.tally import Tally
 from scenarios.chosen import scenario_named
 from scenarios.console import open_console
 from scenarios.published.statistics import success_interval
-from scenarios.report import told
+from scenarios.reporting.told_metric import told
 
 _MOST_POINTS = 12
 _MOST_REASONS = 5
