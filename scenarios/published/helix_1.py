@@ -32,8 +32,7 @@ class Helix1(PublishedExperiment):
     """Three step sizes, four places, two runs each, with the thesis's settings; and the same with ours beside it.
 
     The claims are judged on the runs with the thesis's settings. The control period is what the thesis's loop took at
-    each step size. A quick one is one run with the thesis's settings at each of three places: three
-    minutes on two cores.
+    each step size. A quick one is a run with the thesis's settings at each of three places: three minutes on two cores.
     """
 
     name: ClassVar[str] = "helix-1"

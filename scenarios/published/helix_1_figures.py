@@ -85,7 +85,7 @@ def _our_times(axis: Axes, i: int, arm: Helix1Arm, alpha: float) -> None:
     if not rows:
         return
     times = np.array([row["arm_time"] for row in rows])
-    x = i + 0.2 + 0.16 * (np.linspace(-0.5, 0.5, len(rows)) if len(rows) > 1 else np.zeros(1))
+    x = i + 0.2 + 0.2 * (np.linspace(-0.5, 0.5, len(rows)) if len(rows) > 1 else np.zeros(1))
     held = np.array([bool(row["success"]) for row in rows])
     axis.plot(x[held], times[held], "o", ms=5, color=COLOURS[0], alpha=0.85, mew=0)
     axis.plot(x[~held], times[~held], "x", ms=6, color=COLOURS[1], mew=1.6)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
+from scenarios.paper import paper_values
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.helix_1_arm import Helix1Arm
 from scenarios.published.helix_1_telling import FEWEST, missing, published, too_few
@@ -91,7 +92,20 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
         unit="s",
         verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if Welch's test does not tell the two means apart: p = {told_p(p)}, {len(x)} runs against "
-        f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}",
+        f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
+        f"{_stall(arm, alpha)}",
+    )
+
+
+def _stall(arm: Helix1Arm, alpha: float) -> str:
+    """Tell of a step size at which the error can stall above the threshold."""
+    settings = paper_values("helix_handover", arm.tuning.name.lower())
+    stall = round(settings["epsilon_pose_bound"] / alpha, 6)
+    if settings["epsilon_control"] > settings["epsilon_pose_bound"] or stall < settings["threshold_grasp"]:
+        return ""
+    return (
+        f" At this step size the error can stall near ε_pose,bound / α = {1000 * stall:.0f} mm, the threshold, and the "
+        "last digits of two equal bounds decide whether it does: see the note on control steps."
     )
 
 

@@ -85,6 +85,12 @@ def test_a_mean_time_is_compared_with_the_published_one_and_its_spread(mean: flo
     assert claim.interval[0] < mean < claim.interval[1]
 
 
+def test_the_step_size_whose_error_can_stall_at_the_threshold_says_so():
+    table = table_of(PUBLISHED)
+    stalls = {alpha: "50 mm, the threshold" in judged(table, f"At step size {alpha}").reason for alpha in PUBLISHED}
+    assert stalls == {0.1: True, 0.2: False, 0.4: False}
+
+
 def test_two_runs_are_too_few_for_a_mean():
     assert judged(table_of(times(a04=[20.0, 25.0])), "At step size 0.4").verdict is Verdict.NOT_COMPARABLE
 
