@@ -11,6 +11,7 @@ from scenarios.check_command import check
 from scenarios.export_command import export_command
 from scenarios.listing import print_catalog, print_scenario, print_unit
 from scenarios.paper_command import paper
+from scenarios.report_command import report
 from scenarios.resume_command import resume
 from scenarios.run_command import run
 from scenarios.sweep_command import sweep
@@ -32,6 +33,7 @@ Run
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
                                          a campaign: many runs, one table
   handover paper ir-table                a paper's experiment: ours beside the published
+  handover report runs/long              its page anew, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -79,6 +81,7 @@ main.add_command(build_command)
 main.add_command(check)
 main.add_command(export_command)
 main.add_command(paper)
+main.add_command(report)
 main.add_command(resume)
 main.add_command(run)
 main.add_command(sweep)

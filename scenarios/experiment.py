@@ -95,6 +95,10 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
     def watch(self, parameters: Any) -> AnyWatch:
         """Return an observer of one run."""
 
+    def watch_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyWatch:  # noqa: ARG002
+        """Return an observer of a run that is seen again by its record, and by the pictures that its folder keeps."""
+        return self.watch(parameters)
+
     @abc.abstractmethod
     def cycle(self) -> tuple[str, ...]:
         """Return the units that make up one control cycle, whose CPU time the summary tells."""

@@ -85,10 +85,14 @@ class ServerProcess:
             _remove(folder)
             raise
 
-    def end(self) -> None:
-        """End it, and the run that it carries out, which leaves nothing."""
+    def ask_to_end(self) -> None:
+        """Let it end, without waiting for that."""
         with contextlib.suppress(OSError, ValueError):
             self._orders.close()
+
+    def end(self) -> None:
+        """End it, and the run that it carries out, which leaves nothing."""
+        self.ask_to_end()
         try:
             self._process.wait(_GRACE)
         except subprocess.TimeoutExpired:
