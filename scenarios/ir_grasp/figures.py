@@ -14,7 +14,7 @@ from plants.grasp_hand import FINGERS, finger_points, palm_outline, sensor_rays
 from plants.grasp_objects import outlines
 from scenarios.experiment import Figure
 from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.plots import FINGERS, closing_cost, cost, in_sight
+from scenarios.ir_grasp.plots import FINGER_NAMES, closing_cost, cost, in_sight
 from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 
@@ -37,7 +37,7 @@ def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t, reflex = record.time, ReflexParams()
     both = in_sight(record, "reflex.distance"), in_sight(record, "scene.range")
     with figure(folder / "distances", 2, size=(8.0, 5.6), heights=(3, 2)) as (above, below):
-        for i, finger in enumerate(FINGERS):
+        for i, finger in enumerate(FINGER_NAMES):
             seen, true = (distances[:, i] for distances in both)
             above.plot(t, seen, color=FINGER_COLOURS[i], drawstyle="steps-post", label=f"{finger}, as seen")
             above.plot(t, true, color=FINGER_COLOURS[i], lw=0.8, ls=":")
@@ -96,7 +96,7 @@ def _scene(parameters: Parameters, moments: Mapping[str, float], record: Record,
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
             axes.set_title(f"{record.time[k]:.1f} s, {role}")
         panels[0].set(ylabel="y (mm)")
-        for name, colour in zip(FINGERS, FINGER_COLOURS, strict=True):
+        for name, colour in zip(FINGER_NAMES, FINGER_COLOURS, strict=True):
             panels[len(panels) // 2].plot([], [], color=colour, lw=5, label=name)
         panels[len(panels) // 2].legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.15), handlelength=1.0)
     caption = (

@@ -8,7 +8,7 @@ from scenarios.ir_grasp.parameters import Parameters
 from scenarios.record import Record
 from scenarios.reporting.time_plot import Curve, Level, TimePlot
 
-FINGERS = ("thumb", "index", "ring")
+FINGER_NAMES = ("thumb", "index", "ring")
 _PHASES = "reflex.phase"
 _WRIST = ("reflex.p_WH_cmd", "scene.p_WH")
 _LEAST_COST = 0.1
@@ -56,7 +56,7 @@ def closing_cost(parameters: Parameters) -> float:
 def _distances(parameters: Parameters, record: Record) -> TimePlot:
     seen, true = in_sight(record, "reflex.distance"), in_sight(record, "scene.range")
     curves: list[Curve] = []
-    for i, finger in enumerate(FINGERS):
+    for i, finger in enumerate(FINGER_NAMES):
         curves.append(Curve(label=f"{finger}, as seen", values=seen[:, i], held=True, group=finger))
         curves.append(Curve(label=f"{finger}, true along the beam", values=true[:, i], faint=True, group=finger))
     target = (

@@ -8,7 +8,7 @@ from plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
 from plants.grasp_objects import outlines
 from scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
 from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.plots import FINGERS
+from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.record import Record
 from scenarios.reporting.meshes import Mesh, merged, prism
 from scenarios.reporting.replay import Body, Line, Replay
@@ -58,7 +58,7 @@ def _moving(record: Record) -> tuple[list[Line], list[Line]]:
     for i, finger in enumerate(FINGERS):
         points = np.array([hand[i] for hand in hands])
         radii = np.array([*finger.radii, finger.radii[-1]])
-        fingers.append(Line(label=FINGERS[i], colour=FINGER_COLOURS[i], points=_raised(points), radii=radii))
+        fingers.append(Line(label=FINGER_NAMES[i], colour=FINGER_COLOURS[i], points=_raised(points), radii=radii))
     lines = [Line(label="beams", colour=_BEAM, points=_raised(beams[:, i]), width=3.0) for i in range(len(FINGERS))]
     return fingers, lines
 
