@@ -120,13 +120,13 @@ class FlyerHandover(Experiment[HandoverWatch]):
         """Draw paths, gripper, thrust over time, and the scene at three moments."""
         return draw_handover(parameters, watch, record, folder)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
-        """Return robot, hand and object in space."""
-        return replay_handover(record)
-
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return the gripper's place, speed and angle, who holds the object, and thrust over time."""
         return plot_handover(parameters, record, self.receivers)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return robot, hand and object in space."""
+        return replay_handover(record)
 
 
 def _check_reach(p_WG: Floats) -> None:

@@ -93,10 +93,10 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
         return draw_push(parameters, watch, record, folder)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
-        """Return the robot, its gripper's place of rest and the push in space."""
-        return replay_push(record)
-
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return errors actual and calculated, push and thrust over time."""
         return plot_push(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return the robot, its gripper's place of rest and the push in space."""
+        return replay_push(record)

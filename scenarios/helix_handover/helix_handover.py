@@ -110,10 +110,10 @@ class HelixHandover(Experiment[HandoverWatch]):
         """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
         return draw_handover(parameters, watch.pictures(), record, folder)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
-        """Return arm, gripper, hand, ball and cameras in space."""
-        return replay_handover(record)
-
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distance to the goal, positions, tendons and gripper over time."""
         return plot_handover(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return arm, gripper, hand, ball and cameras in space."""
+        return replay_handover(record)

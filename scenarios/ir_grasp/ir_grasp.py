@@ -107,10 +107,10 @@ class IrGrasp(Experiment[GraspWatch]):
         """Draw the scene at three moments, distances and cost, and the commands."""
         return draw_grasp(parameters, watch.moments, record, folder)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:
-        """Return hand, object and beams in space."""
-        return replay_grasp(parameters, record)
-
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distances, cost, and wrist, heading and closure over time."""
         return plot_grasp(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return hand, object and beams in space."""
+        return replay_grasp(parameters, record)

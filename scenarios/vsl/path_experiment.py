@@ -117,10 +117,10 @@ class PathExperiment(Experiment[PathWatch]):
         """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
         return draw_path_run(parameters, watch, record, folder)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:
-        """Return arm, load, path and the tip's way in space."""
-        return replay_path(parameters, record, hybrid=self.hybrid)
-
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return error and place of the tip, joints, pressures and currents over time."""
         return plot_path_run(parameters, record, hybrid=self.hybrid)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return arm, load, path and the tip's way in space."""
+        return replay_path(parameters, record, hybrid=self.hybrid)
