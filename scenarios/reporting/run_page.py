@@ -13,6 +13,7 @@ from scenarios.reporting.explorer_section import explorer_section
 from scenarios.reporting.graph_section import graph_section
 from scenarios.reporting.page import write_page
 from scenarios.reporting.pictures_section import pictures_section
+from scenarios.reporting.published_section import published_section
 from scenarios.reporting.replay_section import replay_section
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_lead import run_lead
@@ -38,6 +39,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     record = record_of(folder)
     sections = [
         metrics_section(facts),
+        published_section(facts.summary, facts.run),
         *_seen(facts, record),
         pictures_section(folder),
         None if record is None else explorer_section(record),
