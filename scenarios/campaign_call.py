@@ -10,8 +10,9 @@ from typing import NoReturn
 import click
 
 from cosim.exceptions import RecordNotWritten
-from scenarios.bad_call import BadCall, RunNotWritten, told_in_one_line
-from scenarios.campaign.campaign import carry_out_campaign, check_campaign
+from scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
+from scenarios.campaign.bad_crew import CrewLost
+from scenarios.campaign.campaign import carry_out_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_interruption import CampaignInterruption
 from scenarios.campaign.campaign_place import place_of
@@ -19,7 +20,7 @@ from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import checked_plan, unit_fmus
+from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from scenarios.campaign.tally import Tally
 from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
 
@@ -68,15 +69,17 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
     Interrupted, the command ends here, with the status that says so.
 
     Raises:
-        BadCall, RunNotWritten: with what was wrong, in a line.
+        BadCall, RunNotWritten, WorkersLost: with what was wrong, in a line.
     """
     progress = CampaignProgress(sys.stderr)
     folder = None
     try:
         with CampaignInterruption(), told_in_one_line():
             plan = checked_plan(plan)
-            folder = CampaignFolder(out) if out else place_of(plan, unit_fmus(plan))
-            check_campaign(plan, folder)
+            fmus = unit_fmus(plan)
+            check_units(plan, fmus)
+            folder = CampaignFolder(out) if out else place_of(plan, fmus)
+            folder.check(plan, fmus)  # before workers are started
             table = _carry_out(plan, folder, workers, progress)
             finish(folder, table)
     except KeyboardInterrupt:
@@ -92,9 +95,11 @@ def _carry_out(
     try:
         with workers() as crew, progress:
             return carry_out_campaign(plan, folder, crew, progress)
-    except RecordNotWritten as e:
-        done = f"; {told_done(progress.tally)}; the same call goes on when there is room" if progress.tally else ""
-        raise RunNotWritten(f"{e}{done}") from e
+    except (RecordNotWritten, CrewLost) as e:
+        if progress.tally is None:
+            raise
+        stopped = WorkersLost if isinstance(e, CrewLost) else RunNotWritten
+        raise stopped(f"{e}; {told_done(progress.tally)}; the same call goes on") from e
 
 
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:

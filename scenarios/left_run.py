@@ -36,7 +36,7 @@ def complete_signals(folder: RunFolder) -> int:
         raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {str(e).splitlines()[0]}") from e
     except OSError as e:
         if e.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise RecordNotWritten(folder.signals, e.strerror) from e
+            raise RecordNotWritten(folder.signals, str(e.strerror)) from e
         raise BadRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 
 

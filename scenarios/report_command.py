@@ -8,6 +8,7 @@ from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.left_run import complete_signals
 from scenarios.reporting.campaign_page import write_campaign_page
+from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_figures import draw_run
 from scenarios.reporting.run_page import write_run_page
 from scenarios.run_folder import RunFolder, check_place
@@ -22,7 +23,9 @@ killed, or that another version left: its record is completed first, and the pag
 @click.command("report", help=_HELP, short_help="Write the page of a run or of a campaign.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--figures", is_flag=True, help="Draw the figures anew too, as PNG and SVG, into DIR/figures.")
-@click.option("--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]")  # fmt: skip
+@click.option(
+    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
+)
 def report(folder: Path, figures: bool, file: Path | None) -> None:
     """Write the page of a run or of a campaign."""
     with told_in_one_line():
@@ -43,7 +46,7 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
 
 def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
     with left.held():
-        left.read_run()  # before anything is completed: it may be no run's folder at all
+        RunFacts.read(left)  # before anything is completed: it may be no run's folder at all
         complete_signals(left)
         if figures:
             draw_run(left)

@@ -21,19 +21,6 @@ from scenarios.campaign.tally import CampaignProgress, Tally
 from scenarios.run_folder import told_if_not_written
 
 
-def check_campaign(plan: CampaignPlan, folder: CampaignFolder) -> CampaignPlan:
-    """Return the plan as it is carried out, checked with its units and its folder; nothing is written.
-
-    Raises:
-        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError: it cannot be carried out so.
-    """
-    plan = checked_plan(plan)
-    fmus = unit_fmus(plan)
-    check_units(plan, fmus)
-    folder.check(plan, fmus)
-    return plan
-
-
 def carry_out_campaign(
     plan: CampaignPlan, folder: CampaignFolder, crew: Crew, progress: CampaignProgress
 ) -> CampaignTable:
@@ -43,12 +30,16 @@ def carry_out_campaign(
     also if a unit failed in it. Lost runs are tried again by the next call.
 
     Raises:
-        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError: before anything was written.
+        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError, BadCrew: before anything was
+            written.
         RecordNotWritten: there is no room.
+        CrewLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
-    plan = check_campaign(plan, folder)
-    with folder.opened(plan, unit_fmus(plan)) as fmus:
+    plan = checked_plan(plan)
+    files = unit_fmus(plan)
+    check_units(plan, files)
+    with folder.opened(plan, files, crew.check) as fmus:
         work = _Work(plan, folder, progress)
         try:
             work.give_to(crew, fmus)
@@ -129,5 +120,5 @@ class _Work:
             reason = answer.lost or "its folder does not say how it ended"
             row = RunRow(run=run, status="lost", success=None, reason=reason)
         self._count[row.status] += 1
-        self.table.add(row)
         self.progress(self.tally)
+        self.table.add(row)

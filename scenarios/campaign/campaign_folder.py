@@ -5,7 +5,7 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -80,7 +80,7 @@ class CampaignFolder:
         if self.path.exists() and not self.path.is_dir():
             raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
         check_place(self.path)
-        if not self.path.exists() or all(p.name == f"{_FILE}.part" for p in self.path.iterdir()):
+        if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
             return
         if not (self.path / _FILE).exists():
             raise BadRunFolder(self.path, f"it is not empty and has no {_FILE}; name a new folder, or a campaign's")
@@ -89,8 +89,13 @@ class CampaignFolder:
             raise BadRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
 
     @contextlib.contextmanager
-    def opened(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> Generator[dict[str, Path], None, None]:
+    def opened(
+        self, plan: CampaignPlan, fmus: Mapping[str, Path], check: Callable[[Path], None]
+    ) -> Generator[dict[str, Path], None, None]:
         """Make the folder, or go on with it, and keep others from it; give the copies of the FMUs in it.
+
+        `check` is called with the folder before anything is written to it; if it raises, a folder that was not there
+        is removed.
 
         Left-overs of runs that were killed are removed. A file's copy has its name, or, where two units have different
         files of one name, that of the unit before it.
@@ -100,13 +105,12 @@ class CampaignFolder:
             RecordNotWritten: it cannot be written to.
         """
         self.check(plan, fmus)
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as e:
-            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
-        with self._held():
-            self.check(plan, fmus)  # another command may have made it meanwhile
-            self._write(plan, fmus)
+        with contextlib.ExitStack() as held:
+            with self._made():
+                held.enter_context(self._held())
+                self.check(plan, fmus)  # another command may have made it meanwhile
+                check(self.path)
+                self._write(plan, fmus)
             with told_if_not_written(self.path):
                 self.runs.mkdir(exist_ok=True)
                 self.fmus.mkdir(exist_ok=True)
@@ -119,6 +123,22 @@ class CampaignFolder:
         return (self.runs / run.name).is_dir()
 
     @contextlib.contextmanager
+    def _made(self) -> Generator[None, None, None]:
+        """Make the folder; if what follows fails, remove what was made and is empty."""
+        absent = [p for p in (self.path, *self.path.parents) if not p.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+        try:
+            yield
+        except BaseException:
+            with contextlib.suppress(OSError):
+                for folder in absent:
+                    folder.rmdir()
+            raise
+
+    @contextlib.contextmanager
     def _held(self) -> Generator[None, None, None]:
         with contextlib.ExitStack() as held:
             try:
@@ -128,6 +148,10 @@ class CampaignFolder:
             except OSError as e:
                 raise BadRunFolder(self.path, f"it cannot be opened: {e.strerror}") from e
             yield
+
+    def _counts(self, entry: Path) -> bool:
+        """Return whether something is more than what a call leaves that was killed before it wrote `campaign.json`."""
+        return entry.name != f"{_FILE}.part" and not entry.name.startswith(".")
 
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Write `campaign.json`, before anything else is there: without it, nobody could go on."""

@@ -12,11 +12,11 @@ from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_progress import told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.shown_unit import shown_unit
 from scenarios.campaign.tally import Tally
 from scenarios.chosen import scenario_named
 from scenarios.console import open_console
 from scenarios.published.statistics import success_interval
-from scenarios.reporting.told_metric import told
 
 _MOST_POINTS = 12
 _MOST_REASONS = 5
@@ -42,7 +42,7 @@ def _points(plan: CampaignPlan, table: CampaignTable, console: Console) -> Table
     varied = list(dict.fromkeys(name for point in plan.points for name in point))
     metrics = _headline(plan, table, max(1, (console.width - 40 - 12 * len(varied)) // _COLUMN))
     rows = Table(box=None, padding=(0, 2), pad_edge=True)
-    for heading in (*varied, "runs", "succeeded", "95 % interval", *(f"median {name}" for name in metrics)):
+    for heading in (*varied, "runs", "succeeded", "95 % interval", *(f"median\n{name}" for name in metrics)):
         rows.add_column(Text(heading), justify="right", overflow="fold")
     for number, point in enumerate(plan.points[:_MOST_POINTS]):
         of_point = table.where(point=number)
@@ -58,13 +58,16 @@ def _successes(table: CampaignTable) -> list[str]:
     if n == 0:
         return [str(len(table)), "", ""]
     interval = success_interval(successes, n)
-    return [str(len(table)), f"{successes} of {n}", f"{interval.low:.0%} to {interval.high:.0%}"]
+    return [str(len(table)), f"{successes} of {n}", f"{100 * interval.low:.0f} % to {100 * interval.high:.0f} %"]
 
 
 def _median(table: CampaignTable, metric: str) -> str:
     values = table.column(metric)
     values = values[~np.isnan(values)]
-    return told({"value": float(np.median(values)), "unit": table.unit(metric)}) if len(values) else ""
+    if len(values) == 0:
+        return ""
+    median = float(np.median(values))
+    return shown_unit(table.unit(metric), median).text(median)
 
 
 def _headline(plan: CampaignPlan, table: CampaignTable, most: int) -> Sequence[str]:

@@ -2,13 +2,15 @@
 
 import contextlib
 import itertools
+import queue
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from distributed import Client, Future, KilledWorker, as_completed
+from distributed import Client, Future, KilledWorker
 
 from cosim.exceptions import one_line
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
@@ -25,6 +27,12 @@ Of many thousand it would hold many thousand, and take their workers' loss for t
 _MOST_TOLD = 3
 """Workers that a refusal names."""
 
+_LOOK = 5.0
+"""How often it is looked whether there are workers while no run ends, s."""
+
+_WITHOUT = 60.0
+"""For how long a cluster may have no worker, s: those that watch them start others."""
+
 _BOUND = 10.0
 """How long workers get to answer what is asked of all, s."""
 
@@ -39,7 +47,7 @@ class ClusterCrew:
 
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
-        self._name = uuid.uuid4().hex
+        self._batches: set[str] = set()
         self._versions = versions()
 
     @property
@@ -55,10 +63,11 @@ class ClusterCrew:
         """
         told = self._ask(tell_versions)
         self._refuse({worker: _difference(self._versions, other) for worker, other in told.items()})
-        mark = folder / f".{self._name}"
-        mark.write_text(self._name, encoding="utf-8")
+        token = uuid.uuid4().hex
+        mark = folder / f".{token}"
+        mark.write_text(token, encoding="utf-8")
         try:
-            told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, self._name)
+            told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
         finally:
             mark.unlink()
         self._refuse({w: f"{folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
@@ -70,41 +79,59 @@ class ClusterCrew:
         is left before its end, runs under way are ended and leave nothing.
 
         Raises:
-            CrewLost: the scheduler has gone.
+            CrewLost: the scheduler has gone, or no worker has been there for a while.
         """
+        batch = uuid.uuid4().hex
+        self._batches.add(batch)
         waiting = iter(orders)
-        going: dict[str, tuple[RunOrder, Future[RunAnswer]]] = {}
-        coming = as_completed(loop=self._client.loop)
+        going: dict[Any, tuple[RunOrder, Future[RunAnswer]]] = {}
+        done: queue.SimpleQueue[Future[RunAnswer]] = queue.SimpleQueue()
 
         def give() -> None:
             for order in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(going))):
                 key = f"run-{uuid.uuid4().hex}"
-                future = self._client.submit(carry_out_run, order, self._name, self._versions, key=key, pure=False)
-                going[key] = order, future
-                coming.add(future)
+                future = self._client.submit(carry_out_run, order, batch, self._versions, key=key, pure=False)
+                going[future.key] = order, future
+                future.add_done_callback(done.put)
 
         try:
             give()
             while going:
-                key = next(coming).key
-                order, future = going.pop(key)
+                order, future = going.pop(self._next(done).key)
                 answer = self._answer(order, future)
                 give()
                 yield answer
         finally:
-            if going:
+            with contextlib.suppress(Exception):  # of a cluster that is gone nothing is left to end
                 self._client.cancel([future for _, future in going.values()], force=True)
-            self.end_runs()
+            self._end(batch)
 
-    def end_runs(self) -> None:
+    def end(self) -> None:
         """End what workers do for this crew, and the processes that they keep for it."""
-        with contextlib.suppress(Exception):  # of a cluster that is gone nothing is left to end
-            _within(_BOUND, lambda: self._client.run(end_runs, self._name, on_error="ignore"))
+        for batch in list(self._batches):
+            self._end(batch)
+
+    def _end(self, batch: str) -> None:
+        if batch in self._batches:
+            self._batches.remove(batch)
+            with contextlib.suppress(Exception):
+                self._ask(end_runs, batch)
+
+    def _next(self, done: "queue.SimpleQueue[Future[RunAnswer]]") -> "Future[RunAnswer]":
+        """Wait for a run's end."""
+        there = time.monotonic()
+        while True:
+            with contextlib.suppress(queue.Empty):
+                return done.get(timeout=_LOOK)
+            if self.workers:
+                there = time.monotonic()
+            elif time.monotonic() - there > _WITHOUT:
+                raise CrewLost(f"the cluster at {self._address} has had no worker for {_WITHOUT:g} s")
 
     def _answer(self, order: RunOrder, future: "Future[RunAnswer]") -> RunAnswer:
         if future.cancelled():
             raise CrewLost(f"the scheduler at {self._address} is gone")
-        error = future.exception()
+        error = cast("BaseException | None", future.exception())
         if error is None:
             return future.result()
         if isinstance(error, KilledWorker):
@@ -114,7 +141,21 @@ class ClusterCrew:
 
     def _ask(self, function: Callable[..., Any], *arguments: str) -> dict[str, Any]:
         """Return what each worker answers, by its address."""
-        told = _within(_BOUND, lambda: self._client.run(function, *arguments, on_error="return"))
+        told: dict[str, Any] = {}
+        failed: list[Exception] = []
+
+        def ask() -> None:
+            try:
+                told.update(cast("dict[str, Any]", self._client.run(function, *arguments, on_error="return")))
+            except Exception as e:  # told where it is waited for
+                failed.append(e)
+
+        asking = threading.Thread(target=ask, daemon=True)  # of workers some may not answer at all
+        asking.start()
+        asking.join(_BOUND)
+        if failed or asking.is_alive():
+            fault = one_line(failed[0]) if failed else f"no answer within {_BOUND:g} s"
+            raise BadCrew(f"the workers of the cluster at {self._address} do not answer: {fault}")
         return {f"worker {worker}": answer for worker, answer in told.items()}
 
     def _refuse(self, faults: Mapping[str, str]) -> None:
@@ -129,18 +170,3 @@ def _difference(here: Mapping[str, str], there: Any) -> str:
     if isinstance(there, BaseException):
         return f"cannot run this package: {type(there).__name__}: {one_line(there)}"
     return difference(here, there)
-
-
-def _within(seconds: float, ask: Callable[[], Any]) -> Any:
-    """Return what a call gives that must not take longer.
-
-    Raises:
-        BadCrew: it does.
-    """
-    given: list[Any] = []
-    thread = threading.Thread(target=lambda: given.append(ask()), daemon=True)
-    thread.start()
-    thread.join(seconds)
-    if not given:
-        raise BadCrew(f"the cluster's workers do not answer within {seconds:g} s")
-    return given[0]

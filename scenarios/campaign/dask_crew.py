@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Generator
 
-import dask
+from dask import config
 from distributed import Client, LocalCluster
 
 from cosim.exceptions import one_line
@@ -38,24 +38,23 @@ def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
     Raises:
         BadCrew: they cannot be started.
     """
-    with _quiet(), dask.config.set(_SETTINGS), contextlib.ExitStack() as opened:
+    with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
         try:
-            with _deaf_to_ctrl_c():  # so are the threads that are started here, and what these start
-                cluster = opened.enter_context(
-                    LocalCluster(
-                        n_workers=workers or cores(),
-                        threads_per_worker=1,
-                        host="127.0.0.1",
-                        dashboard_address=None,
-                        memory_limit=0,
-                        silence_logs=_SILENT,
-                    )
+            with _told_nothing_of_semaphores(), _deaf_to_ctrl_c():  # so are the threads that are started here, and what these start
+                cluster = LocalCluster(
+                    n_workers=workers or cores(),
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address="",
+                    memory_limit=0,
+                    silence_logs=_SILENT,
                 )
+                opened.callback(cluster.close)
                 client = opened.enter_context(Client(cluster, set_as_default=False))
         except (OSError, RuntimeError) as e:
             raise BadCrew(f"no workers can be started on this machine: {one_line(e)}") from e
         crew = ClusterCrew(client, "127.0.0.1")
-        opened.callback(crew.end_runs)
+        opened.callback(crew.end)
         yield crew
 
 
@@ -66,7 +65,7 @@ def crew_at(address: str) -> Generator[Crew, None, None]:
     Raises:
         BadCrew: the address is malformed, no scheduler answers there, or it has no workers.
     """
-    with _quiet(), dask.config.set(_SETTINGS), contextlib.ExitStack() as opened:
+    with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
         whole = scheduler_address(address)
         try:
             client = opened.enter_context(Client(whole, timeout=5, set_as_default=False))
@@ -77,7 +76,7 @@ def crew_at(address: str) -> Generator[Crew, None, None]:
         except TimeoutError as e:
             raise BadCrew(f"the scheduler at {whole} has no workers; `dask worker {whole}` starts some") from e
         crew = ClusterCrew(client, whole)
-        opened.callback(crew.end_runs)
+        opened.callback(crew.end)
         yield crew
 
 
@@ -100,6 +99,21 @@ def _quiet() -> Generator[None, None, None]:
         finally:
             for logger, level in zip(loggers, before, strict=True):
                 logger.setLevel(level)
+
+
+@contextlib.contextmanager
+def _told_nothing_of_semaphores() -> Generator[None, None, None]:
+    """Let Python's process that cleans up after a killed command do so without telling."""
+    name = "PYTHONWARNINGS"
+    before = os.environ.get(name)
+    os.environ[name] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 @contextlib.contextmanager

@@ -74,8 +74,8 @@ class CampaignPlan:
     def runs(self) -> tuple[PlannedRun, ...]:
         """Return the runs, point by point.
 
-        A run's name and seed follow from its point and its repetition alone: they stay the same if there are more
-        repetitions.
+        Names are those of a campaign's folder if `checked_plan` has returned the plan. A run's name and seed follow
+        from its point and its repetition alone: they stay the same if there are more repetitions.
         """
         return tuple(
             PlannedRun(

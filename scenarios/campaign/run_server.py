@@ -15,6 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
@@ -96,7 +97,7 @@ class RunServer:
         end, heartbeat = self._in_child(lambda: fault_of(lambda: death.complete(left)), folder, log)
         return "" if heartbeat.status == 0 else heartbeat.facts.get("lost", death.told)
 
-    def _in_child(self, work, folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
+    def _in_child(self, work: Callable[[], str], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
         heartbeat = supervisor.renew_heartbeat()
 
         def begin() -> NoReturn:

@@ -1,7 +1,7 @@
 """Where a Dask scheduler is, and whether it is one: found out before anything is sent to it."""
 
 import asyncio
-from typing import Any
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 from distributed.comm.registry import backends
@@ -54,6 +54,7 @@ def _whole(told: str) -> str:
 
 
 async def _kind(address: str) -> str:
-    arguments: dict[str, Any] = Security().get_connection_args("client")
+    arguments = cast("dict[str, Any]", Security().get_connection_args("client"))
     async with rpc(address, timeout=_CONNECT, connection_args=arguments) as there:
-        return str((await there.identity())["type"])
+        told = cast("dict[str, Any]", await there.identity())
+        return str(told["type"])

@@ -56,6 +56,11 @@ class ServerProcess:
         threading.Thread(target=self._listen, daemon=True).start()
 
     @property
+    def pid(self) -> int:
+        """Its number."""
+        return self._process.pid
+
+    @property
     def lives(self) -> bool:
         """Whether it can be given orders."""
         return self._process.poll() is None
@@ -85,10 +90,14 @@ class ServerProcess:
             _remove(folder)
             raise
 
-    def end(self) -> None:
-        """End it, and the run that it carries out, which leaves nothing."""
+    def ask_to_end(self) -> None:
+        """Let it end, without waiting for that."""
         with contextlib.suppress(OSError, ValueError):
             self._orders.close()
+
+    def end(self) -> None:
+        """End it, and the run that it carries out, which leaves nothing."""
+        self.ask_to_end()
         try:
             self._process.wait(_GRACE)
         except subprocess.TimeoutExpired:

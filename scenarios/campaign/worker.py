@@ -16,16 +16,16 @@ from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProce
 from scenarios.run_folder import versions
 
 _servers: dict[tuple[str, int], ServerProcess] = {}
-"""By crew and thread."""
+"""By batch and thread."""
 
 _ended: set[str] = set()
-"""Crews whose runs are not wanted any more."""
+"""Batches whose runs are not wanted any more."""
 
 _lock = threading.Lock()
 
 
-def carry_out_run(order: RunOrder, crew: str, wanted_versions: Mapping[str, str]) -> RunAnswer:
-    """Carry out an order of a crew. If its server dies, begin it anew with another one, once.
+def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str]) -> RunAnswer:
+    """Carry out an order of a batch. If its server dies, begin it anew with another one, once.
 
     A worker that came when the others had been checked may be of other versions; it carries out nothing.
     """
@@ -36,12 +36,12 @@ def carry_out_run(order: RunOrder, crew: str, wanted_versions: Mapping[str, str]
 
     def wanted() -> bool:
         known = worker.state.tasks.get(task)
-        return crew not in _ended and known is not None and known.state in ("executing", "long-running")
+        return batch not in _ended and known is not None and known.state in ("executing", "long-running")
 
     lost = ""
     for _ in range(2):
         try:
-            lost = _server_of(crew).carry_out(order, wanted)
+            lost = _server_of(batch).carry_out(order, wanted)
             break
         except ServerLost as e:
             lost = str(e)
@@ -52,11 +52,13 @@ def carry_out_run(order: RunOrder, crew: str, wanted_versions: Mapping[str, str]
     return RunAnswer(name=order.name, lost=lost, worker=worker.address)
 
 
-def end_runs(crew: str) -> None:
-    """End the runs of a crew in this worker, and its servers."""
+def end_runs(batch: str) -> None:
+    """End the runs of a batch in this worker, and its servers."""
     with _lock:
-        _ended.add(crew)
-        servers = [_servers.pop(key) for key in list(_servers) if key[0] == crew]
+        _ended.add(batch)
+        servers = [_servers.pop(key) for key in list(_servers) if key[0] == batch]
+    for server in servers:
+        server.ask_to_end()
     for server in servers:
         server.end()
 
@@ -86,9 +88,9 @@ def fault_of_folder(folder: str, file: str, content: str) -> str:
     return "" if os.access(folder, os.W_OK | os.X_OK) else "it may not write there"
 
 
-def _server_of(crew: str) -> ServerProcess:
+def _server_of(batch: str) -> ServerProcess:
     """Return this thread's server, started unless it lives."""
-    key = crew, threading.get_ident()
+    key = batch, threading.get_ident()
     with _lock:
         server = _servers.get(key)
         if server is None or not server.lives:

@@ -11,6 +11,7 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.free_flyer.impedance_figures import draw_push
 from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from scenarios.free_flyer.impedance_plots import plot_push
 from scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from scenarios.free_flyer.published import published_of_push
 from scenarios.free_flyer.replay import replay_push
@@ -19,6 +20,7 @@ from scenarios.paper import paper_values
 from scenarios.record import Record
 from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):
@@ -96,6 +98,10 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
     def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
         return draw_push(parameters, watch, record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return errors actual and calculated, push and thrust over time."""
+        return plot_push(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return the robot, its gripper's place of rest and the push in space."""

@@ -11,6 +11,7 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.plots import plot_handover
 from scenarios.helix_handover.published import published_of
 from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
@@ -19,6 +20,7 @@ from scenarios.record import Record
 from scenarios.reporting.camera_picture import CameraPicture
 from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 
 class HelixHandover(Experiment[HandoverWatch]):
@@ -113,6 +115,10 @@ class HelixHandover(Experiment[HandoverWatch]):
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
         return draw_handover(parameters, watch.pictures(), record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return distance to the goal, positions, tendons and gripper over time."""
+        return plot_handover(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return arm, gripper, hand, ball and cameras in space."""

@@ -5,7 +5,7 @@ import numpy as np
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.ir_table_runs import OBJECTS, POSES, REFLEX, IrTableRuns
 from scenarios.published.statistics import success_interval, time_interval
-from scenarios.published.verdict_rules import told_rate
+from scenarios.published.verdict_rules import nothing_measured, told_rate
 
 _WHERE = "table II"
 _IN_COST = ("thumb", "ring")
@@ -13,10 +13,14 @@ _IN_COST = ("thumb", "ring")
 _MOST_RUNS = (2.5, 97.5)
 """Percentiles of our runs between which a published figure passes for that of one run."""
 
+_FEWEST_RUNS = 10
+"""Runs of an object below which such percentiles say nothing."""
+
 _TARGET_TAKEN = (
     "The distance to which thumb and ring are brought, 10 mm, was taken from these figures: agreement would only show "
     "that the correction reaches its target."
 )
+_TOO_FEW = f"There are fewer than {_FEWEST_RUNS} runs of an object that came to their end."
 _IN_SPACE = (
     "The index lags behind as the hand's synergy has it in space. The plane hand's index is stiffer by assumption, so "
     "that it lags behind too: what comes of it is no evidence."
@@ -54,25 +58,27 @@ def _told(runs: IrTableRuns, fingers: tuple[str, ...], perturbed: bool, reason: 
 
 def _within_runs(runs: IrTableRuns) -> Claim:
     """Judge the perturbed distances of thumb and ring, of which the paper tells neither number nor spread."""
+    sentence, printed = _sentence(runs, _IN_COST, True), _span(_printed(runs, _IN_COST, True))
     inside: list[bool] = []
     medians: list[float] = []
     for name, things in OBJECTS.items():
         for finger in _IN_COST:
             values = runs.metric(f"final_distance_{finger}", REFLEX, True, things)
-            if len(values):
-                low, high = np.percentile(values, _MOST_RUNS)
-                inside.append(bool(low <= runs.published_distances(name, True)[finger] <= high))
-                medians.append(float(np.median(values)))
+            if len(values) < _FEWEST_RUNS:
+                return nothing_measured(sentence, _WHERE, printed, reason=_TOO_FEW)
+            low, high = np.percentile(values, _MOST_RUNS)
+            inside.append(bool(low <= runs.published_distances(name, True)[finger] <= high))
+            medians.append(float(np.median(values)))
     reason = (
         "The paper tells neither of how many runs its figures are nor how they spread. Reproduced if each of the six "
         f"lies between the {_MOST_RUNS[0]:g}th and {_MOST_RUNS[1]:g}th percentile of our runs, so that it could be a "
         f"run's: {sum(inside)} of {len(inside)} do."
     )
     return Claim(
-        claim=_sentence(runs, _IN_COST, True),
-        published=_span(_printed(runs, _IN_COST, True)),
-        measured=f"{_span(medians)} (medians by object)" if medians else "",
-        verdict=Verdict.REPRODUCED if inside and all(inside) else Verdict.NOT_REPRODUCED,
+        claim=sentence,
+        published=printed,
+        measured=f"{_span(medians)} (medians by object)",
+        verdict=Verdict.REPRODUCED if all(inside) else Verdict.NOT_REPRODUCED,
         reason=reason,
         where=_WHERE,
     )
@@ -87,21 +93,20 @@ def _centred(runs: IrTableRuns) -> Claim:
             for p in POSES
         ]
     )
-    interval = time_interval(unlike)
-    reason = (
-        f"Reproduced if the interval of the median of our runs lies below the largest difference in the table, "
-        f"{1000 * max(printed):.0f} mm."
-    )
-    below = interval is not None and interval.high <= max(printed)
+    sentence = "Thumb and ring are well centred with respect to the object."
+    told, where, interval = f"{_span(printed)} apart", "table II, sec. V-D", time_interval(unlike)
+    if interval is None:
+        return nothing_measured(sentence, where, told, reason=_TOO_FEW)
     return Claim(
-        claim="Thumb and ring are well centred with respect to the object.",
-        published=f"{_span(printed)} apart",
-        measured=f"{1000 * float(np.median(unlike)):.1f} mm apart (median)" if len(unlike) else "",
-        interval=None if interval is None else (interval.low, interval.high),
+        claim=sentence,
+        published=told,
+        measured=f"{1000 * float(np.median(unlike)):.1f} mm apart (median)",
+        interval=(interval.low, interval.high),
         unit="m",
-        verdict=Verdict.REPRODUCED if below else Verdict.NOT_REPRODUCED,
-        reason=reason if interval is None else f"{reason} Interval: {interval.method}.",
-        where="table II, sec. V-D",
+        verdict=Verdict.REPRODUCED if interval.high <= max(printed) else Verdict.NOT_REPRODUCED,
+        reason=f"Reproduced if the interval of the median of our runs ({interval.method}) lies below the largest "
+        f"difference in the table, {1000 * max(printed):.0f} mm.",
+        where=where,
     )
 
 

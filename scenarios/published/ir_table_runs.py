@@ -1,5 +1,6 @@
 """The runs of the experiment `ir-table`, by arm, pose and object."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -105,7 +106,7 @@ class IrTableRuns:
     ) -> NDArray[np.float64]:
         """Return a metric of an arm's runs in a pose, without those that have none."""
         values = [row[name] for row in self.rows(arm, perturbed, things)]
-        return np.array([v for v in values if v is not None], dtype=np.float64)
+        return np.array([v for v in values if v is not None and not math.isnan(v)], dtype=np.float64)
 
     def rows(self, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(Thing)) -> list[dict[str, Any]]:
         """Return the rows of runs of an arm in a pose that came to their end."""

@@ -133,14 +133,16 @@ def rare_claim(claim: str, where: str, published: str, measured: tuple[int, int]
     return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
 
 
-def nothing_measured(claim: str, where: str, published: str, beyond: bool = False) -> Claim:
-    """Return a claim on which there is no run."""
+def nothing_measured(
+    claim: str, where: str, published: str, beyond: bool = False, reason: str = "None of its runs came to its end."
+) -> Claim:
+    """Return a claim on which there is no run, or there are too few."""
     return Claim(
         claim=claim,
         published=published,
         measured="",
         verdict=Verdict.NOT_COMPARABLE,
-        reason="None of the runs that it is about came to its end.",
+        reason=reason,
         where=where,
         beyond=beyond,
     )

@@ -22,6 +22,9 @@ class OwnCrew:
         self.begun: list[str] = []
         self._before = before
 
+    def check(self, folder: Path) -> None:
+        assert folder.is_dir()
+
     def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
         for order in orders:
             self.begun.append(order.name)
@@ -41,6 +44,7 @@ def _run(order: RunOrder) -> None:
         fmus={unit: Path(file) for unit, file in order.fmus.items()},
         folder=RunFolder(unfinished),
         options=order.options,
+        presented=False,
     )
     try:
         carry_out(task, lambda _t, _end: None, Interruption())

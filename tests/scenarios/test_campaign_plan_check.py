@@ -49,7 +49,7 @@ SIZES: list[tuple[int, int, str]] = [
 @pytest.mark.parametrize(("points", "repetitions", "fault"), SIZES)
 def test_sizes_out_of_bounds(points: int, repetitions: int, fault: str):
     with pytest.raises(BadParameter, match=re.escape(fault)):
-        checked_plan(plan(points=[{}] * points, repetitions=repetitions))
+        checked_plan(plan(points=[dict[str, str]()] * points, repetitions=repetitions))
 
 
 def test_unknown_scenario_and_unit():

@@ -108,6 +108,13 @@ def test_a_moment_is_shown_once():
     assert list(moments(follow((0.0, signals(Phase.WAIT))))) == ["start"]
 
 
+def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to_close():
+    metrics = follow((7.9, signals(Phase.DESCEND)), (8.0, signals(Phase.GRASP))).outcome().metrics
+    assert metrics["model_travel"].value == pytest.approx(0.0, abs=1e-12)
+    assert metrics["model_mismatch"].value == metrics["arm_travel"].value == pytest.approx(np.hypot(0.16, 0.1))
+    assert "model_mismatch" not in follow((7.9, signals(Phase.DESCEND))).outcome().metrics
+
+
 def test_a_covered_lens_is_shown_when_the_first_picture_was_taken_through_it():
     covered = Parameters(cover=Cover.LEFT, cover_from=0.99, cover_for=2.0)
     seen = signals(Phase.WAIT)
@@ -133,10 +140,3 @@ def test_what_vision_does_not_see_is_not_marked():
     labels = [m.label for m in picture.marks]
     assert "ball, as measured" not in labels
     assert {"wrist, as measured", "gripper, as measured", "ball, as the controller has it"} <= set(labels)
-
-
-def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to_close():
-    metrics = follow((7.9, signals(Phase.DESCEND)), (8.0, signals(Phase.GRASP))).outcome().metrics
-    assert metrics["model_travel"].value == pytest.approx(0.0, abs=1e-12)
-    assert metrics["model_mismatch"].value == metrics["arm_travel"].value == pytest.approx(np.hypot(0.16, 0.1))
-    assert "model_mismatch" not in follow((7.9, signals(Phase.DESCEND))).outcome().metrics
