@@ -25,6 +25,9 @@ class PlainCrew:
     lost: Sequence[str] = ()
     workers: int = 1
 
+    def check(self, folder: Path) -> None:
+        assert folder.is_dir()
+
     def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
         for order in orders:
             if order.name in self.lost:
@@ -43,7 +46,13 @@ def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> Cam
 
 def told(scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Any) -> dict[str, Any]:
     """Return what a campaign's file says."""
-    plan = {"scenario": scenario, "points": list(points), "fixed": {}, "repetitions": repetitions, "seed": 0}
+    plan: dict[str, Any] = {
+        "scenario": scenario,
+        "points": list(points),
+        "fixed": {},
+        "repetitions": repetitions,
+        "seed": 0,
+    }
     return {**plan, "paired": False, **more}
 
 
@@ -62,9 +71,9 @@ def table_of(points: Sequence[Mapping[str, Any]], repetitions: int = 2, **more: 
         **{name: [1.0] * len(runs) for name in ("simulated_seconds", "wall_seconds", "cpu_seconds")},
         **more,
     }
-    table = pa.table({name: list(values) for name, values in columns.items()})
+    table: Any = pa.table({name: list(values) for name, values in columns.items()})
     roles = {n: "parameter" for p in points for n in p} | dict.fromkeys(more, "metric")
-    fields = [
+    fields: list[Any] = [
         pa.field(f.name, f.type, metadata={"role": roles.get(f.name, "run"), "unit": "m" if f.name in more else "1"})
         for f in table.schema
     ]

@@ -25,8 +25,9 @@ def page_of(path: Path, plan: dict[str, Any], table: CampaignTable) -> str:
 
 def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTable:
     index = table.table.column_names.index(column)
-    field = table.table.schema.field(index)
-    return CampaignTable(table.table.set_column(index, field, pa.array(values, field.type)))
+    whole: Any = table.table
+    field = whole.schema.field(index)
+    return CampaignTable(whole.set_column(index, field, pa.array(values, field.type)))
 
 
 def test_a_campaign_that_is_not_complete_says_how_far_it_is(tmp_path: Path):

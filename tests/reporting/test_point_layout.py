@@ -43,8 +43,10 @@ def test_a_switch_is_told_by_its_name():
     assert [name for _, name in along.ticks or ()] == ["perturbed", "not perturbed"]
 
 
-THREE = [{"strategy": s, "thing": "cylinder", "perturbed": p} for s in ("reflex", "blind") for p in ("true", "false")]
-THREE += [{"strategy": "blind", "thing": "baby_cup_a", "perturbed": "true"}]
+THREE = [
+    *({"strategy": s, "thing": "cylinder", "perturbed": p} for s in ("reflex", "blind") for p in ("true", "false")),
+    {"strategy": "blind", "thing": "baby_cup_a", "perturbed": "true"},
+]
 SOME = [{"strategy": "reflex"}, *({"strategy": "forward", "forward": f} for f in ("0.035", "0.055"))]
 
 
