@@ -23,7 +23,7 @@ _ON_EQUAL_BOUNDS = (
 def table_1(arm: Helix1Arm) -> ComparisonTable:
     """Return the times for the arm's movement by step size, published beside ours."""
     there = published()
-    header = ["s", *(f"α = {alpha}, {whose}" for alpha in arm.alphas for whose in ("published", "ours"))]
+    header = ["α", *(f"{alpha} {whose}" for alpha in arm.alphas for whose in ("published", "ours"))]
     rows = [
         _row("Minimum", there["arm_time_min"], arm, lambda x: _figure(x, np.min)),
         _row("Median", there["arm_time_median"], arm, lambda x: _with_interval(x, np.median)),

@@ -14,6 +14,7 @@ TIMES = {0.1: spread(100.0, 50.0), 0.2: spread(40.0, 10.0), 0.4: [20.0, 21.0, 22
 def test_table_1_has_the_papers_rows_with_ours_beside():
     table = Helix1().tables(table_of(TIMES))[0]
     rows = {row[0]: row[1:] for row in table.rows}
+    assert table.header[5:] == ["0.4 published", "0.4 ours"]
     assert rows["Minimum"][4:] == ["14.6", "20.0"]
     assert rows["Median"][4:] == ["22.3", "23.0 [21.0, 25.0]"]
     assert rows["Maximum"][4:] == ["29.5", "26.0"]
