@@ -10,6 +10,8 @@ from scenarios.catalog import SCENARIOS
 from scenarios.check_command import check
 from scenarios.export_command import export_command
 from scenarios.listing import print_catalog, print_scenario, print_unit
+from scenarios.paper_command import paper
+from scenarios.report_command import report
 from scenarios.resume_command import resume
 from scenarios.run_command import run
 from scenarios.sweep_command import sweep
@@ -30,6 +32,8 @@ Run
   handover resume runs/long              goes on with a run with checkpoints
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
                                          a campaign: many runs, one table
+  handover paper ir-table                a paper's experiment: ours beside the published
+  handover report runs/long              its page anew, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -76,6 +80,8 @@ def list_(name: str | None) -> None:
 main.add_command(build_command)
 main.add_command(check)
 main.add_command(export_command)
+main.add_command(paper)
+main.add_command(report)
 main.add_command(resume)
 main.add_command(run)
 main.add_command(sweep)

@@ -12,16 +12,16 @@ from cosim.master import Master
 from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
-from scenarios.conversions import conversions_of
 from scenarios.ended import Ended
 from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
+from scenarios.reporting.kept_pictures import write_pictures
 from scenarios.reporting.run_page import write_run_page
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import told_if_not_written
 from scenarios.run_metrics import run_metrics
-from scenarios.run_summary import configuration, files_and_forms, summary_of, unit_rows
+from scenarios.run_summary import configuration, files_and_forms, presentation, summary_of, unit_rows
 from scenarios.supervisor import heartbeat_of_run
 from scenarios.task import Task
 
@@ -77,7 +77,7 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     if resumption is None:
         task.folder.make()
     fmus = {n: u.description.path for n, u in master.system.units.items()}
-    told = {**configuration(task), **files_and_forms(task), "conversions": conversions_of(master.system)}
+    told = {**configuration(task), **files_and_forms(task), **presentation(task, master)}
     task.folder.write_run(told, fmus)
     master.heartbeat.tell(
         folder=str(task.folder.path),
@@ -136,6 +136,7 @@ def _conclude(
     task.folder.write_summary(summary)
     if failure is not None:
         task.folder.add_to_run(failure=failure.as_data())
+    write_pictures(task.folder.pictures, watch.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
     if task.presented:

@@ -1,32 +1,23 @@
 """The command `handover sweep`."""
 
-import contextlib
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import click
 
-from cosim.exceptions import RecordNotWritten
 from cosim.master_options import MasterOptions
-from scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
-from scenarios.campaign.bad_crew import CrewLost
-from scenarios.campaign.campaign import carry_out_campaign
+from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_interruption import CampaignInterruption
-from scenarios.campaign.campaign_place import place_of
-from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_summary import print_campaign
 from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.crew import Crew
 from scenarios.campaign.grid import parse_grid, set_parameters
 from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
-from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
+from scenarios.campaign_arguments import campaign_options
+from scenarios.campaign_call import call_campaign, workforce
 from scenarios.chosen import replacements, scenario_named
-from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
-from scenarios.headed_options import HeadedCommand, HeadedOption
+from scenarios.headed_options import HeadedCommand
 from scenarios.limit_arguments import limit_options, limits
 from scenarios.master_arguments import coupling_of, master_options
 from scenarios.scenario_arguments import scenario_options
@@ -65,8 +56,6 @@ Exit status
   130  aborted with Ctrl-C: before the first run, or by a second one
 """
 
-_worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
-
 
 @click.command("sweep", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("scenario", metavar="SCENARIO")
@@ -76,24 +65,7 @@ _worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
     "--paired", is_flag=True, help="Let all combinations of a repetition share a seed, to compare them run by run."
 )
 @scenario_options
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Folder of the campaign; one that is there goes on.  [default: one of its own in campaigns/]",
-)
-@click.option("--no-report", is_flag=True, help="Write no report page at the end.")
-@click.help_option("-h", "--help")
-@_worker_option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Runs at the same time, on this machine.  [default: one a core]",
-)
-@_worker_option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Dask scheduler whose workers carry out the runs; they see this folder under the same path.",
-)
+@campaign_options
 @master_options
 @limit_options
 def sweep(
@@ -113,8 +85,7 @@ def sweep(
     **coupling: Any,
 ) -> None:
     """Run a SCENARIO many times."""
-    if workers is not None and scheduler is not None:
-        raise BadCall("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
+    crew = workforce(workers, scheduler)
     if is_ssp(scenario):
         raise BadCall(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
     experiment = scenario_named(scenario)
@@ -130,62 +101,12 @@ def sweep(
             units={name: str(file) for name, file in replacements(experiment, replaced).items()},
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
-    _sweep(plan, out, lambda: _workforce(workers, scheduler), report=not no_report)
+    call = call_campaign(plan, out, crew, (lambda _folder, _table: None) if no_report else _write_report)
+    print_campaign(call.plan, call.table, call.tally, call.folder)
+    sys.exit(call.status)
 
 
-def _workforce(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Crew]:
-    from scenarios.campaign.dask_crew import crew_at, embedded_crew  # loading Dask takes half a second
-
-    return embedded_crew(workers) if scheduler is None else crew_at(scheduler)
-
-
-_Workforce = Callable[[], contextlib.AbstractContextManager[Crew]]
-
-
-def _sweep(plan: CampaignPlan, out: Path | None, workforce: _Workforce, *, report: bool) -> NoReturn:
-    """Carry out a campaign, tell how it went, and exit with the status that says so."""
-    progress = CampaignProgress(sys.stderr)
-    folder = None
-    try:
-        with CampaignInterruption(), told_in_one_line():
-            plan = checked_plan(plan)
-            fmus = unit_fmus(plan)
-            check_units(plan, fmus)
-            folder = CampaignFolder(out) if out else place_of(plan, fmus)
-            folder.check(plan, fmus)  # before workers are started
-            table = _carry_out(plan, folder, workforce, progress)
-            if report:
-                _write_report(folder)
-    except KeyboardInterrupt:
-        _end_interrupted(folder, progress)
-    tally = progress.tally
-    assert tally is not None
-    print_campaign(plan, table, tally, folder)
-    sys.exit(UNIT_FAILED if tally.failed or tally.lost else 0)
-
-
-def _write_report(folder: CampaignFolder) -> None:
+def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
     from scenarios.reporting.campaign_page import write_campaign_page  # what draws takes long to load
 
     write_campaign_page(folder.path)
-
-
-def _carry_out(
-    plan: CampaignPlan, folder: CampaignFolder, workforce: _Workforce, progress: CampaignProgress
-) -> CampaignTable:
-    try:
-        with workforce() as crew, progress:
-            return carry_out_campaign(plan, folder, crew, progress)
-    except (RecordNotWritten, CrewLost) as e:
-        if progress.tally is None:
-            raise
-        stopped = WorkersLost if isinstance(e, CrewLost) else RunNotWritten
-        raise stopped(f"{e}; {told_done(progress.tally)}; the same call goes on") from e
-
-
-def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:
-    if folder is None or progress.tally is None:
-        click.echo("Aborted!", err=True)
-        sys.exit(ABORTED)
-    click.echo(f"{told_done(progress.tally)} in {folder.path}; the same call goes on", err=True)
-    sys.exit(INTERRUPTED)

@@ -1,5 +1,7 @@
 """Judges a Helix handover by ground truth, which the arm's controller does not see."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,8 +10,9 @@ from cosim.ports import Floats
 from cosim.signals import Signals
 from scenarios.experiment import Metric, Outcome, Watch
 from scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
-from scenarios.helix_handover.parameters import Parameters
-from scenarios.helix_handover.snapshot import Snapshot
+from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.snapshot import is_covered, take_pictures
+from scenarios.reporting.camera_picture import CameraPicture
 
 _SETTLING = 1.0
 """How long the ball must stay in the closed gripper, s (assumed)."""
@@ -17,19 +20,25 @@ _SETTLING = 1.0
 _NOTHING_SEEN = 10.0
 """How long the controller may wait for its first sight of ball and ring, s (assumed)."""
 
+_MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball"}
+_COVERED = "lens covered"
+
 
 class HandoverWatch(Watch):
-    """Follows one handover, keeps pictures of three moments and tells how it ended.
+    """Follows one handover, keeps pictures of moments that tell of it, and tells how it ended.
 
     Attributes:
-        snapshots: what the cameras saw by the moment's role, in the order of time: `start`, `at the ball` (the first
-            entry into GRASP), `end`. Moments that did not come, or came at the time of another, are not there.
         phases: the controller's phases and when each was first entered, in s.
+
+    Args:
+        parameters: the scenario's.
+        pictures: what the cameras saw, where signals hold no pictures; else they are taken.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
         self.parameters = parameters
-        self.snapshots: dict[str, Snapshot] = {}
+        self._pictures = list(pictures or ())
+        self._takes = pictures is None
         self.phases: dict[str, float] = {}
         self._t = 0.0
         self._phase = ""
@@ -52,11 +61,14 @@ class HandoverWatch(Watch):
         if phase in ("APPROACH", "DESCEND"):
             self._nearest = min(self._nearest, self._error)
         self._t = t
-        if not self.snapshots:
+        if not self._pictures:
             self._keep("start", signals)
+        if phase in _MOMENTS and phase not in self.phases:
+            self._keep(_MOMENTS[phase], signals)
         if phase == "GRASP" and phase not in self.phases:
-            self._keep("at the ball", signals)
             self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"])
+        if self._hides(t):
+            self._keep(_COVERED, signals)
         self.phases.setdefault(phase, t)
         if holder == "GRIPPER" and self._released_at is None:
             self._released_at, self._offset = t, self._p_GO
@@ -66,9 +78,23 @@ class HandoverWatch(Watch):
         """Keep the last picture."""
         self._keep("end", signals)
 
+    def pictures(self) -> Sequence[CameraPicture]:
+        """Return what the cameras saw at the start, on first entering a phase, through a covered lens, and at the end.
+
+        Moments that did not come, or came at the time of another, are not there.
+        """
+        return tuple(self._pictures)
+
     def _keep(self, role: str, signals: Signals) -> None:
-        if all(shot.t != self._t for shot in self.snapshots.values()):
-            self.snapshots[role] = Snapshot.take(self._t, signals)
+        if self._takes and all(picture.t != self._t for picture in self._pictures):
+            self._pictures += take_pictures(self._t, role, self.parameters, signals)
+
+    def _hides(self, t: float) -> bool:
+        """Return whether a lens is covered in the pictures that hold at t, for the first time."""
+        p = self.parameters
+        if p.cover is Cover.NONE or any(picture.role == _COVERED for picture in self._pictures):
+            return False
+        return is_covered(t, p.cover, p)
 
     @property
     def over(self) -> bool:

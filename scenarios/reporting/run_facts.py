@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
@@ -55,7 +55,7 @@ class RunFacts:
             summary = {"success": False, "reason": _KILLED, "metrics": dict[str, Any](), "complete": False}
             summary |= {k: run[k] for k in ("scenario", "parameters", "seed", "master") if k in run}
         _check(folder, "summary.json", summary)
-        _check_metrics(folder, summary["metrics"])
+        _check_metrics(folder, cast(Mapping[str, Any], summary["metrics"]))
         named = SCENARIOS.get(run["scenario"])
         return cls(folder=folder, run=run, summary=summary, experiment=None if named is None else named(), ended=ended)
 

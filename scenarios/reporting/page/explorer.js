@@ -11,23 +11,24 @@
   const chosen = new Set();
   let div = null;
 
+  // Lists what is found, and what is shown besides: a click shows another signal instead, with Ctrl in addition.
   function list() {
     const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
     const found = signals.filter(s => words.every(w => `${s.name} ${s.unit} ${s.about}`.toLowerCase().includes(w)));
-    select.replaceChildren();
     const groups = new Map();
+    for (const s of signals.filter(s => chosen.has(s.name) && !found.includes(s))) put(groups, "shown", s, s.name);
     for (const s of found) {
-      const of = s.name.split(".")[0];
-      if (!groups.has(of)) {
-        const group = document.createElement("optgroup");
-        group.label = of;
-        groups.set(of, group);
-        select.append(group);
-      }
-      const option = new Option(s.name.slice(of.length + 1) + (s.unit ? ` (${s.unit})` : ""), s.name, false, chosen.has(s.name));
-      option.title = s.about;
-      groups.get(of).append(option);
+      const unit = s.name.split(".")[0];
+      put(groups, unit, s, s.name.slice(unit.length + 1));
     }
+    select.replaceChildren(...groups.values());
+  }
+
+  function put(groups, label, s, name) {
+    if (!groups.has(label)) groups.set(label, Object.assign(document.createElement("optgroup"), {label}));
+    const option = new Option(name + (s.unit ? ` (${s.unit})` : ""), s.name, false, chosen.has(s.name));
+    option.title = s.about;
+    groups.get(label).append(option);
   }
 
   // Returns a figure with an axis for each unit, arrays and enumerations on axes of their own.
@@ -42,7 +43,7 @@
     }
     const rows = [...axes.values()].slice(0, MOST_AXES);
     const layout = {
-      meta: {time: true}, hovermode: "x unified", showlegend: true, height: HEIGHT * rows.length + 20,
+      meta: {time: true}, hovermode: "x unified", showlegend: true,
       xaxis: {title: {text: "time (s)"}, range: span, unifiedhovertitle: {text: "%{x:.4~f} s"}},
     };
     if (rows.length > 1) layout.xaxis.anchor = `y${rows.length}`;
@@ -87,22 +88,25 @@
 
   const floats = bdata => page.array({dtype: "f4", bdata});
 
+  const axesOf = figure => Object.keys(figure.layout).filter(k => k.startsWith("yaxis")).length;
+
   function show() {
     if (!div) {
       div = document.createElement("div");
       div.className = "plot";
       shown.append(div);
     }
-    const figure = figureOf(chosen.size ? [...chosen] : [signals[0].name]);
-    div.style.height = figure.layout.height + "px";
-    div.dataset.height = figure.layout.height;
+    const figure = figureOf([...chosen]);
+    div.dataset.height = HEIGHT * axesOf(figure) + 20;
+    div.style.height ||= div.dataset.height + "px";
     return page.draw(div, figure);
   }
 
   search.addEventListener("input", list);
   select.addEventListener("change", () => {
-    for (const option of select.options) option.selected ? chosen.add(option.value) : chosen.delete(option.value);
-    if (![...select.selectedOptions].length) chosen.clear();
+    if (!select.selectedOptions.length) return;
+    chosen.clear();
+    for (const option of select.selectedOptions) chosen.add(option.value);
     show();
   });
   chosen.add(signals[0].name);

@@ -12,6 +12,7 @@ const page = (() => {
     "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
   const touch = matchMedia("(pointer: coarse)").matches;
   const figures = new Map();
+  let span = null;  // the range of time that was chosen
   const listeners = [], changes = [], starts = [];
 
   function colours() {
@@ -52,23 +53,41 @@ const page = (() => {
   }
 
   const settings = {
-    displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover", scrollZoom: false,
+    displaylogo: false, displayModeBar: touch ? false : "hover", scrollZoom: false,
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d"],
   };
 
   function draw(div, figure) {
-    const isNew = !figures.has(div);
+    if (!figures.has(div)) widths.observe(div);
     figures.set(div, figure);
     const {data, layout, config} = coloured(figure, colours());
-    const kept = div.layout && div.layout.xaxis && figure.layout.meta?.time ? rangeOf(div) : null;
     const shown = {...layout, template: template(), autosize: true};
-    if (kept) shown.xaxis = {...shown.xaxis, range: kept, autorange: false};
+    if (figure.layout.meta?.time) asOthers(shown);
     if (div.clientWidth < 560) narrow(shown);
     for (const change of changes) change(div, shown);
+    div.dataset.height ??= parseFloat(div.style.height);
+    div.dataset.width = div.clientWidth;
+    const first = !div.layout;
     return Plotly.react(div, data, shown, {...settings, ...config}).then(() => {
-      if (isNew) follow(div);
+      if (first) div.on("plotly_relayout", change => follow(div, change));
       return fit(div);
     });
+  }
+
+  // Lets a figure show the range of time that was chosen in one of them; all heights are theirs.
+  function asOthers(layout) {
+    layout.xaxis = span ? {...layout.xaxis, range: [...span], autorange: false} : {...layout.xaxis};
+    for (const key of Object.keys(layout).filter(k => /^yaxis\d*$/.test(k)))
+      layout[key] = {...layout[key], fixedrange: true};
+  }
+
+  function follow(div, change) {
+    if (!figures.get(div).layout.meta?.time) return;
+    if (change["xaxis.autorange"]) span = null;
+    else if ("xaxis.range[0]" in change) span = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
+    else if (change["xaxis.range"]) span = change["xaxis.range"];
+    else return;
+    redraw(figure => figure.layout.meta?.time);
   }
 
   // On a phone: few ticks, small margins.
@@ -82,32 +101,11 @@ const page = (() => {
   // Makes room below a figure for its legend, so that the axes keep their height.
   function fit(div) {
     const legend = div.querySelector("g.legend");
-    div.dataset.height ??= parseFloat(div.style.height);
     const more = legend ? Math.ceil(legend.getBBox().height) : 0;
-    const height = parseFloat(div.dataset.height) + more;
-    const bottom = 44 + more;
-    if (Math.abs(div.clientHeight - height) < 2 && div.layout.margin?.b === bottom) return null;
+    const height = Number(div.dataset.height) + more;
+    if (Math.abs(parseFloat(div.style.height) - height) < 2 && !more) return null;
     div.style.height = height + "px";
-    return Plotly.relayout(div, more ? {height, "margin.b": bottom} : {height});
-  }
-
-  function rangeOf(div) {
-    const axis = div.layout.xaxis;
-    return axis.autorange === false && axis.range ? [...axis.range] : null;
-  }
-
-  // Shows the range of time that is chosen in one figure in all that have a time.
-  let passing = false;
-  function follow(div) {
-    div.on("plotly_relayout", change => {
-      if (passing || !figures.get(div).layout.meta?.time) return;
-      const keys = Object.keys(change).filter(k => k.startsWith("xaxis."));
-      if (!keys.some(k => /^xaxis\.(range|autorange)/.test(k))) return;
-      passing = true;
-      const same = Object.fromEntries(keys.map(k => [k, change[k]]));
-      const others = [...figures].filter(([d, f]) => d !== div && f.layout.meta?.time);
-      Promise.all(others.map(([d]) => Plotly.relayout(d, same))).finally(() => { passing = false; });
-    });
+    return Plotly.relayout(div, more ? {autosize: true, "margin.b": 48 + more} : {autosize: true});
   }
 
   const arrays = {
@@ -125,9 +123,18 @@ const page = (() => {
     return JSON.parse(element.querySelector('script[type="application/json"]').textContent);
   }
 
-  function redraw() {
+  function redraw(which = () => true) {
+    return Promise.all([...figures].filter(([, f]) => which(f)).map(([div, figure]) => draw(div, figure)));
+  }
+
+  const widths = new ResizeObserver(entries => {
+    for (const {target} of entries)
+      if (target.clientWidth && target.clientWidth !== Number(target.dataset.width)) draw(target, figures.get(target));
+  });
+
+  function recolour() {
     for (const act of listeners) act();
-    return Promise.all([...figures].map(([div, figure]) => draw(div, figure)));
+    redraw();
   }
 
   async function drawAll() {
@@ -141,8 +148,8 @@ const page = (() => {
   }
 
   document.addEventListener("DOMContentLoaded", drawAll);  // when the page's other scripts have run
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-  matchMedia("print").addEventListener("change", redraw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+  matchMedia("print").addEventListener("change", recolour);
   return {
     colours, draw, array, data,
     onColours: act => listeners.push(act), onDraw: act => changes.push(act), onReady: act => starts.push(act),
