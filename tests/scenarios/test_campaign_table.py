@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -116,7 +116,7 @@ def test_rows_come_in_any_order_and_are_in_the_plans(tmp_path: Path, table: Camp
 def test_it_is_written_seldom_while_runs_come_fast(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
     written: list[float] = []
-    write_table: Any = pq.write_table
+    write_table = cast(Any, pq).write_table
 
     def take_a_second(*given: Any) -> None:
         write_table(*given)
