@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from scenarios.experiment import Figure
 from scenarios.helix_handover.parameters import Parameters
+from scenarios.helix_handover.plots import gripper_to_ball, tendon_name
 from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 from scenarios.reporting.camera_picture import CameraPicture
@@ -27,7 +27,7 @@ def draw_handover(
 
 def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t = record.time
-    true = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
+    true = gripper_to_ball(record)
     with figure(folder / "error", 1, size=(8.0, 3.6)) as (axes,):
         shade_phases(axes, t, record["servo.phase"], record.items("servo.phase"))
         seen = record["servo.phase"] > 0
@@ -68,7 +68,7 @@ def _tendons(record: Record, folder: Path) -> Figure:
     with figure(folder / "tendons", 2, size=(8.0, 5.0)) as (lengths, tensions):
         for k in range(9):
             style: dict[str, Any] = {"color": COLOURS[k // 3], "ls": ("-", "--", ":")[k % 3], "lw": 1.2}
-            label = f"segment {k // 3 + 1}, {120 * (k % 3)}°"
+            label = tendon_name(k)
             lengths.plot(record.time, record["servo.dl_t"][:, k] * 1000, drawstyle="steps-post", label=label, **style)
             tensions.plot(record.time, record["arm.tension"][:, k], **style)
         lengths.set(ylabel="commanded change (mm)", xlim=(record.time[0], record.time[-1]))

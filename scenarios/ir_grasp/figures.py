@@ -14,10 +14,10 @@ from plants.grasp_hand import FINGERS, finger_points, palm_outline, sensor_rays
 from plants.grasp_objects import outlines
 from scenarios.experiment import Figure
 from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.plots import FINGER_NAMES, closing_cost, cost, in_sight
 from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 
-FINGER_NAMES = ("thumb", "index", "ring")
 FINGER_COLOURS = (COLOURS[1], COLOURS[2], COLOURS[0])
 PALM_COLOUR, THING_COLOUR = "#c9d1db", "#ecd9b8"
 _GROUPS = {0: "reach", 1: "look", 2: "look", 3: "look", 4: "probe", 5: "step", 6: "close", 7: "pull", 8: "shake", 9: ""}
@@ -35,13 +35,10 @@ def draw_grasp(parameters: Parameters, moments: Mapping[str, float], record: Rec
 
 def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t, reflex = record.time, ReflexParams()
-    threshold = reflex.threshold_literal if parameters.literal else reflex.threshold
+    both = in_sight(record, "reflex.distance"), in_sight(record, "scene.range")
     with figure(folder / "distances", 2, size=(8.0, 5.6), heights=(3, 2)) as (above, below):
         for i, finger in enumerate(FINGER_NAMES):
-            seen, true = (
-                np.where(record[s][:, i] < reflex.distance_max, 1000 * record[s][:, i], np.nan)
-                for s in ("reflex.distance", "scene.range")
-            )
+            seen, true = (distances[:, i] for distances in both)
             above.plot(t, seen, color=FINGER_COLOURS[i], drawstyle="steps-post", label=f"{finger}, as seen")
             above.plot(t, true, color=FINGER_COLOURS[i], lw=0.8, ls=":")
         if not parameters.literal:
@@ -49,8 +46,10 @@ def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
         above.plot([], [], color="#4d5866", lw=0.8, ls=":", label="true, along the beam")
         above.set(ylabel="distance (mm)", ylim=(0, 82), xlim=(t[0], t[-1]))
         above.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.08))
-        below.semilogy(t, np.maximum(record["reflex.cost"] * 1e6, 0.1), color=COLOURS[3], drawstyle="steps-post")
-        below.axhline(1e6 * threshold, color="#4d5866", lw=0.8, ls="--", label="at which the hand closes")
+        below.semilogy(t, cost(record), color=COLOURS[3], drawstyle="steps-post")
+        below.axhline(
+            1e6 * closing_cost(parameters), color="#4d5866", lw=0.8, ls="--", label="at which the hand closes"
+        )
         below.legend(loc="best")
         below.set(xlabel="time (s)", ylabel="cost f (mm²)", xlim=(t[0], t[-1]))
         for axes, names in ((above, _GROUPS), (below, {})):

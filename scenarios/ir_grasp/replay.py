@@ -6,8 +6,9 @@ from controllers.reflex_parameters import Params as ReflexParams
 from cosim.ports import Floats
 from plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
 from plants.grasp_objects import outlines
-from scenarios.ir_grasp.figures import FINGER_COLOURS, FINGER_NAMES, PALM_COLOUR, THING_COLOUR
+from scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
 from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.record import Record
 from scenarios.reporting.meshes import Mesh, merged, prism
 from scenarios.reporting.replay import Body, Line, Replay
