@@ -13,8 +13,8 @@ from scenarios.reporting.replay import Body, Line, Replay
 _PUSH, _TWIST, _WAY = "#d1602b", "#8357a8", "#b58a1b"
 _PER_NEWTON, _PER_NEWTON_METRE = 0.04, 0.08
 """Lengths of arrows, m/N and m/(N m)."""
-_ARROW_HEAD, _AXIS_LENGTH = 0.7, 0.12
-"""Where along an arrow its head begins, and length of the axes of a frame, m."""
+_ARROW_HEAD, _CLEAR, _AXIS_LENGTH = 0.7, 0.035, 0.12
+"""Where along an arrow its head begins, how far from G it keeps, m, and length of the axes of a frame, m."""
 _AXES = ("#c0392b", "#2e8b57", "#2f6db5")
 
 
@@ -23,7 +23,7 @@ def replay_handover(record: Record) -> Replay:
     return Replay(
         bodies=[*_robot(record, jaw_gap(record)), *_person(record)],
         lines=_fingers(record),
-        eye=(-1.0, -1.15, 0.75),
+        eye=(-0.9, -1.05, 0.65),
         phases="decision.phase",
         notes=("No up and no down: in microgravity. The person's arm is not shown.",),
     )
@@ -31,15 +31,16 @@ def replay_handover(record: Record) -> Replay:
 
 def replay_push(record: Record) -> Replay:
     """Return the robot, its gripper's place of rest, and what pushes it."""
+    pushes = (
+        ("push", _PUSH, _PER_NEWTON * record["push.f_G"]),
+        ("twist", _TWIST, _PER_NEWTON_METRE * record["push.tau_G"]),
+    )
+    way = Line(label="way of the gripper", colour=_WAY, points=record["robot.p_WG"][:, None], trail=True)
     return Replay(
         bodies=_robot(record, np.zeros(len(record.time))),
-        lines=[
-            _arrow("push", _PUSH, record["robot.p_WG"], _PER_NEWTON * record["push.f_G"]),
-            _arrow("twist", _TWIST, record["robot.p_WG"], _PER_NEWTON_METRE * record["push.tau_G"]),
-            Line(label="way of the gripper", colour=_WAY, points=record["robot.p_WG"][:, None], width=4.0, trail=True),
-        ],
+        lines=[way, *(_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along))],
         fixed=_frame("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
-        eye=(-0.9, -1.2, 0.6),
+        eye=(-1.0, -1.15, 0.6),
         notes=(f"Arrows: {1000 * _PER_NEWTON:.0f} mm a newton, {1000 * _PER_NEWTON_METRE:.0f} mm a newton metre.",),
     )
 
@@ -92,10 +93,17 @@ def _own(solid: Solid, p_WB: Floats, q_WB: Floats) -> Mesh:
     return faceted(hull(np.round((solid.corners - p_WB) @ rotation_of(q_WB), 9)))
 
 
-def _arrow(label: str, colour: str, p_WG: Floats, along: Floats) -> Line:
-    """Return an arrow from points, shape (rows, 3), that is hidden while it has no length."""
-    shown = np.where(np.linalg.norm(along, axis=1, keepdims=True) > 0.0, along, np.nan)
-    points = np.stack([p_WG + share * shown for share in (0.0, _ARROW_HEAD, _ARROW_HEAD, 1.0)], axis=1)
+def _arrow(label: str, colour: str, record: Record, along: Floats) -> Line:
+    """Return an arrow, shape (rows, 3), beside the jaws: one that points at the robot ends there, others begin there.
+
+    It is hidden while it has no length.
+    """
+    p_WG, length = record["robot.p_WG"], np.linalg.norm(along, axis=1, keepdims=True)
+    shown = np.where(length > 0.0, along, np.nan)
+    ahead = shown / np.where(length > 0.0, length, 1.0)
+    inwards = np.einsum("ij,ij->i", along, record["robot.p_WB"] - p_WG)[:, None] > 0.0
+    first = p_WG + np.where(inwards, -shown - _CLEAR * ahead, _CLEAR * ahead)
+    points = np.stack([first + share * shown for share in (0.0, _ARROW_HEAD, _ARROW_HEAD, 1.0)], axis=1)
     return Line(label=label, colour=colour, points=points, radii=np.array([0.006, 0.006, 0.018, 0.0005]))
 
 

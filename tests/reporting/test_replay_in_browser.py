@@ -89,6 +89,31 @@ def test_play_goes_on_until_it_is_paused_and_leaves_the_view_as_it_is(page: Page
     wait_until(page, f"{SCENE}._fullLayout.scene.camera.eye.x !== 0.5")
 
 
+@pytest.mark.slow
+def test_a_scene_that_is_turned_while_it_plays_stays_turned(page: Page):
+    eye = f"{SCENE}._fullLayout.scene.camera.eye"
+    page.get_by_role("button", name="reset view").click()
+    move(page, 0)
+    before = page.evaluate(eye)
+    box = page.locator(".replay-scene").bounding_box()
+    assert box is not None
+    page.get_by_label("speed").select_option("0.5")
+    page.get_by_label("play", exact=True).click()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(15):
+        page.mouse.move(x + 8 * step, y)
+    page.mouse.up()
+    seen = page.evaluate(f"{SCENE}.dataset.frame")
+    wait_until(page, f"{SCENE}.dataset.frame !== '{seen}'")
+    page.get_by_label("pause").click()
+    after = page.evaluate(eye)
+    assert np.hypot(after["x"] - before["x"], after["y"] - before["y"]) > 0.05
+    page.get_by_role("button", name="reset view").click()
+
+
+@pytest.mark.slow
 def test_a_name_in_the_legend_hides_what_is_called_so(page: Page):
     shown = f"{SCENE}.data.filter(trace => trace.name === 'beams').map(trace => trace.visible ?? true)"
     name = page.get_by_role("button", name="beams")

@@ -17,6 +17,7 @@ for (const replay of document.querySelectorAll(".replay")) {
   let drawing = false;  // Plotly is at it
   let wanted = false;   // and is to draw again
   let playing = 0;      // the request of the next picture
+  let held = 0;         // the view is being turned or zoomed until this is called off
 
   const hasWebGl = () => {
     const canvas = document.createElement("canvas");
@@ -101,17 +102,15 @@ for (const replay of document.querySelectorAll(".replay")) {
 
   async function show() {
     tell();
-    if (drawing || !moving.length) {
-      wanted = drawing;
-      return;
-    }
+    wanted = drawing || held;
+    if (wanted || !moving.length) return;
     drawing = true;
     do {
       wanted = false;
       const places = moving.map(i => replayShapes.places(run.traces[i], u, run.low));
       const axis = k => places.map(p => p[k]);
       await Plotly.restyle(scene, {x: axis("x"), y: axis("y"), z: axis("z")}, moving);
-    } while (wanted);
+    } while (wanted && !held);
     drawing = false;
     scene.dataset.frame = u;
   }
@@ -140,8 +139,17 @@ for (const replay of document.querySelectorAll(".replay")) {
     playing = requestAnimationFrame(step);
   }
 
-  // Plotly saves the view at the end of a turn only, and would jump back at a picture drawn meanwhile.
+  // Each picture puts the view where Plotly last saved it, which is at the end of a turn: time goes on, pictures wait.
   function follow() {
+    const hold = () => { clearTimeout(held); held = Infinity; };
+    const release = () => {
+      clearTimeout(held);
+      held = setTimeout(() => { held = 0; if (wanted) show(); }, 150);
+    };
+    scene.addEventListener("pointerdown", hold, true);
+    scene.addEventListener("wheel", release, true);
+    for (const end of ["pointerup", "pointercancel"])
+      document.addEventListener(end, () => { if (held === Infinity) release(); }, true);
     scene.on("plotly_relayouting", change => {
       if (change["scene.camera"]) scene.layout.scene.camera = change["scene.camera"];
     });

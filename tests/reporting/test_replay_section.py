@@ -1,0 +1,83 @@
+"""A replay's data: rigid bodies once, poses by moment, what stays once, and nothing of a wrong length."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from numpy.typing import NDArray
+
+from cosim.ports import Floats
+from scenarios.record import Record
+from scenarios.reporting.meshes import box
+from scenarios.reporting.replay import Body, Line, Replay
+from scenarios.reporting.replay_section import replay_section
+
+ROWS = 1000
+MOVING: Floats = np.column_stack([np.linspace(0.0, 2.0, ROWS), np.zeros(ROWS), np.zeros(ROWS)])
+CUBE = Body(label="<cube>", colour="#123456", mesh=box((0.2, 0.2, 0.2)), p_WB=MOVING)
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Record:
+    pq.write_table(pa.table({"time": np.linspace(0.0, 10.0, ROWS)}), tmp_path / "s")
+    return Record(tmp_path / "s")
+
+
+def data(replay: Replay, record: Record) -> dict[str, Any]:
+    """Return what the page's script gets."""
+    found = re.search(r'<script type="application/json">(.*?)</script>', replay_section(replay, record).html)
+    assert found is not None
+    return json.loads(found[1])
+
+
+def numbers(packed: dict[str, str]) -> NDArray[np.float32]:
+    return np.frombuffer(base64.b64decode(packed["bdata"]), np.dtype(packed["dtype"]))
+
+
+def test_a_body_is_held_once_and_its_place_at_some_moments(record: Record):
+    (trace,) = data(Replay(bodies=[CUBE]), record)["traces"]
+    assert len(numbers(trace["parts"][0]["vertices"])) == CUBE.mesh.vertices.size
+    p = numbers(trace["parts"][0]["p"]).reshape(-1, 3)
+    assert len(p) < 300 < ROWS
+    np.testing.assert_allclose([p[0], p[-1]], MOVING[[0, -1]])
+
+
+def test_what_stays_is_held_once(record: Record):
+    (trace,) = data(Replay(bodies=[replace(CUBE, p_WB=np.ones((ROWS, 3)))]), record)["traces"]
+    assert len(numbers(trace["parts"][0]["p"])) == 3
+
+
+def test_orientations_follow_each_other_the_short_way(record: Record):
+    q_WB = np.tile([1.0, 0.0, 0.0, 0.0], (ROWS, 1))
+    q_WB[:, 3] = np.linspace(0.0, 0.5, ROWS)
+    q_WB[ROWS // 2 :] *= -1.0
+    (trace,) = data(Replay(bodies=[replace(CUBE, q_WB=q_WB)]), record)["traces"]
+    q = numbers(trace["parts"][0]["q"]).reshape(-1, 4)
+    assert np.all(np.einsum("ij,ij->i", q[1:], q[:-1]) > 0.0)
+
+
+def test_the_axes_hold_everything_at_all_times(record: Record):
+    tube = Line(label="tube", colour="#ffffff", points=MOVING[:, None] + [[0, 0, 0], [0, 3, 0]], radii=np.full(2, 0.5))
+    told = data(Replay(bodies=[CUBE], lines=[tube]), record)
+    assert np.all(np.array(told["low"]) <= [-0.5, -0.5, -0.5])
+    assert np.all(np.array(told["high"]) >= [2.5, 3.5, 0.5])
+    assert np.all(np.array(told["high"]) - told["low"] < [3.4, 4.4, 1.4])
+
+
+def test_a_body_with_more_or_fewer_rows_than_the_record_is_refused(record: Record):
+    with pytest.raises(ValueError, match="'<cube>' has 999 rows, the record 1000"):
+        replay_section(Replay(bodies=[replace(CUBE, p_WB=MOVING[1:])]), record)
+
+
+def test_names_are_text(record: Record):
+    html = replay_section(Replay(bodies=[CUBE], notes=["a < b"]), record).html
+    assert "<cube>" not in html
+    assert "&lt;cube&gt;" in html
+    assert "a &lt; b" in html
