@@ -8,6 +8,7 @@ import click
 from cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
 from fmus.binaries import NotCompiled
 from fmus.compile import CompilationError, UnknownPlatform
+from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.exit_status import BAD_CALL, UNIT_FAILED
 from scenarios.parameters import BadParameter
 from scenarios.run_folder import BadRunFolder
@@ -31,11 +32,18 @@ class RunNotWritten(click.ClickException):
     exit_code = UNIT_FAILED
 
 
+class WorkersLost(click.ClickException):
+    """A campaign whose workers have gone; what has ended is kept, and the same call goes on."""
+
+    exit_code = UNIT_FAILED
+
+
 @contextmanager
 def told_in_one_line() -> Generator[None, None, None]:
     """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback.
 
-    A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten.
+    A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten,
+    a cluster that has gone as WorkersLost.
     """
     try:
         yield
@@ -43,7 +51,9 @@ def told_in_one_line() -> Generator[None, None, None]:
         raise UnitLost(str(e)) from e
     except RecordNotWritten as e:
         raise RunNotWritten(str(e)) from e
-    except (CosimError, BadParameter, BadRunFolder, NotCompiled, UnknownPlatform) as e:
+    except CrewLost as e:
+        raise WorkersLost(str(e)) from e
+    except (CosimError, BadParameter, BadRunFolder, BadCrew, NotCompiled, UnknownPlatform) as e:
         raise BadCall(str(e)) from e
     except CompilationError as e:
         raise BadCall(str(e).replace("\n", " ", 1)) from e

@@ -1,6 +1,7 @@
 """Who carries out the runs of a campaign."""
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Protocol
 
 from scenarios.campaign.run_order import RunAnswer, RunOrder
@@ -14,10 +15,24 @@ class Crew(Protocol):
         """How many runs go on at the same time."""
         ...
 
+    def check(self, folder: Path) -> None:
+        """Check that all workers give the same numbers as this process would, and write to the same folder.
+
+        Args:
+            folder: an existing one, into which runs are to be written.
+
+        Raises:
+            BadCrew: some do not.
+        """
+        ...
+
     def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
         """Give each order to a worker; yield the answers as they come.
 
         A worker that is lost is replaced where that is possible, and its run begun anew. If the iteration is left
         before its end, runs under way are ended and leave nothing.
+
+        Raises:
+            CrewLost: all of them have gone for good.
         """
         ...

@@ -9,6 +9,7 @@ from cosim.geometry import rotation_of
 from cosim.ports import Floats
 from cosim.signals import Signals
 from scenarios.experiment import Metric, Outcome, Watch
+from scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
 from scenarios.helix_handover.parameters import Cover, Parameters
 from scenarios.helix_handover.snapshot import is_covered, take_pictures
 from scenarios.reporting.camera_picture import CameraPicture
@@ -28,11 +29,16 @@ class HandoverWatch(Watch):
 
     Attributes:
         phases: the controller's phases and when each was first entered, in s.
+
+    Args:
+        parameters: the scenario's.
+        pictures: what the cameras saw, where signals hold no pictures; else they are taken.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
         self.parameters = parameters
-        self._pictures: list[CameraPicture] = []
+        self._pictures = list(pictures or ())
+        self._takes = pictures is None
         self.phases: dict[str, float] = {}
         self._t = 0.0
         self._phase = ""
@@ -41,6 +47,7 @@ class HandoverWatch(Watch):
         self._p_WO: Floats = np.zeros(3)
         self._p_GO: Floats = np.zeros(3)
         self._offset: Floats | None = None  # p_GO when the hand let go
+        self._mismatch: ModelMismatch | None = None  # when the gripper began to close
         self._error = 0.0
         self._nearest = np.inf
         self._released_at: float | None = None
@@ -58,6 +65,8 @@ class HandoverWatch(Watch):
             self._keep("start", signals)
         if phase in _MOMENTS and phase not in self.phases:
             self._keep(_MOMENTS[phase], signals)
+        if phase == "GRASP" and phase not in self.phases:
+            self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"])
         if self._hides(t):
             self._keep(_COVERED, signals)
         self.phases.setdefault(phase, t)
@@ -77,7 +86,7 @@ class HandoverWatch(Watch):
         return tuple(self._pictures)
 
     def _keep(self, role: str, signals: Signals) -> None:
-        if all(picture.t != self._t for picture in self._pictures):
+        if self._takes and all(picture.t != self._t for picture in self._pictures):
             self._pictures += take_pictures(self._t, role, self.parameters, signals)
 
     def _hides(self, t: float) -> bool:
@@ -123,6 +132,8 @@ class HandoverWatch(Watch):
             metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
         if self._released_at is not None:
             metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the hand lets go")
+        if self._mismatch is not None:
+            metrics |= _mismatch_metrics(self._mismatch)
         if self._offset is not None:
             lateral, axial = _beside_and_along(self._offset)
             metrics["grasp_offset_lateral"] = Metric(
@@ -154,6 +165,17 @@ class HandoverWatch(Watch):
         reach = "out of reach or too slow" if self._nearest > 2 * self.parameters.threshold else "no grasp"
         within = f"within {self.parameters.patience:.0f} s"
         return f"{reach}: {within} the arm came no nearer than {self._nearest:.3f} m to its goal; {where}"
+
+
+def _mismatch_metrics(m: ModelMismatch) -> dict[str, Metric]:
+    start = "place after calibration when the gripper begins to close, as in fig. 9"
+    return {
+        "model_mismatch": Metric(
+            m.apart, "m", "gripper of the commanded state f(q_sys) to the measured one when the gripper begins to close"
+        ),
+        "model_travel": Metric(m.model_travel, "m", f"gripper of the commanded state f(q_sys) from its {start}"),
+        "arm_travel": Metric(m.arm_travel, "m", f"measured gripper from its {start}"),
+    }
 
 
 def _beside_and_along(p_GO: Floats) -> tuple[float, float]:

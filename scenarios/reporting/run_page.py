@@ -13,13 +13,15 @@ from scenarios.reporting.explorer_section import explorer_section
 from scenarios.reporting.graph_section import graph_section
 from scenarios.reporting.page import write_page
 from scenarios.reporting.pictures_section import pictures_section
+from scenarios.reporting.published_section import published_section
 from scenarios.reporting.replay_section import replay_section
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_lead import run_lead
+from scenarios.reporting.run_record import record_of
 from scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
 from scenarios.reporting.section import Section
 from scenarios.reporting.time_plots_section import time_plots_section
-from scenarios.run_folder import BadRunFolder, RunFolder
+from scenarios.run_folder import RunFolder
 
 
 def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
@@ -34,9 +36,10 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
         RecordNotWritten: the page cannot be written.
     """
     facts = RunFacts.read(folder)
-    record = _record(folder)
+    record = record_of(folder)
     sections = [
         metrics_section(facts),
+        published_section(facts.summary, facts.run),
         *_seen(facts, record),
         pictures_section(folder),
         None if record is None else explorer_section(record),
@@ -48,17 +51,6 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     ]
     heading = f"{facts.scenario}: {'succeeded' if facts.summary['success'] else 'failed'}"
     write_page(file or folder.report, heading, run_lead(facts), [s for s in sections if s is not None])
-
-
-def _record(folder: RunFolder) -> Record | None:
-    """Return the record; None where there is none, or one of less than two rows, which shows nothing over time."""
-    if not folder.signals.exists():
-        return None
-    try:
-        record = Record(folder.signals)
-        return record if len(record.time) > 1 else None
-    except (OSError, ValueError, KeyError) as e:  # Arrow's faults are among them
-        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {str(e).splitlines()[0]}") from e
 
 
 def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:

@@ -15,6 +15,7 @@ from scenarios.helix_handover.watch import HandoverWatch
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
 P_WG = np.array([0.16, 0.0, -0.6])
+CALIBRATED = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
 P_WR = P_WG + np.array([0.0, 0.0, 0.1])
 
 
@@ -25,7 +26,7 @@ def signals(
     reals = {
         "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
         "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along])},
-        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG},
+        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
         "vision": {"p_WO_meas": P_WG, "p_WR_meas": P_WR, "p_WG_meas": P_WG},
     }
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
@@ -105,6 +106,13 @@ def test_a_run_that_timed_out_has_a_start_and_an_end():
 
 def test_a_moment_is_shown_once():
     assert list(moments(follow((0.0, signals(Phase.WAIT))))) == ["start"]
+
+
+def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to_close():
+    metrics = follow((7.9, signals(Phase.DESCEND)), (8.0, signals(Phase.GRASP))).outcome().metrics
+    assert metrics["model_travel"].value == pytest.approx(0.0, abs=1e-12)
+    assert metrics["model_mismatch"].value == metrics["arm_travel"].value == pytest.approx(np.hypot(0.16, 0.1))
+    assert "model_mismatch" not in follow((7.9, signals(Phase.DESCEND))).outcome().metrics
 
 
 def test_a_covered_lens_is_shown_when_the_first_picture_was_taken_through_it():

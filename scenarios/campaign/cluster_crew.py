@@ -1,0 +1,172 @@
+"""The workers of a Dask cluster as a crew."""
+
+import contextlib
+import itertools
+import queue
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from distributed import Client, Future, KilledWorker
+
+from cosim.exceptions import one_line
+from scenarios.campaign.bad_crew import BadCrew, CrewLost
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+from scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
+from scenarios.run_folder import versions
+
+_AHEAD = 2
+"""Orders that the scheduler holds for each thread: one that is carried out and one that waits.
+
+Of many thousand it would hold many thousand, and take their workers' loss for their fault.
+"""
+
+_MOST_TOLD = 3
+"""Workers that a refusal names."""
+
+_LOOK = 5.0
+"""How often it is looked whether there are workers while no run ends, s."""
+
+_WITHOUT = 60.0
+"""For how long a cluster may have no worker, s: those that watch them start others."""
+
+_BOUND = 10.0
+"""How long workers get to answer what is asked of all, s."""
+
+
+class ClusterCrew:
+    """The workers of a Dask cluster.
+
+    Args:
+        client: connected to the cluster's scheduler.
+        address: the scheduler's.
+    """
+
+    def __init__(self, client: Client, address: str) -> None:
+        self._client, self._address = client, address
+        self._batches: set[str] = set()
+        self._versions = versions()
+
+    @property
+    def workers(self) -> int:
+        """How many runs go on at the same time."""
+        return sum(cast("Mapping[str, int]", self._client.nthreads()).values())
+
+    def check(self, folder: Path) -> None:
+        """Check that all workers give the same numbers as this process, and write to the same folder.
+
+        Raises:
+            BadCrew: some do not; the first of them are named.
+        """
+        told = self._ask(tell_versions)
+        self._refuse({worker: _difference(self._versions, other) for worker, other in told.items()})
+        token = uuid.uuid4().hex
+        mark = folder / f".{token}"
+        mark.write_text(token, encoding="utf-8")
+        try:
+            told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
+        finally:
+            mark.unlink()
+        self._refuse({w: f"{folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
+
+    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+        """Give each order to a worker; yield the answers as they come.
+
+        A worker that is lost is replaced where something watches it (a nanny), and its run begun anew. If the iteration
+        is left before its end, runs under way are ended and leave nothing.
+
+        Raises:
+            CrewLost: the scheduler has gone, or no worker has been there for a while.
+        """
+        batch = uuid.uuid4().hex
+        self._batches.add(batch)
+        waiting = iter(orders)
+        going: dict[Any, tuple[RunOrder, Future[RunAnswer]]] = {}
+        done: queue.SimpleQueue[Future[RunAnswer]] = queue.SimpleQueue()
+
+        def give() -> None:
+            for order in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(going))):
+                key = f"run-{uuid.uuid4().hex}"
+                future = self._client.submit(carry_out_run, order, batch, self._versions, key=key, pure=False)
+                going[future.key] = order, future
+                future.add_done_callback(done.put)
+
+        try:
+            give()
+            while going:
+                order, future = going.pop(self._next(done).key)
+                answer = self._answer(order, future)
+                give()
+                yield answer
+        finally:
+            with contextlib.suppress(Exception):  # of a cluster that is gone nothing is left to end
+                self._client.cancel([future for _, future in going.values()], force=True)
+            self._end(batch)
+
+    def end(self) -> None:
+        """End what workers do for this crew, and the processes that they keep for it."""
+        for batch in list(self._batches):
+            self._end(batch)
+
+    def _end(self, batch: str) -> None:
+        if batch in self._batches:
+            self._batches.remove(batch)
+            with contextlib.suppress(Exception):
+                self._ask(end_runs, batch)
+
+    def _next(self, done: "queue.SimpleQueue[Future[RunAnswer]]") -> "Future[RunAnswer]":
+        """Wait for a run's end."""
+        there = time.monotonic()
+        while True:
+            with contextlib.suppress(queue.Empty):
+                return done.get(timeout=_LOOK)
+            if self.workers:
+                there = time.monotonic()
+            elif time.monotonic() - there > _WITHOUT:
+                raise CrewLost(f"the cluster at {self._address} has had no worker for {_WITHOUT:g} s")
+
+    def _answer(self, order: RunOrder, future: "Future[RunAnswer]") -> RunAnswer:
+        if future.cancelled():
+            raise CrewLost(f"the scheduler at {self._address} is gone")
+        error = cast("BaseException | None", future.exception())
+        if error is None:
+            return future.result()
+        if isinstance(error, KilledWorker):
+            times = error.allowed_failures + 1
+            return RunAnswer(name=order.name, lost=f"its worker was lost {times} times: killed, or out of memory")
+        return RunAnswer(name=order.name, lost=f"{type(error).__name__}: {one_line(error)}")
+
+    def _ask(self, function: Callable[..., Any], *arguments: str) -> dict[str, Any]:
+        """Return what each worker answers, by its address."""
+        told: dict[str, Any] = {}
+        failed: list[Exception] = []
+
+        def ask() -> None:
+            try:
+                told.update(cast("dict[str, Any]", self._client.run(function, *arguments, on_error="return")))
+            except Exception as e:  # told where it is waited for
+                failed.append(e)
+
+        asking = threading.Thread(target=ask, daemon=True)  # of workers some may not answer at all
+        asking.start()
+        asking.join(_BOUND)
+        if failed or asking.is_alive():
+            fault = one_line(failed[0]) if failed else f"no answer within {_BOUND:g} s"
+            raise BadCrew(f"the workers of the cluster at {self._address} do not answer: {fault}")
+        return {f"worker {worker}": answer for worker, answer in told.items()}
+
+    def _refuse(self, faults: Mapping[str, str]) -> None:
+        """Raise BadCrew if there is a fault."""
+        bad = [f"{worker} {fault}" for worker, fault in faults.items() if fault]
+        if bad:
+            more = f"; and {len(bad) - _MOST_TOLD} workers more" if len(bad) > _MOST_TOLD else ""
+            raise BadCrew(f"the cluster at {self._address} cannot be used: {'; '.join(bad[:_MOST_TOLD])}{more}")
+
+
+def _difference(here: Mapping[str, str], there: Any) -> str:
+    if isinstance(there, BaseException):
+        return f"cannot run this package: {type(there).__name__}: {one_line(there)}"
+    return difference(here, there)

@@ -1,0 +1,90 @@
+"""Carries out an order in this process, and gives its folder the name that says it is complete."""
+
+import contextlib
+import os
+import shutil
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import click
+
+from cosim.exceptions import one_line
+from scenarios.bad_call import told_in_one_line
+from scenarios.campaign.run_order import RunOrder
+from scenarios.chosen import scenario_named
+from scenarios.interruption import Interruption
+from scenarios.parameters import parse_parameters
+from scenarios.run_folder import RunFolder
+from scenarios.runner import carry_out
+from scenarios.task import Task
+
+
+def carry_out_order(order: RunOrder, folder: Path) -> None:
+    """Run an order into a folder, without figures or a report.
+
+    Raises:
+        As `carry_out` and `parse_parameters`. BadCall: there is no such scenario.
+    """
+    experiment = scenario_named(order.scenario)
+    task = Task(
+        experiment=experiment(),
+        parameters=parse_parameters(experiment, order.parameters),
+        seed=order.seed,
+        fmus={name: Path(path) for name, path in order.fmus.items()},
+        folder=RunFolder(folder),
+        options=order.options,
+        presented=False,
+    )
+    carry_out(task, lambda _t, _end: None, Interruption())
+
+
+def fault_of(work: Callable[[], object]) -> str:
+    """Do something; return in a sentence why it could not be done, and "" if it could."""
+    try:
+        with told_in_one_line():
+            work()
+    except click.ClickException as e:
+        return e.message
+    except BaseException as e:  # a run may raise what it likes: the campaign goes on
+        traceback.print_exc()
+        return f"{type(e).__name__}: {one_line(e)}"
+    return ""
+
+
+@contextlib.contextmanager
+def printing_to(log: BinaryIO):
+    """Let what this process prints, in Python or in native code, go to a file meanwhile."""
+    before = [os.dup(number) for number in (1, 2)]
+    try:
+        for number in (1, 2):
+            os.dup2(log.fileno(), number)
+        yield
+    finally:
+        for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+            stream.flush()
+            os.dup2(before[number - 1], number)
+            os.close(before[number - 1])
+
+
+def finish(order: RunOrder, folder: Path, log: BinaryIO) -> str:
+    """Name the folder of a run that has ended as the order says; return why it cannot be, and "" if it is.
+
+    What the run printed goes into its `log.txt`. A folder without a summary is removed.
+    """
+    named = Path(order.runs, order.name)
+    if not (folder / "summary.json").exists():
+        return "it ended without a summary"
+    with contextlib.suppress(OSError):  # a full disk: the run itself is complete
+        log.seek(0)
+        if printed := log.read():
+            (folder / "log.txt").write_bytes(printed)
+    try:
+        os.rename(folder, named)
+    except OSError as e:
+        if not (named / "summary.json").exists():  # else it was carried out twice, as when a worker was taken for lost
+            return f"its folder cannot be named {named}: {e.strerror}"
+        shutil.rmtree(folder, ignore_errors=True)
+    return ""

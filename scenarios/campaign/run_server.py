@@ -1,0 +1,134 @@
+"""A process that carries out one run after the other, each in a child of its own: `python -m` this module.
+
+It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads orders from
+standard input and answers on standard output (`messages`): an order is a `RunOrder` and the folder for its files while
+it runs; the answer is why there is no folder of the run, or "". It ends with its input, and a run under way with it.
+
+Where processes cannot be forked (Windows) it carries runs out itself: what a unit does to the process, it does to it.
+"""
+
+import contextlib
+import gc
+import os
+import select
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, NoReturn
+
+from cosim.heartbeat import Heartbeat
+from fmus.build import import_block
+from fmus.catalog import UNITS
+from scenarios import supervisor
+from scenarios.campaign.messages import receive, send
+from scenarios.campaign.ordered_run import carry_out_order, fault_of, finish, printing_to
+from scenarios.campaign.run_order import RunOrder
+from scenarios.catalog import SCENARIOS
+from scenarios.death import Death
+from scenarios.forked_child import ChildEnd, ForkedChild
+
+IDLE = 60.0
+"""Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""
+
+
+class RunServer:
+    """Carries out orders.
+
+    Args:
+        orders: where they come from.
+        answers: where the answers go.
+    """
+
+    def __init__(self, orders: BinaryIO, answers: BinaryIO) -> None:
+        self._orders, self._answers = orders, answers
+        self._loaded: set[str] = set()
+        self._forks = supervisor.can_supervise()
+
+    def serve(self) -> None:
+        """Carry out orders until there are no more."""
+        while self._comes():
+            try:
+                order, folder = receive(self._orders)
+            except EOFError:
+                return
+            self._load(order.scenario)
+            send(self._answers, self._carry_out(order, folder))
+
+    def _comes(self) -> bool:
+        """Wait for an order, or the end of them."""
+        return not self._forks or bool(select.select([self._orders], [], [], IDLE)[0])
+
+    def _load(self, scenario: str) -> None:
+        """Load what the units of a scenario import, once for all its runs."""
+        if scenario in self._loaded or scenario not in SCENARIOS:
+            return
+        self._loaded.add(scenario)
+        for unit in SCENARIOS[scenario].units.values():
+            with contextlib.suppress(Exception):  # a run that needs it will tell
+                import_block(UNITS[unit].block)
+        gc.collect()
+        gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
+
+    def _carry_out(self, order: RunOrder, folder: Path) -> str:
+        with tempfile.TemporaryFile(dir=order.runs) as log:
+            if self._forks:
+                lost = self._fork(order, folder, log)
+            else:
+                with printing_to(log):
+                    lost = fault_of(lambda: carry_out_order(order, folder))
+            lost = lost or finish(order, folder, log)
+        if lost:
+            shutil.rmtree(folder, ignore_errors=True)
+        return lost
+
+    def _fork(self, order: RunOrder, folder: Path, log: BinaryIO) -> str:
+        """Carry out a run in a child; if that dies of a unit, complete what it left in another child."""
+        began = time.monotonic()
+        end, heartbeat = self._in_child(lambda: fault_of(lambda: carry_out_order(order, folder)), folder, log)
+        if heartbeat.status is not None:
+            return heartbeat.facts.get("lost", "")
+        death = Death(heartbeat, end, time.monotonic() - began)
+        left = death.folder
+        if left is None or death.was_killed or end.signal in supervisor.ORDERS:
+            return death.told
+        end, heartbeat = self._in_child(lambda: fault_of(lambda: death.complete(left)), folder, log)
+        return "" if heartbeat.status == 0 else heartbeat.facts.get("lost", death.told)
+
+    def _in_child(self, work: Callable[[], str], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
+        heartbeat = supervisor.renew_heartbeat()
+
+        def begin() -> NoReturn:
+            supervisor.begin_child()
+            for pipe in (self._orders, self._answers):
+                os.close(pipe.fileno())
+            for number in (1, 2):
+                os.dup2(log.fileno(), number)
+            if lost := work():
+                heartbeat.tell(lost=lost)
+            supervisor.leave(1 if lost else 0)
+
+        child = ForkedChild(begin, heartbeat)
+        end = child.wait(self._orders.fileno())
+        if end is None:  # no order comes before the answer: the worker is gone
+            child.kill()
+            for scratch in heartbeat.facts.get("scratch", []):
+                shutil.rmtree(scratch, ignore_errors=True)
+            shutil.rmtree(folder, ignore_errors=True)
+            sys.exit()
+        return end, heartbeat
+
+
+def main() -> None:
+    """Serve on the standard streams, which runs do not see."""
+    orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), 0)
+    os.dup2(2, 1)
+    RunServer(orders, answers).serve()
+
+
+if __name__ == "__main__":
+    main()
