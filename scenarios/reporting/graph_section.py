@@ -102,7 +102,7 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
         },
     )
     told = "; ".join(f"{a} to {b}: {', '.join(s.out for s in signals)}" for (a, b), signals in bundles.items())
-    height = 230 if len(units) <= 2 else 460 if len(units) <= _FEW else 620
+    height = 230 if len(units) <= 2 else 280 + 40 * min(len(units), 10)
     return plot_html(figure, height=height, label=f"Graph of {len(units)} units. {told}")
 
 

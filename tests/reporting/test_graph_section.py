@@ -1,6 +1,8 @@
 """The graph of a run's system: places, arrows with their signals, and a table; of a large system the table alone."""
 
 import itertools
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,8 @@ import pytest
 
 from scenarios.reporting.graph_layout import bent, places
 from scenarios.reporting.graph_section import graph_section, rate
+from scenarios.reporting.run_page import write_run_page
+from scenarios.run_folder import BadRunFolder, RunFolder
 
 LOOP = [("camera", "vision"), ("vision", "servo"), ("servo", "arm"), ("arm", "camera"), ("arm", "hand"),
         ("hand", "arm"), ("hand", "camera")]  # fmt: skip
@@ -100,3 +104,11 @@ def test_without_a_system_there_is_no_section():
 )
 def test_rates_are_told_as_one_reads_them(period: float | None, sampled: bool, told: str):
     assert rate(unit("u", period=period, sampled=sampled)) == told
+
+
+def test_a_damaged_system_is_told_as_the_runs_fault(tmp_path: Path):
+    (tmp_path / "run.json").write_text(json.dumps({"scenario": "x", "parameters": {}, "system": {"units": [1]}}))
+    (tmp_path / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
+    with pytest.raises(BadRunFolder, match="what it tells of its units is damaged"):
+        write_run_page(RunFolder.left_at(tmp_path))
+    assert not (tmp_path / "report.html").exists()
