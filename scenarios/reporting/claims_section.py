@@ -4,21 +4,26 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from scenarios.campaign.shown_unit import ShownUnit, shown_unit
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.reporting.rows_table import rows_table
 from scenarios.reporting.section import Section
 
+_HEADER = ("claim", "published", "ours", "95 % interval", "verdict")
 _COLOURS = {Verdict.REPRODUCED: "good", Verdict.NOT_REPRODUCED: "bad", Verdict.NOT_COMPARABLE: "soft"}
 
 
 def claims_section(claims: Sequence[Claim]) -> Section | None:
     """Return the table of claims with their verdicts, this project's own below; None if there are none."""
     parts: list[Markup] = []
-    for beyond, caption in ((False, ""), (True, "Beyond the paper")):
+    for beyond, title in ((False, ""), (True, "Beyond the paper")):
         rows = [_row(c) for c in claims if c.beyond is beyond]
         if rows:
-            parts.append(rows_table(("claim", "published", "ours", "95 % interval", "verdict"), rows, caption=caption))
+            heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in _HEADER)
+            heading = Markup("<h3>{}</h3>").format(title) if title else Markup()
+            table = Markup("<table class='claims'><thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table>")
+            parts.append(heading + table.format(heads, Markup("\n").join(rows)))
     return Section(anchor="claims", title="Claims", html=Markup("\n").join(parts)) if parts else None
 
 
@@ -27,17 +32,31 @@ def verdict_html(verdict: Verdict) -> Markup:
     return Markup("<b class='{}'>{}</b>").format(_COLOURS[verdict], verdict.value)
 
 
-def _row(claim: Claim) -> tuple[str | Markup, ...]:
+def _row(claim: Claim) -> Markup:
     where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
-    reason = Markup("{}<br><span class='soft'>{}</span>").format(verdict_html(claim.verdict), claim.reason)
-    return Markup("{}{}").format(claim.claim, where), claim.published, claim.measured, _span(claim), reason
+    cells = (
+        Markup("{}{}").format(claim.claim, where),
+        claim.published,
+        claim.measured,
+        _span(claim),
+        Markup("{}<br><span class='soft'>{}</span>").format(verdict_html(claim.verdict), claim.reason),
+    )
+    told = Markup().join(
+        Markup("<td data-label='{}'{}>{}</td>").format(name, Markup() if cell else Markup(" class='empty'"), cell)
+        for name, cell in zip(_HEADER, cells, strict=True)
+    )
+    return Markup("<tr>{}</tr>").format(told)
 
 
 def _span(claim: Claim) -> str:
+    """Return the interval, a rate's in percent."""
     if claim.interval is None:
-        return "–"
-    low, high = claim.interval
-    return f"{low:.3g} to {high:.3g}" + ("" if claim.unit == "1" else f" {claim.unit}")
+        return ""
+    unit = shown_unit(claim.unit, claim.interval)
+    if claim.unit == "1" and "%" in claim.measured:
+        unit = ShownUnit(100.0, "%")
+    low, high = (x * unit.factor for x in claim.interval)
+    return f"{low:.3g} to {high:.3g} {unit.symbol}".rstrip()
 
 
 def comparison_section(tables: Sequence[ComparisonTable]) -> Section | None:
