@@ -35,7 +35,7 @@ def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals)
             camera=side.name.lower(),
             role=role,
             pixels=signals[f"camera.{side.name.lower()}"].reshape(_SHAPE),
-            marks=[*([] if is_covered(t, side, parameters) else _measured(side, signals)), *_estimated(side, signals)],
+            marks=[*_estimated(side, signals), *([] if is_covered(t, side, parameters) else _measured(side, signals))],
         )
         for side in (Cover.LEFT, Cover.RIGHT)
     ]

@@ -69,6 +69,7 @@ def _plot(bars: Sequence[_Bar], in_all: float) -> Markup:
         text=told,
         textposition="auto",
         insidetextanchor="end",
+        insidetextfont={"color": "var(--page)"},
         textangle=0,
         hovertemplate="%{y}: %{text}<extra></extra>",
     )

@@ -1,9 +1,8 @@
 """Draws the units of a run and what flows between them."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple
 
-import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
@@ -22,8 +21,17 @@ _COLOURS = 8  # of page.css
 _FEW = 8
 """Units beyond which a box has room for the name alone."""
 
-_Bundles = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
-"""Connections by the units that they go from and to."""
+
+class _Signal(NamedTuple):
+    """A connection: the ports at its ends, and what `run.json` tells of it."""
+
+    out: str
+    into: str
+    told: Mapping[str, Any]
+
+
+_Bundles = Mapping[tuple[str, str], Sequence[_Signal]]
+"""Signals by the units that they go from and to."""
 
 
 def graph_section(run: Mapping[str, Any]) -> Section | None:
@@ -38,7 +46,7 @@ def graph_section(run: Mapping[str, Any]) -> Section | None:
         return None
     connections: Sequence[Mapping[str, Any]] = system.get("connections", ())
     html = template("graph.html").render(
-        plot=_plot(units, _bundled(connections)) if len(units) <= _MOST_UNITS else None,
+        plot=_plot(units, _bundled([u["name"] for u in units], connections)) if len(units) <= _MOST_UNITS else None,
         units=[(u["name"], u["model"], u["fmi"], rate(u)) for u in units],
         rows=_rows(connections[:_MOST_ROWS], run.get("conversions", ())),
         left_out=max(0, len(connections) - _MOST_ROWS),
@@ -54,17 +62,19 @@ def rate(unit: Mapping[str, Any]) -> str:
     return told + (", sampled" if unit["sampled"] else "")
 
 
-def _unit_of(port: str, names: Sequence[str] = ()) -> str:
-    """Return the unit of a port's whole name; units' and ports' names may have dots."""
-    fitting = [name for name in names if port.startswith(f"{name}.")]
-    return max(fitting, key=len) if fitting else port.partition(".")[0]
-
-
-def _bundled(connections: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
-    bundles: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+def _bundled(names: Collection[str], connections: Sequence[Mapping[str, Any]]) -> _Bundles:
+    bundles: dict[tuple[str, str], list[_Signal]] = {}
     for c in connections:
-        bundles.setdefault((_unit_of(c["source"]), _unit_of(c["target"])), []).append(c)
+        (source, out), (target, into) = (_parted(c[end], names) for end in ("source", "target"))
+        bundles.setdefault((source, target), []).append(_Signal(out=out, into=into, told=c))
     return bundles
+
+
+def _parted(port: str, names: Collection[str]) -> tuple[str, str]:
+    """Return unit and port of a port's whole name; both may have dots in them."""
+    dots = [k for k, letter in enumerate(port) if letter == "."]
+    at = next((k for k in reversed(dots) if port[:k] in names), dots[0])
+    return port[:at], port[at + 1 :]
 
 
 def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
@@ -72,14 +82,18 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
     between = {pair: cs for pair, cs in bundles.items() if pair[0] != pair[1]}
     at = places(names, between)
     colour = {name: f"var(--c{k % _COLOURS})" for k, name in enumerate(names)}
-    traces = [_arrow(at[a], at[b], a, b, cs, colour[a]) for (a, b), cs in between.items()]
-    reach = 1.25 if len(units) > 2 else 1.6
+    lines = [bent(at[a], at[b]) for a, b in between]
+    drawn = [_line(points, colour[a]) for points, (a, _) in zip(lines, between, strict=True)]
+    heads = [
+        _head(points, _told(*pair, cs), colour[pair[0]])
+        for points, (pair, cs) in zip(lines, between.items(), strict=True)
+    ]
     axis = {"visible": False, "fixedrange": True}
     figure = go.Figure(
-        traces,
+        [*drawn, *heads],
         {
-            "xaxis": {**axis, "range": [-reach - 0.1, reach + 0.1]},
-            "yaxis": {**axis, "range": [-reach, reach]},
+            "xaxis": {**axis, "range": [-1.6, 1.6]},
+            "yaxis": {**axis, "range": [-1.25, 1.25]},
             "annotations": [_box(u, at[u["name"]], colour[u["name"]], few=len(units) <= _FEW) for u in units],
             "showlegend": False,
             "hovermode": "closest",
@@ -87,40 +101,50 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
     )
-    told = "; ".join(f"{a} to {b}: {', '.join(_port(c['source']) for c in cs)}" for (a, b), cs in bundles.items())
-    height = 230 if len(units) <= 2 else 440 if len(units) <= _FEW else 620
+    told = "; ".join(f"{a} to {b}: {', '.join(s.out for s in signals)}" for (a, b), signals in bundles.items())
+    height = 230 if len(units) <= 2 else 280 + 40 * min(len(units), 10)
     return plot_html(figure, height=height, label=f"Graph of {len(units)} units. {told}")
 
 
-def _arrow(a: Floats, b: Floats, source: str, target: str, cs: Sequence[Mapping[str, Any]], colour: str) -> Any:
-    """Return a bent line with its head in the middle, where boxes of any size leave it free."""
-    points, head = bent(a, b), len(bent(a, b)) // 2
-    sizes = np.where(np.arange(len(points)) == head, 15, 0)
+def _line(points: Floats, colour: str) -> Any:
+    line = {"color": colour, "width": 1.8}
+    return go.Scatter(x=points[:, 0], y=points[:, 1], mode="lines", line=line, hoverinfo="skip")
+
+
+def _head(points: Floats, told: str, colour: str) -> Any:
+    """Return an arrow's head in the middle of its line, where boxes of any size leave it free, with its signals."""
+    middle = len(points) // 2
+    ends = points[middle - 1 : middle + 1]
     return go.Scatter(
-        x=points[:, 0],
-        y=points[:, 1],
-        mode="lines+markers",
-        line={"color": colour, "width": 1.8},
-        marker={"symbol": "arrow", "angleref": "previous", "size": sizes, "color": colour, "opacity": 1},
-        hovertext=_told(source, target, cs),
+        x=ends[:, 0],
+        y=ends[:, 1],
+        mode="markers",
+        marker={
+            "symbol": "arrow",
+            "angleref": "previous",
+            "size": [0, 15],
+            "color": colour,
+            "opacity": 1,
+            "line": {"width": 0},
+        },
+        hovertext=["", told],
         hoverinfo="text",
         hoverlabel={"align": "left"},
     )
 
 
-def _told(source: str, target: str, cs: Sequence[Mapping[str, Any]]) -> str:
+def _told(source: str, target: str, signals: Sequence[_Signal]) -> str:
     lines = [f"<b>{escape(source)} → {escape(target)}</b>"]
-    for c in cs[:_MOST_TOLD]:
-        out, into = _port(c["source"]), _port(c["target"])
-        port = out if out == into else f"{out} → {into}"
-        lines.append(f"{escape(port)}{escape(_form(c))}")
-    if len(cs) > _MOST_TOLD:
-        lines.append(f"and {len(cs) - _MOST_TOLD} more")
+    for s in signals[:_MOST_TOLD]:
+        port = s.out if s.out == s.into else f"{s.out} → {s.into}"
+        lines.append(f"{escape(port)}{escape(_form(s.told))}")
+    if len(signals) > _MOST_TOLD:
+        lines.append(f"and {len(signals) - _MOST_TOLD} more")
     return "<br>".join(lines)
 
 
 def _form(c: Mapping[str, Any]) -> str:
-    """Return unit and size of a signal, where they say something, such as " (m, 3)"."""
+    """Return kind, unit and size of a signal, where they say something, such as " (m, x 3)"."""
     kind = [] if c["kind"] == "real" else [c["kind"]]
     unit = [c["unit"]] if c["unit"] not in ("", "1") else []
     size = [f"x {c['size']}"] if c["size"] != 1 else []
@@ -128,24 +152,21 @@ def _form(c: Mapping[str, Any]) -> str:
     return f" ({told})" if told else ""
 
 
-def _port(name: str) -> str:
-    return name.partition(".")[2]
-
-
 def _box(unit: Mapping[str, Any], at: Floats, colour: str, *, few: bool) -> dict[str, Any]:
     name, model = escape(unit["name"]), escape(unit["model"])
     rest = f"FMI {escape(unit['fmi'])}, {escape(rate(unit))}"
+    lines = rest.replace(", sampled", "<br>sampled")  # narrow, for phones
     return {
         "x": float(at[0]),
         "y": float(at[1]),
-        "text": f"<b>{name}</b><br>{model}<br>{rest}" if few else f"<b>{name}</b>",
+        "text": f"<b>{name}</b><br>{model}<br>{lines}" if few else f"<b>{name}</b>",
         "hovertext": f"{name}: {model}, {rest}",
         "showarrow": False,
         "bgcolor": "var(--card)",
         "bordercolor": colour,
         "borderwidth": 2,
         "borderpad": 6,
-        "font": {"size": 12},
+        "font": {"size": 11},
     }
 
 

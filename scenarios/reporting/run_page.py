@@ -21,7 +21,7 @@ from scenarios.reporting.run_record import record_of
 from scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
 from scenarios.reporting.section import Section
 from scenarios.reporting.time_plots_section import time_plots_section
-from scenarios.run_folder import RunFolder
+from scenarios.run_folder import BadRunFolder, RunFolder
 
 
 def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
@@ -43,8 +43,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
         *_seen(facts, record),
         pictures_section(folder),
         None if record is None else explorer_section(record),
-        graph_section(facts.run),
-        cpu_section(facts.summary),
+        *_of_units(facts),
         parameters_section(facts),
         master_section(facts),
         files_section(facts),
@@ -68,3 +67,11 @@ def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
         why = e.args[0] if e.args else e
         html = Markup("<p>The run is of another version of {}, so its plots and its replay are left out: {}.</p>")
         return [Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))]
+
+
+def _of_units(facts: RunFacts) -> Sequence[Section | None]:
+    try:
+        return graph_section(facts.run), cpu_section(facts.summary)
+    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as e:
+        fault = f"what it tells of its units is damaged: {type(e).__name__} {e}"
+        raise BadRunFolder(facts.folder.path, fault) from e

@@ -12,12 +12,12 @@ from click.testing import CliRunner
 sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
 
 from failing_systems import failing_ssp, native_fmu
-from scenarios.report import write_report
 
 from cosim.ssp.writing import write_ssp
 from cosim.system import System
 from scenarios.command import main
 from scenarios.master_rows import master_rows
+from scenarios.reporting.run_page import write_run_page
 from scenarios.run_folder import RunFolder
 
 
@@ -33,12 +33,14 @@ class Page(HTMLParser):
         self.feed(file.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attrs: object) -> None:  # noqa: ARG002
+        if tag == "a":  # headings are links to themselves
+            return
         self._tag = tag
         if tag == "tr":
             self.rows.append([])
 
-    def handle_endtag(self, tag: str) -> None:  # noqa: ARG002
-        self._tag = ""
+    def handle_endtag(self, tag: str) -> None:
+        self._tag = self._tag if tag == "a" else ""
 
     def handle_data(self, data: str) -> None:
         if self._tag in ("td", "th"):
@@ -97,7 +99,7 @@ def test_the_report_tells_how_units_were_coupled(tmp_path: Path):
     assert rows["pace"] == f"1000 x real time asked for, {summary['pace']['reached']:.3g} x reached"
     assert f"of {summary['pace']['deadlines']}" in rows["deadlines missed"]
     assert "Parameters" not in page.headings
-    assert {row[2] for row in page.rows if len(row) == 5} == {"step", "varies"}
+    assert any(row[2:3] == ["varies"] for row in page.rows)
 
 
 def test_iterations_are_told_once():
@@ -114,16 +116,17 @@ def test_iterations_are_told_once():
 def test_a_failure_s_log_is_shown_and_what_is_not_known_is_not_zero(tmp_path: Path):
     folder = RunFolder(tmp_path / "out")
     folder.make()
-    folder.write_run({}, {})
+    folder.write_run({"scenario": "x.ssp", "parameters": {}}, {})
     master = {"algorithm": "jacobi", "tolerance": 1e-8, "iterations": 100, "extrapolation": "hold", "adaptive": None,
               "repeat_discarded": False}  # fmt: skip
     summary = {
         "scenario": "x.ssp", "seed": 0, "simulated_seconds": 0.2, "wall_seconds": 1.0, "success": False,
         "reason": "a unit failed", "metrics": {}, "master": master,
         "failure": {"instance": "arm", "log": ["tendon <3> tore", "sorry"]},
+        "units": [{"name": "arm", "model": "Arm (FMI 3)", "step": "10 ms", "steps": None, "cpu_seconds": None}],
     }  # fmt: skip
-    write_report(folder, "x", (), summary, (), [("arm", "Arm (FMI 3)", "10 ms", None, None)], ())
+    folder.write_summary(summary)
+    write_run_page(folder)
     page = Page(folder.report)
     assert page.pre == "tendon <3> tore\nsorry"
-    assert page.headings == ["What was told of arm", "Master", "Units"]
-    assert ["arm", "Arm (FMI 3)", "10 ms", "–", "–"] in page.rows
+    assert page.headings == ["What was told of arm", "Master", "Files"]

@@ -102,7 +102,7 @@ const page = (() => {
   function fit(div) {
     const legend = div.querySelector("g.legend");
     const more = legend ? Math.ceil(legend.getBBox().height) : 0;
-    const height = Number(div.dataset.height) + more;
+    const height = Number(div.dataset.height) + Number(div.dataset.more ?? 0) + more;
     if (Math.abs(parseFloat(div.style.height) - height) < 2 && !more) return null;
     div.style.height = height + "px";
     return Plotly.relayout(div, more ? {autosize: true, "margin.b": 48 + more} : {autosize: true});

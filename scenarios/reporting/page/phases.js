@@ -10,11 +10,16 @@
     const pixels = Math.max(div.clientWidth - MARGINS, 1) / (high - low);
     const spans = phases.filter(p => p.to > low && p.from < high);
     layout.shapes = [...(layout.shapes ?? []), ...phases.flatMap((p, k) => k % 2 ? [shade(p)] : [])];
+    let up = 0;  // px that the longest upright name takes
     layout.annotations = [...(layout.annotations ?? []), ...spans.flatMap(p => {
       const from = Math.max(p.from, low), to = Math.min(p.to, high), wide = (to - from) * pixels;
       if (wide > LETTER * p.name.length + 6) return [name(p, (from + to) / 2, 0)];
-      return wide > UPRIGHT ? [name(p, (from + to) / 2, -90)] : [];
+      if (wide < UPRIGHT) return [];
+      up = Math.max(up, LETTER * p.name.length - 14);
+      return [name(p, (from + to) / 2, -90)];
     })];
+    layout.margin = {...layout.margin, t: 30 + up};
+    div.dataset.more = up;
   }
 
   function shade(p) {
@@ -23,8 +28,7 @@
   }
 
   function name(p, x, angle) {
-    return {text: p.name, x, xref: "x", y: 1, yref: "paper", yanchor: angle ? "top" : "bottom", yshift: angle ? -4 : 1,
-      textangle: angle, showarrow: false, font: {size: 12, color: page.colours().soft}};
+    return {text: p.name, x, xref: "x", y: 1, yref: "paper", yanchor: "bottom", yshift: 1, textangle: angle, showarrow: false, font: {size: 12, color: page.colours().soft}};
   }
 
   page.onDraw(decorate);

@@ -1,0 +1,114 @@
+"""The graph of a run's system: places, arrows with their signals, and a table; of a large system the table alone."""
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.reporting.graph_layout import bent, places
+from scenarios.reporting.graph_section import graph_section, rate
+from scenarios.reporting.run_page import write_run_page
+from scenarios.run_folder import BadRunFolder, RunFolder
+
+LOOP = [("camera", "vision"), ("vision", "servo"), ("servo", "arm"), ("arm", "camera"), ("arm", "hand"),
+        ("hand", "arm"), ("hand", "camera")]  # fmt: skip
+
+
+def unit(name: str, **more: Any) -> dict[str, Any]:
+    return {"name": name, "model": name.title(), "fmi": "3", "period": 0.02, "sampled": False, **more}
+
+
+def connection(source: str, target: str, **more: Any) -> dict[str, Any]:
+    return {"source": source, "target": target, "unit": "m", "size": 1, "kind": "real", **more}
+
+
+def html_of(units: list[str], connections: list[dict[str, Any]], **more: Any) -> str:
+    section = graph_section({"system": {"units": [unit(u) for u in units], "connections": connections}, **more})
+    assert section is not None
+    return str(section.html)
+
+
+def test_a_loop_lies_clockwise_in_the_order_of_its_signals():
+    at = places(["arm", "hand", "camera", "servo", "vision"], LOOP)
+    angles = {name: float(np.arctan2(p[0], p[1])) % (2 * np.pi) for name, p in at.items()}
+    assert sorted(angles, key=lambda name: angles[name]) == ["arm", "hand", "camera", "vision", "servo"]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 8, 9, 40])
+def test_places_are_the_same_each_time_apart_and_within_the_square(n: int):
+    names = [f"u{i}" for i in range(n)]
+    pairs = list(itertools.pairwise(names))
+    at = np.array(list(places(names, pairs).values()))
+    assert np.array_equal(at, np.array(list(places(names, pairs).values())))
+    assert np.abs(at).max() <= 1.0 + 1e-9
+    assert n == 1 or min(np.linalg.norm(at[i] - at[j]) for i in range(n) for j in range(i)) > 0.05
+
+
+def test_there_and_back_lie_apart():
+    a, b = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
+    there, back = bent(a, b), bent(b, a)
+    assert there[0] == pytest.approx(a)
+    assert there[-1] == pytest.approx(b)
+    assert np.linalg.norm(there[10] - back[10]) > 0.3
+
+
+def test_signals_of_a_pair_share_an_arrow_that_tells_them():
+    html = html_of(
+        ["arm", "hand"],
+        [connection("arm.p_WG", "hand.p_WG", size=3), connection("arm.grip", "hand.grip", unit="1"),
+         connection("hand.f_G", "arm.f", unit="N", size=3)],
+    )  # fmt: skip
+    assert html.count('"symbol":"arrow"') == 2
+    assert "p_WG (m, x 3)" in html
+    assert "f_G \\u2192 f (N, x 3)" in html or "f_G → f (N, x 3)" in html
+    assert "<td>arm.grip</td><td>hand.grip</td><td></td><td>1</td>" in html
+
+
+def test_a_conversion_stands_in_the_table():
+    change = {"source": "a.x", "unit": "mm", "target": "b.x", "target_unit": "m", "factor": 0.001, "offset": 0.0}
+    html = html_of(["a", "b"], [connection("a.x", "b.x", unit="mm")], conversions=[change])
+    assert "<th>converted</th>" in html
+    assert "times 0.001" in html
+    assert "<th>converted</th>" not in html_of(["a", "b"], [connection("a.x", "b.x")])
+
+
+def test_names_with_dots_find_their_units():
+    html = html_of(["plant.arm", "plant"], [connection("plant.arm.y.x", "plant.u")])
+    assert "plant.arm to plant: y.x" in html
+
+
+def test_markup_in_names_is_text():
+    assert "<script>x" not in html_of(["<script>x", "b"], [connection("<script>x.y", "b.u")])
+
+
+def test_of_a_large_system_there_is_a_table_that_ends():
+    names = [f"u{i}" for i in range(41)]
+    html = html_of(names, [connection(f"u{k % 41}.y", f"u{k // 41}.x{k}") for k in range(1005)])
+    assert 'class="plot"' not in html
+    assert "41 units is too large for a drawing" in html
+    assert html.count("<tr><td>u0.y</td>") == 25
+    assert "5 more are in" in html
+
+
+def test_without_a_system_there_is_no_section():
+    assert graph_section({}) is None
+    assert graph_section({"system": {"units": [], "connections": []}}) is None
+
+
+@pytest.mark.parametrize(
+    ("period", "sampled", "told"),
+    [(0.02, False, "20 ms"), (1 / 30, True, "33.3 ms, sampled"), (2.0, False, "2 s"), (None, False, "steps vary")],
+)
+def test_rates_are_told_as_one_reads_them(period: float | None, sampled: bool, told: str):
+    assert rate(unit("u", period=period, sampled=sampled)) == told
+
+
+def test_a_damaged_system_is_told_as_the_runs_fault(tmp_path: Path):
+    (tmp_path / "run.json").write_text(json.dumps({"scenario": "x", "parameters": {}, "system": {"units": [1]}}))
+    (tmp_path / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
+    with pytest.raises(BadRunFolder, match="what it tells of its units is damaged"):
+        write_run_page(RunFolder.left_at(tmp_path))
+    assert not (tmp_path / "report.html").exists()

@@ -1,0 +1,41 @@
+"""A page: what it is given cannot break out of it, and Plotly comes along only where something is drawn."""
+
+from pathlib import Path
+
+import plotly.graph_objects as go
+import pytest
+from markupsafe import Markup
+
+from cosim.exceptions import RecordNotWritten
+from scenarios.reporting.page import write_page
+from scenarios.reporting.plot_html import plot_html
+from scenarios.reporting.section import Section
+
+EVIL = "</script><script>alert(1)</script>"
+
+
+def page_of(path: Path, html: Markup) -> str:
+    write_page(path / "page.html", EVIL, Markup("<p>lead</p>"), [Section(anchor="a", title=EVIL, html=html)])
+    return (path / "page.html").read_text(encoding="utf-8")
+
+
+def test_names_that_are_html_are_text(tmp_path: Path):
+    figure = go.Figure([go.Scatter(x=[1.0], y=[2.0], name=EVIL)])
+    page = page_of(tmp_path, plot_html(figure, label=EVIL))
+    assert "alert(1)" in page
+    assert EVIL not in page
+    assert page.count("</script>") == page.count("<script")
+
+
+def test_a_page_without_plots_is_small_and_tells_the_browser_to_ask_for_nothing(tmp_path: Path):
+    page = page_of(tmp_path, Markup("<p>text</p>"))
+    assert len(page) < 30_000
+    policy = page.partition('Content-Security-Policy" content="')[2].partition('"')[0].replace("&#39;", "'")
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert "http" not in policy
+
+
+def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path):
+    with pytest.raises(RecordNotWritten, match="cannot be written"):
+        page_of(tmp_path / "missing", Markup(""))
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,118 @@
+"""`handover report`: a page of what a folder has; where it has not enough, a line says what, and nothing is written."""
+
+import errno
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from scenarios.command import main
+
+FILES = {"figures", "report.html", "run.json", "signals.parquet", "summary.json"}
+
+
+@pytest.fixture
+def copy(grasp: Path, tmp_path: Path) -> Path:
+    """Return a copy of a run's folder, without page and figures."""
+    shutil.copytree(grasp, tmp_path / "run", ignore=shutil.ignore_patterns("*.html", "figures"))
+    return tmp_path / "run"
+
+
+def report(*arguments: object) -> tuple[int, str]:
+    done = CliRunner().invoke(main, ["report", *map(str, arguments)])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done.exit_code, done.output
+
+
+def change(file: Path, **changes: Any) -> None:
+    told = json.loads(file.read_text())
+    file.write_text(json.dumps({k: v for k, v in {**told, **changes}.items() if v is not ...}))
+
+
+def test_page_and_figures_are_those_that_the_run_wrote(grasp: Path, copy: Path):
+    assert report(copy, "--figures") == (0, f"report: {copy / 'report.html'}\n")
+    assert {p.name for p in copy.iterdir()} == FILES
+    assert (copy / "report.html").read_bytes() == (grasp / "report.html").read_bytes()
+    for figure in (grasp / "figures").iterdir():
+        assert (copy / "figures" / figure.name).read_bytes() == figure.read_bytes()
+
+
+def test_the_page_goes_where_it_is_asked_for(copy: Path, tmp_path: Path):
+    assert report(copy, "--out", tmp_path / "page.html")[0] == 0
+    assert "ir_grasp: succeeded" in (tmp_path / "page.html").read_text()
+    assert not (copy / "report.html").exists()
+    assert report(copy, "--out", tmp_path) == (2, f"Error: {tmp_path} is a folder; name a file for the page\n")
+
+
+def test_a_run_of_which_an_older_version_told_less_has_a_page(copy: Path):
+    unknown = dict.fromkeys(("title", "headline", "told_parameters", "system", "versions", "units"), ...)
+    change(copy / "run.json", **unknown)
+    change(copy / "summary.json", units=..., wall_seconds=...)
+    assert report(copy)[0] == 0
+    page = (copy / "report.html").read_text()
+    assert 'id="signals"' in page
+    assert 'id="parameters"' in page
+
+
+def test_a_run_of_another_version_of_its_scenario_says_what_is_left_out(copy: Path):
+    change(copy / "run.json", parameters={"colour": "red"})
+    assert report(copy)[0] == 0
+    page = (copy / "report.html").read_text()
+    assert "ir_grasp has no parameter &#39;colour&#39;" in page
+    assert 'id="replay"' not in page
+    status, told = report(copy, "--figures")
+    assert status == 2
+    assert "another version of ir_grasp" in told
+
+
+def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
+    (copy / "summary.json").unlink()
+    assert report(copy)[0] == 0
+    lead = (copy / "report.html").read_text().partition("<main>")[0]
+    assert "<b>Not ended</b>: it has no summary" in lead
+    assert not (copy / "summary.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "told"),
+    [
+        ("run.json", None, "it is not the folder of a run: it has no run.json"),
+        ("run.json", "{", "its run.json is damaged"),
+        ("run.json", '{"scenario": 3}', "its run.json is damaged: it has no 'parameters'; 'scenario' is 3"),
+        ("summary.json", '{"metrics": 3}', "its summary.json is damaged: it has no 'success'; it has no 'reason'; 'm"),
+        ("signals.parquet", "PAR1", "its signals.parquet is damaged"),
+    ],
+)
+def test_what_is_damaged_is_told_in_a_line(copy: Path, file: str, content: str | None, told: str):
+    if content is None:
+        (copy / file).unlink()
+    else:
+        (copy / file).write_text(content)
+    status, printed = report(copy)
+    assert (status, printed.count("\n")) == (2, 1)
+    assert told in printed
+    assert not (copy / "report.html").exists()
+
+
+def test_no_folder_and_a_full_disk(copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    status, told = report(tmp_path / "nothing")
+    assert (status, told) == (2, f"Error: {tmp_path / 'nothing'} is no folder; name that of a run or of a campaign\n")
+
+    def refuse(source: Any, target: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(source), str(target))
+
+    monkeypatch.setattr(os, "replace", refuse)
+    assert report(copy) == (3, f"Error: {copy / 'report.html'} cannot be written: No space left on device\n")
+    assert {p.name for p in copy.iterdir()} == FILES - {"report.html", "figures"}
+
+
+def test_a_run_without_report_leaves_neither_page_nor_figures(tmp_path: Path):
+    done = CliRunner().invoke(main, ["run", "ir_grasp", "--no-report", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    assert f"results: {tmp_path / 'run'}\n" in done.output
+    assert not (tmp_path / "run" / "report.html").exists()
+    assert not any((tmp_path / "run").glob("figures/*"))
