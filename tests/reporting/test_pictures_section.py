@@ -55,9 +55,11 @@ def test_pictures_become_smaller_until_they_have_room(tmp_path: Path):
     data = re.findall(r'src="data:image/jpeg;base64,([^"]*)"', html)
     assert len(data) == 6
     assert sum(map(len, data)) <= 1_200_000
-    shape = cv2.imdecode(np.frombuffer(base64.b64decode(data[0]), dtype=np.uint8), cv2.IMREAD_COLOR).shape
-    assert 360 <= shape[1] < 960
-    assert shape[0] * 16 == shape[1] * 9
+    pixels = cv2.imdecode(np.frombuffer(base64.b64decode(data[0]), dtype=np.uint8), cv2.IMREAD_COLOR)
+    assert pixels is not None
+    high, wide, _ = pixels.shape
+    assert 360 <= wide < 960
+    assert high * 16 == wide * 9
 
 
 def test_without_pictures_there_is_no_section(tmp_path: Path):
