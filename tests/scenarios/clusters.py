@@ -13,11 +13,11 @@ from living import until
 
 
 @contextlib.contextmanager
-def running(*command: str, **environment: str) -> Generator["subprocess.Popen[bytes]", None, None]:
-    """Run a command of Dask until the end of the block."""
+def running(folder: Path, *command: str, **environment: str) -> Generator["subprocess.Popen[bytes]", None, None]:
+    """Run a command of Dask in a folder until the end of the block."""
     command = (sys.executable, "-m", "dask", *command)
-    nowhere = subprocess.DEVNULL
-    with subprocess.Popen(command, stdout=nowhere, stderr=nowhere, env={**os.environ, **environment}) as process:
+    nowhere, around = subprocess.DEVNULL, {**os.environ, **environment}
+    with subprocess.Popen(command, stdout=nowhere, stderr=nowhere, cwd=folder, env=around) as process:
         try:
             yield process
         finally:
@@ -32,10 +32,9 @@ def running(*command: str, **environment: str) -> Generator["subprocess.Popen[by
 def scheduler(folder: Path) -> Generator[str, None, None]:
     """Run a scheduler; give its address."""
     told = folder / "scheduler.json"
-    with running(
-        "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)
-    ) as process:
-        until(lambda: told.exists() and told.read_text().endswith("}") or process.poll() is not None)
+    command = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)]
+    with running(folder, *command) as process:
+        until(lambda: (told.exists() and told.read_text().endswith("}")) or process.poll() is not None)
         yield json.loads(told.read_text())["address"]
 
 
@@ -48,7 +47,7 @@ def worker(folder: Path, address: str, threads: int = 1, **environment: str) -> 
     command += ["--memory-limit", "0", "--local-directory", str(folder)]
     with Client(address, set_as_default=False) as client:
         there = len(client.scheduler_info(n_workers=-1)["workers"])
-        with running(*command, **environment) as process:
+        with running(folder, *command, **environment) as process:
             client.wait_for_workers(there + 1, timeout=60)
             yield process.pid
 

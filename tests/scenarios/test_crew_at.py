@@ -35,13 +35,12 @@ def test_threads_of_a_worker_carry_out_runs_side_by_side(address: str, tmp_path:
     runs = tmp_path / "runs"
     orders = [order(runs, f"run_{i}", seed=i) for i in range(4)]
     orders.append(bad_order(runs, "Crashes", tmp_path))
-    with worker(tmp_path, address, threads=2) as process, crew_at(address.removeprefix("tcp://")) as crew:
-        assert crew.workers == 2
-        crew.check(runs)
-        answers: list[tuple[str, str]] = []
-        for answer in crew.carry_out(orders):
-            answers.append((answer.name, answer.lost))
-            assert len(servers(process)) <= 2
+    with worker(tmp_path, address, threads=2) as process:
+        with crew_at(address.removeprefix("tcp://")) as crew:
+            assert crew.workers == 2
+            crew.check(runs)
+            answers = [(answer.name, answer.lost) for answer in crew.carry_out(orders)]
+            assert len(servers(process)) == 2
         assert sorted(answers) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
         assert servers(process) == []  # though the cluster lives on
 
@@ -62,7 +61,10 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp
 
 
 def test_a_cluster_without_workers_is_refused(address: str):
-    with pytest.raises(BadCrew, match=f"{address} has no workers; `dask worker {address}` starts some"), crew_at(address):
+    with (
+        pytest.raises(BadCrew, match=f"{address} has no workers; `dask worker {address}` starts some"),
+        crew_at(address),
+    ):
         pass
 
 
@@ -97,7 +99,9 @@ def test_a_worker_that_does_not_see_the_folder_is_refused(
     with worker(tmp_path, address), crew_at(address) as crew:
         (tmp_path / "here").mkdir()
         monkeypatch.chdir(tmp_path / "here")
-        with pytest.raises(BadCrew, match=r"worker tcp://[\d.:]+: .* does not see what is written there \(No such file"):
+        with pytest.raises(
+            BadCrew, match=r"worker tcp://[\d.:]+: .* does not see what is written there \(No such file"
+        ):
             crew.check(Path("/proc/self/cwd"))  # another folder in each process
         assert list((tmp_path / "here").iterdir()) == []
 
