@@ -1,7 +1,7 @@
 """What a campaign costs beside its runs, and what a second worker brings.
 
-`pytest tests/benchmarks/test_campaign_speed.py --benchmark-enable -s` prints the figures. Runs are of helix_handover and
-give up after a second of simulated time, which takes about one second of wall time.
+`pytest tests/benchmarks/test_campaign_speed.py --benchmark-enable -s` prints the figures. Runs are of helix_handover
+and give up after a second of simulated time, which takes one to two seconds of wall time on an idle core.
 
 Counted is from the first order to the last answer, when the workers are up and have carried out one run each, in which
 they load what runs need (2 to 4 s a worker, once). A run's own time are the `wall_seconds` of its summary: from when

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Generator
 from pathlib import Path
+from typing import cast
 
 from living import until
 
@@ -46,7 +47,7 @@ def worker(folder: Path, address: str, threads: int = 1, **environment: str) -> 
     command = ["worker", address, "--host", "127.0.0.1", "--nthreads", str(threads), "--no-dashboard"]
     command += ["--memory-limit", "0", "--local-directory", str(folder)]
     with Client(address, set_as_default=False) as client:
-        there = len(client.scheduler_info(n_workers=-1)["workers"])
+        there = len(cast("dict[str, int]", client.nthreads()))
         with running(folder, *command, **environment) as process:
             client.wait_for_workers(there + 1, timeout=60)
             yield process.pid
