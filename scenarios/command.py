@@ -10,8 +10,11 @@ from scenarios.catalog import SCENARIOS
 from scenarios.check_command import check
 from scenarios.export_command import export_command
 from scenarios.listing import print_catalog, print_scenario, print_unit
+from scenarios.paper_command import paper
+from scenarios.report_command import report
 from scenarios.resume_command import resume
 from scenarios.run_command import run
+from scenarios.sweep_command import sweep
 from scenarios.vsl_train_command import vsl_train
 
 _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
@@ -27,6 +30,10 @@ Run
   handover run helix_handover            one run; leaves a folder with a report
   handover run x.ssp --stop 5            a system from another tool, for 5 s
   handover resume runs/long              goes on with a run with checkpoints
+  handover sweep ir_grasp strategy=reflex,blind --repeat 20
+                                         a campaign: many runs, one table
+  handover paper ir-table                a paper's experiment: ours beside the published
+  handover report runs/long              its page anew, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -37,10 +44,10 @@ Exchange
 
 \b
 Exit status
-  0    the task succeeded
-  1    the run ended, but the task failed
+  0    the task succeeded; of a campaign: all runs ended
+  1    the run ended, but the task failed; of a campaign: interrupted, the same call goes on
   2    bad call or bad input; nothing was written
-  3    a unit failed, the run was killed, or the disk is full; what was recorded until then is kept
+  3    a unit failed, a run was killed or lost, or the disk is full; what was recorded until then is kept
   130  aborted with Ctrl-C: before the run, or by a second one during it
 
 \b
@@ -73,6 +80,9 @@ def list_(name: str | None) -> None:
 main.add_command(build_command)
 main.add_command(check)
 main.add_command(export_command)
+main.add_command(paper)
+main.add_command(report)
 main.add_command(resume)
 main.add_command(run)
+main.add_command(sweep)
 main.add_command(vsl_train)

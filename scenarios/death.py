@@ -14,6 +14,7 @@ from scenarios.experiment import Outcome
 from scenarios.forked_child import ChildEnd
 from scenarios.record import Record
 from scenarios.run_folder import RunFolder, told_if_not_written
+from scenarios.run_summary import unit_data
 
 
 class Death:
@@ -62,6 +63,7 @@ class Death:
                 "metrics": dict[str, Any](),
                 "simulated_seconds": _simulated(folder),
                 "cpu_seconds": self._end.cpu,
+                "units": unit_data(self.facts["units"]),
                 "reason": reason,
                 "wall_seconds": self._wall,
                 "failure": data,

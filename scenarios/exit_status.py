@@ -2,5 +2,8 @@
 
 TASK_FAILED, BAD_CALL, UNIT_FAILED = 1, 2, 3
 
+INTERRUPTED = 1
+"""A campaign was ended by Ctrl-C: the same call goes on."""
+
 ABORTED = 130
 """What Ctrl-C aborted, as shells have it."""

@@ -1,13 +1,14 @@
 """A run that a process has left: whether it can go on, and how."""
 
 import contextlib
+import errno
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
 from cosim.checkpoint import BadCheckpoint
-from cosim.exceptions import nearest
+from cosim.exceptions import RecordNotWritten, nearest
 from cosim.record.complete_record import complete_record
 from cosim.record.file_lock import FileLocked
 from fmus.build import cached
@@ -17,6 +18,26 @@ from scenarios.resumption import Resumption, unpack
 from scenarios.run_folder import BadRunFolder, RunFolder, sha256_of, versions
 from scenarios.ssp_call import open_experiment
 from scenarios.task import Task
+
+
+def complete_signals(folder: RunFolder) -> int:
+    """Complete the record of a run that a process has left, as far as it goes; return its rows, 0 if there is none.
+
+    Raises:
+        BadRunFolder: the run still goes on, or the record cannot be completed. RecordNotWritten: the disk is full.
+    """
+    try:
+        return complete_record(folder.signals)
+    except FileLocked as e:
+        raise BadRunFolder(folder.path, "the run still goes on") from e
+    except FileNotFoundError:  # it ended before it recorded
+        return 0
+    except ValueError as e:  # Arrow's
+        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {str(e).splitlines()[0]}") from e
+    except OSError as e:
+        if e.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise RecordNotWritten(folder.signals, str(e.strerror)) from e
+        raise BadRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 
 
 class LeftRun:
@@ -32,7 +53,7 @@ class LeftRun:
         self._told = folder.read_run()
         if folder.read_summary().get("complete"):
             raise BadRunFolder(folder.path, "the run is complete; there is nothing to go on with")
-        rows = self._complete()
+        rows = complete_signals(folder)
         self._check_versions(self._object("versions"))
         self.resumption: Resumption = unpack(folder.checkpoint)
         if rows < self.resumption.checkpoint.rows:
@@ -73,16 +94,6 @@ class LeftRun:
         if not isinstance(found, dict):
             raise BadRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
         return cast(Mapping[str, Any], found)
-
-    def _complete(self) -> int:
-        try:
-            return complete_record(self.folder.signals)
-        except FileLocked as e:
-            raise BadRunFolder(self.folder.path, "the run still goes on") from e
-        except FileNotFoundError:  # it ended before it recorded
-            return 0
-        except OSError as e:
-            raise BadRunFolder(self.folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 
     def _check_versions(self, before: Mapping[str, str]) -> None:
         here = versions()

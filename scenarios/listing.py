@@ -20,7 +20,7 @@ from scenarios.conversions import told_conversion
 from scenarios.ended import Ended
 from scenarios.experiment import Experiment
 from scenarios.master_rows import pace_rows
-from scenarios.report import told
+from scenarios.reporting.told_metric import told
 from scenarios.run_folder import RunFolder
 
 _MOST_CONVERSIONS = 8
@@ -65,7 +65,7 @@ def print_unit(unit: Entry) -> None:
 
 
 def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> None:
-    """Print how a run ended, the figures named in the headline, and where the report is."""
+    """Print how a run ended, the figures named in the headline, and where its report is, or its results."""
     console = open_console()
     summary = ended.summary
     verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
@@ -77,7 +77,8 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)
     _print_rows(console, rows)
-    console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
+    left = f"report: {folder.report}" if folder.report.exists() else f"results: {folder.path}"
+    console.print(left, markup=False, soft_wrap=True)
     if folder.checkpoint.exists():
         console.print(f"to go on: handover resume {shlex.quote(str(folder.path))}", markup=False, soft_wrap=True)
 

@@ -1,7 +1,7 @@
 """Turns `name=value` texts into a scenario's parameters; every fault is told at once, with what would be right."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import numpy as np
 
@@ -39,7 +39,7 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
         elif name in values:
             faults.append(f"{name} is given twice")
         else:
-            values[name], fault = _parse(known[name], value)
+            values[name], fault = parse_value(known[name], value)
             if fault:
                 faults.append(f"{name}: {fault}")
     if faults:
@@ -47,7 +47,17 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     return experiment.parameters_type(**values)
 
 
-def _parse(variable: Variable, text: str) -> tuple[Any, str | None]:
+def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) -> Any:
+    """Return the scenario's parameters as `run.json` keeps them.
+
+    Raises:
+        BadParameter: it keeps some that the scenario does not have, or values that they cannot take.
+    """
+    return parse_parameters(experiment, [f"{name}={_as_text(value)}" for name, value in kept.items()])
+
+
+def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
+    """Return a parameter's value from its text, and what is wrong with it, saying what would be right, or None."""
     value: Any = text
     if variable.kind is Kind.BOOLEAN:
         value = {"true": True, "false": False}.get(text.lower(), text)
@@ -68,4 +78,28 @@ def _parse(variable: Variable, text: str) -> tuple[Any, str | None]:
     wanted = range_of(variable)
     if fault and wanted and wanted not in fault:
         fault += f", {wanted}"
+    if fault and variable.items and "did you mean" in (near := nearest(text, [n.lower() for n, _ in variable.items])):
+        fault += f"; {near}"
     return value, fault
+
+
+def text_of(variable: Variable, value: Any) -> str:
+    """Return the text of a parameter's value, the same for all texts that `parse_value` takes for this value."""
+    if variable.kind is Kind.STRING:
+        return str(value)
+    if variable.kind is Kind.BOOLEAN:
+        return str(bool(value)).lower()
+    if variable.enumeration is not None:
+        return str(value.name).lower()
+    return ",".join(map(_number_text, np.asarray(value).reshape(-1).tolist()))
+
+
+def _number_text(number: float) -> str:
+    short = f"{number:g}"
+    return short if float(short) == number else repr(number)
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, list):
+        return ",".join(_as_text(v) for v in cast(list[Any], value))
+    return repr(value) if isinstance(value, float) else str(value)

@@ -38,9 +38,18 @@ class Record:
         shape = tuple(int(i) for i in last[1].split(","))
         return np.column_stack([self._values(n) for n in names]).reshape(-1, *shape)
 
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals, in the order of the system's units."""
+        return tuple(name for name in self._columns if name != "time")
+
     def unit(self, signal: str) -> str:
         """Return a signal's unit."""
         return self._metadata(signal).get(b"unit", b"1").decode()
+
+    def description(self, signal: str) -> str:
+        """Return what a signal is; "" where nobody told."""
+        return self._metadata(signal).get(b"description", b"").decode()
 
     def items(self, signal: str) -> dict[int, str]:
         """Return the names of an enumeration's values; none for another signal."""

@@ -30,15 +30,16 @@ trust.
 
 @click.command("resume", help=_HELP, short_help="Go on with a run from its last checkpoint.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @limit_options
-def resume(folder: Path, call_limit: float, pace: float | None) -> None:
+def resume(folder: Path, no_report: bool, call_limit: float, pace: float | None) -> None:
     """Go on with a run from its last checkpoint."""
     with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
         left_at = RunFolder.left_at(folder)
         opened.enter_context(left_at.held())
         left = LeftRun(left_at)
         task = left.task(opened)
-        task = replace(task, options=replace(task.options, **limits(call_limit, pace)))
+        task = replace(task, options=replace(task.options, **limits(call_limit, pace)), presented=not no_report)
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption, left.resumption)
     end_with(ended, task)

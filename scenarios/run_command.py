@@ -67,6 +67,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     metavar="SECONDS",
     help="Write a checkpoint every so many simulated seconds, for `handover resume`.",
 )
+@click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @master_options
 @limit_options
 def run(
@@ -79,6 +80,7 @@ def run(
     step: Fraction | None,
     formats: Sequence[str],
     every: Fraction | None,
+    no_report: bool,
     call_limit: float,
     pace: float | None,
     **coupling: Any,
@@ -108,6 +110,7 @@ def run(
             every=every,
             source=source,
             options=options,
+            presented=not no_report,
         )
         with progress_bar(sys.stderr) as progress:
             ended = carry_out(task, progress, interruption)

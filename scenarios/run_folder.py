@@ -38,7 +38,7 @@ def check_place(path: Path) -> None:
 
 
 class RunFolder:
-    """Paths of what a run leaves: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `figures/`.
+    """Paths of a run's files: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `pictures/`, `figures/`.
 
     While it goes on there are the files of a `Recorder`, and `checkpoint.zip` if it was asked for.
 
@@ -76,6 +76,11 @@ class RunFolder:
     def figures(self) -> Path:
         """The folder of figures."""
         return self.path / "figures"
+
+    @property
+    def pictures(self) -> Path:
+        """The folder of camera pictures, if there are any."""
+        return self.path / "pictures"
 
     @property
     def report(self) -> Path:

@@ -1,7 +1,7 @@
 """What a run's folder says of it: what was chosen, what came out, and the rows of its report's tables."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -9,10 +9,14 @@ import numpy as np
 
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
+from scenarios.conversions import conversions_of
 from scenarios.experiment import Metric, Outcome
-from scenarios.report import UnitRow
 from scenarios.resumption import Spent
 from scenarios.task import Task
+from scenarios.told_system import told_system
+
+UnitRow = tuple[str, str, str, int | None, float | None]
+"""Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
 
 
 def configuration(task: Task) -> dict[str, Any]:
@@ -27,6 +31,17 @@ def files_and_forms(task: Task) -> dict[str, Any]:
     every = None if task.every is None else str(task.every)
     files = {name: str(path.absolute()) for name, path in task.fmus.items()}
     return {"source": task.source, "files": files, "formats": list(task.formats), "checkpoint": every}
+
+
+def presentation(task: Task, master: Master) -> dict[str, Any]:
+    """Return what is needed to present a run by its folder alone, as JSON can hold it."""
+    return {
+        "title": task.experiment.title,
+        "headline": list(task.experiment.headline),
+        "told_parameters": [list(row) for row in parameter_rows(task)],
+        "system": told_system(master.system, adaptive=master.steps is not None),
+        "conversions": conversions_of(master.system),
+    }
 
 
 def summary_of(
@@ -49,6 +64,7 @@ def summary_of(
         **({} if master.steps is None else {"steps": asdict(master.steps)}),
         "wall_seconds": spent.wall,
         "cpu_seconds": spent.cpu,
+        "units": unit_data(unit_rows(master)),
         "failure": None if failure is None else failure.as_data(),
         **({} if master.pacer is None else {"pace": master.pacer.report.as_data()}),
     }
@@ -78,6 +94,11 @@ def unit_rows(master: Master) -> list[UnitRow]:
         period = "varies" if follows else f"{float(unit.period) * 1000:.4g} ms"
         rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
     return rows
+
+
+def unit_data(rows: Sequence[UnitRow]) -> list[dict[str, Any]]:
+    """Return rows of units as JSON can hold them."""
+    return [dict(zip(("name", "model", "step", "steps", "cpu_seconds"), row, strict=True)) for row in rows]
 
 
 def _plain(value: Any) -> Any:

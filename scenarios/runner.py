@@ -1,8 +1,7 @@
 """Carries out one run of a scenario: everything is checked, then the folder is made, then it runs and is reported."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 from cosim.checkpoint import check_states, remove_checkpoint
 from cosim.checkpointer import Checkpointer
@@ -13,16 +12,16 @@ from cosim.master import Master
 from cosim.observer import Observer
 from cosim.record.recorder import Recorder
 from cosim.signals import Signals
-from scenarios.conversions import conversions_of
 from scenarios.ended import Ended
 from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
-from scenarios.report import UnitRow, write_report
+from scenarios.reporting.kept_pictures import write_pictures
+from scenarios.reporting.run_page import write_run_page
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import told_if_not_written
 from scenarios.run_metrics import run_metrics
-from scenarios.run_summary import configuration, files_and_forms, parameter_rows, summary_of, unit_rows
+from scenarios.run_summary import configuration, files_and_forms, presentation, summary_of, unit_rows
 from scenarios.supervisor import heartbeat_of_run
 from scenarios.task import Task
 
@@ -78,13 +77,11 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     if resumption is None:
         task.folder.make()
     fmus = {n: u.description.path for n, u in master.system.units.items()}
-    told = {**configuration(task), **files_and_forms(task), "conversions": conversions_of(master.system)}
+    told = {**configuration(task), **files_and_forms(task), **presentation(task, master)}
     task.folder.write_run(told, fmus)
     master.heartbeat.tell(
         folder=str(task.folder.path),
         configuration=configuration(task),
-        title=task.experiment.title,
-        parameters=parameter_rows(task),
         units=[(*row[:3], None, None) for row in unit_rows(master)],
     )
 
@@ -139,11 +136,12 @@ def _conclude(
     task.folder.write_summary(summary)
     if failure is not None:
         task.folder.add_to_run(failure=failure.as_data())
+    write_pictures(task.folder.pictures, watch.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
     if task.presented:
         with told_if_not_written(task.folder.path):
-            _present(task, watch, summary, unit_rows(master))
+            _present(task, watch)
     return Ended(outcome=outcome, summary=summary, failure=failure)
 
 
@@ -156,11 +154,8 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
     return seen
 
 
-def _present(task: Task, watch: Watch, summary: Mapping[str, Any], units: Sequence[UnitRow]) -> None:
-    figures = []
+def _present(task: Task, watch: Watch) -> None:
     record = Record(task.folder.signals) if task.folder.signals.exists() else None
     if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
-        figures = task.experiment.draw(task.parameters, watch, record, task.folder.figures)
-    write_report(
-        task.folder, task.experiment.title, task.experiment.headline, summary, parameter_rows(task), units, figures
-    )
+        task.experiment.draw(task.parameters, watch, record, task.folder.figures)
+    write_run_page(task.folder)

@@ -1,7 +1,7 @@
 """An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 from cosim.signals import Signals
 from cosim.ssp.ssp_file import SspFile
 from cosim.system import System
-from cosim.variable import Kind
 from scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
 from scenarios.plotting import COLOURS, figure
 from scenarios.record import Record
@@ -76,26 +75,26 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
             return ()
 
         def draw(self, parameters: Any, watch: UntilStop, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
-            return _drawn(ssp.system, record, folder)
+            return draw_outputs(ssp.system.units, record, folder)
 
     return SspExperiment()
 
 
-def _drawn(system: System, record: Record, folder: Path) -> list[Figure]:
+def draw_outputs(units: Iterable[str], record: Record, folder: Path) -> list[Figure]:
     """Draw the first real outputs of each unit over time, an axis for each."""
     figures: list[Figure] = []
-    for name, unit in system.units.items():
-        ports = [p for p in unit.description.outputs.values() if p.kind is Kind.REAL][:_MOST_SIGNALS]
+    for name in units:
+        ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MOST_SIGNALS]
         if not ports:
             continue
         file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
         with figure(folder / file, len(ports), size=(8.0, 1.6 * len(ports) + 0.4)) as axes:
             for ax, port in zip(axes, ports, strict=True):
-                values = record[f"{name}.{port.name}"].reshape(len(record.time), -1)
+                values = record[port].reshape(len(record.time), -1)
                 for k, colour in enumerate(COLOURS[: values.shape[1]]):
                     ax.plot(record.time, values[:, k], color=colour, lw=1.0)
-                unit = "" if port.unit.symbol in ("", "1") else f"\n({port.unit.symbol})"
-                ax.set_ylabel(port.name + unit)
+                unit = "" if record.unit(port) in ("", "1") else f"\n({record.unit(port)})"
+                ax.set_ylabel(port.removeprefix(f"{name}.") + unit)
             axes[-1].set_xlabel("time (s)")
         figures.append(Figure(file, f"Outputs of {name} over time."))
     return figures

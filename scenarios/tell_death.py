@@ -8,7 +8,7 @@ from scenarios.death import Death
 from scenarios.exit_status import UNIT_FAILED
 from scenarios.forked_child import ChildEnd
 from scenarios.listing import print_summary
-from scenarios.report import write_report
+from scenarios.reporting.run_page import write_run_page
 from scenarios.run_folder import told_if_not_written
 
 _BY_SIGNAL = 128  # what shells add to a signal's number
@@ -23,11 +23,10 @@ def tell_death(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
     sys.stderr.write(f"{death.told}\n")
     if death.folder is None:
         return UNIT_FAILED if death.failure is not None else _BY_SIGNAL + (end.signal or 0)
-    facts = death.facts
     try:
         ended = death.complete(death.folder)
         with told_if_not_written(death.folder.path):
-            write_report(death.folder, facts["title"], (), ended.summary, facts["parameters"], facts["units"], ())
+            write_run_page(death.folder)
         print_summary(ended, (), death.folder)
     except RecordNotWritten as e:
         sys.stderr.write(f"{e}\n")

@@ -1,9 +1,21 @@
 """What a campaign is to run: points in the space of a scenario's parameters, each several times."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from cosim.master_options import MasterOptions
+
+MOST_RUNS = 100_000
+"""Runs of a campaign: above it, a slip of the pen is likelier than a wish."""
+
+MOST_REPETITIONS = 10_000
+"""Runs of a point; as many have names that sort in their order."""
+
+_LONGEST_NAME = 80
+_UNSAFE = re.compile(r"[^A-Za-z0-9.,=+_-]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +48,11 @@ class CampaignPlan:
         repetitions: runs of each point.
         seed: the campaign's; each run's is derived from it.
         paired: whether all points of a repetition share a seed, so that their runs can be compared one by one.
+        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share
+            none, so that their runs can be counted together.
         units: files of FMUs that take the place of units, by the units' names.
         options: how units are run.
+        experiment: name of the published experiment that it is of; "" if it is of none.
     """
 
     scenario: str
@@ -46,5 +61,56 @@ class CampaignPlan:
     repetitions: int = 1
     seed: int = 0
     paired: bool = False
+    scenes: Sequence[str] = ()
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     options: MasterOptions = field(default_factory=MasterOptions)
+    experiment: str = ""
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return len(self.points) * self.repetitions
+
+    def runs(self) -> tuple[PlannedRun, ...]:
+        """Return the runs, point by point.
+
+        Names are those of a campaign's folder if `checked_plan` has returned the plan. A run's name and seed follow
+        from its point and its repetition alone: they stay the same if there are more repetitions.
+        """
+        return tuple(
+            PlannedRun(
+                name=self._name(point, repetition),
+                point=point,
+                repetition=repetition,
+                parameters={**self.fixed, **self.points[point]},
+                seed=run_seed(self.seed, self._seeded_as(point), repetition),
+            )
+            for point in range(len(self.points))
+            for repetition in range(self.repetitions)
+        )
+
+    def _seeded_as(self, point: int) -> int | None:
+        """Return the first point that shares its seeds with a point, None if all do."""
+        if not self.paired:
+            return point
+        if not self.scenes:
+            return None
+        scenes = [tuple(p.get(name) for name in self.scenes) for p in self.points]
+        return scenes.index(scenes[point])
+
+    def _name(self, point: int, repetition: int) -> str:
+        """Return such as `007_alpha=0.2_r0003`: point, what is varied as far as there is room, repetition."""
+        number = str(point).zfill(max(3, len(str(len(self.points) - 1))))
+        values = "_".join(f"{name}={value}" for name, value in self.points[point].items())
+        end = f"_r{repetition:04d}"
+        begin = _UNSAFE.sub("-", f"{number}_{values}" if values else number)
+        return begin[: _LONGEST_NAME - len(end)] + end
+
+
+def run_seed(campaign: int, point: int | None, repetition: int) -> int:
+    """Return the seed of a run by its campaign's; `point` is None where all points of a repetition share it.
+
+    It has 53 bits: any reader of JSON keeps them, and of 100,000 runs no two are likely to share one.
+    """
+    key = (repetition,) if point is None else (point, repetition)
+    return int(np.random.SeedSequence(campaign, spawn_key=key).generate_state(1, np.uint64)[0] >> np.uint64(11))

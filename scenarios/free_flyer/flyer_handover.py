@@ -1,6 +1,6 @@
 """A free-flyer and a person pass an object to each other: what the four handovers have in common."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,11 +12,15 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.free_flyer.handover_figures import draw_handover
 from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.handover_plots import plot_handover
 from scenarios.free_flyer.handover_watch import HandoverWatch
+from scenarios.free_flyer.replay import replay_handover
 from scenarios.free_flyer.rig import arm, expected_lag, wire_handover
 from scenarios.paper import paper_values
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""
@@ -115,6 +119,14 @@ class FlyerHandover(Experiment[HandoverWatch]):
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw paths, gripper, thrust over time, and the scene at three moments."""
         return draw_handover(parameters, watch, record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return the gripper's place, speed and angle, who holds the object, and thrust over time."""
+        return plot_handover(parameters, record, self.receivers)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return robot, hand and object in space."""
+        return replay_handover(record)
 
 
 def _check_reach(p_WG: Floats) -> None:

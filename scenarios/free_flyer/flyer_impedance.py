@@ -1,6 +1,6 @@
 """A push against the gripper, and the robot's yielding to it. [Fernandes2020] sec. 4.1.3."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -11,10 +11,16 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.free_flyer.impedance_figures import draw_push
 from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from scenarios.free_flyer.impedance_plots import plot_push
 from scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from scenarios.free_flyer.published import published_of_push
+from scenarios.free_flyer.replay import replay_push
 from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from scenarios.paper import paper_values
 from scenarios.record import Record
+from scenarios.reporting.published_value import PublishedValue
+from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):
@@ -85,6 +91,18 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         """Return the robot's own computing."""
         return ("impedance",)
 
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return how far robot and impedance model differ at most."""
+        return published_of_push(parameters)
+
     def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
         return draw_push(parameters, watch, record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return errors actual and calculated, push and thrust over time."""
+        return plot_push(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return the robot, its gripper's place of rest and the push in space."""
+        return replay_push(record)

@@ -12,7 +12,7 @@ from cosim.ports import Floats
 from scenarios.experiment import Figure
 from scenarios.free_flyer.handover_parameters import Parameters
 from scenarios.free_flyer.handover_watch import HandoverWatch
-from scenarios.free_flyer.scene import draw_near, draw_scene, person_at, robot_at
+from scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
 from scenarios.free_flyer.thrust_figure import draw_thrust
 from scenarios.paper import paper_values
 from scenarios.plotting import COLOURS, figure, leave_room, shade_phases
@@ -119,9 +119,7 @@ def _moments(watch: HandoverWatch, record: Record) -> dict[str, int]:
 
 def _scenes(watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
     """Draw the scene, and the transfers from near."""
-    g = paper_values("free_flyer", "person")
-    gap = g["aperture"] * (record["person.gripper_angle"] - g["angle_empty"]) / (g["angle_open"] - g["angle_empty"])
-    rows = _moments(watch, record)
+    gap, rows = jaw_gap(record), _moments(watch, record)
     seen = {title: robot_at(record, row, float(gap[row])) + person_at(record, row) for title, row in rows.items()}
     scene = draw_scene(seen, "Blue: jaws; orange: object.", folder)
     between = list(rows)[1:-1]

@@ -7,12 +7,10 @@ import numpy as np
 
 from cosim.signals import Signals
 from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.free_flyer.impedance_model import Errors, Motion, errors_of
+from scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Errors, Motion, errors_of
 from scenarios.free_flyer.impedance_parameters import Parameters
 from scenarios.free_flyer.stability import stability_metrics
 from scenarios.paper import paper_values
-
-_SEEN = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
 
 _REST_POSITION, _REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
@@ -52,7 +50,7 @@ class ImpedanceWatch(Watch):
         """Keep the motion and follow the errors."""
         if not self._rows:
             self._stability = stability_metrics(signals, ("impedance",))
-        seen = [signals[name] for name in _SEEN]
+        seen = [signals[name] for name in MOTION_SIGNALS]
         self._rows.append([t, *seen])
         self._saturated += bool(signals["thrusters.saturated"])
         away = math.dist(seen[0].tolist(), self._goal)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from matplotlib.colors import to_rgb
 from cosim.geometry import rotation_of
 from cosim.ports import Floats
 from scenarios.experiment import Figure
+from scenarios.paper import paper_values
 from scenarios.plotting import figure
 from scenarios.record import Record
 
@@ -24,7 +26,9 @@ OBJECT = (0.021, 0.195, 0.017)
 PALM_DEPTH = 0.03
 """How far the gripper's palm lies behind G, m."""
 _ARM_WIDTH, _PALM_SIDES, _JAW_SIDES = 0.04, (0.012, 0.05, 0.075), (0.06, 0.04, 0.008)
-_HAND_SIDES, _FINGER_WIDTH, _PALM_OF_HAND = (0.085, 0.08, 0.022), 0.016, np.array([-0.03, 0.0, 0.02])
+_HAND_SIDES, _PALM_OF_HAND = (0.085, 0.08, 0.022), np.array([-0.03, 0.0, 0.02])
+FINGER_WIDTH = 0.016
+"""Thickness of a person's fingers, m."""
 
 _ROOTS = (
     ((-0.01, 0.045, 0.0), (0.6, 0.8, 0.0), (0.035, 0.028)),
@@ -68,6 +72,12 @@ class Solid:
     colour: str
 
 
+def jaw_gap(record: Record) -> Floats:
+    """Return the room between the gripper's jaws over time, shape (rows,), m."""
+    g = paper_values("free_flyer", "person")
+    return g["aperture"] * (record["person.gripper_angle"] - g["angle_empty"]) / (g["angle_open"] - g["angle_empty"])
+
+
 def robot_at(record: Record, row: int, gap: float) -> list[Solid]:
     """Return cube, arm, palm and jaws at one row of a record; `gap` is the room between the jaws, m."""
     R_WB = rotation_of(_at(record, "robot.q_WB", row))
@@ -95,7 +105,7 @@ def person_at(record: Record, row: int) -> list[Solid]:
     thing = _box(_at(record, "person.p_WO", row), rotation_of(_at(record, "person.q_WO", row)), OBJECT, _THING)
     p_WH, R_WH = _at(record, "person.p_WH", row), rotation_of(_at(record, "person.q_WH", row))
     palm = p_WH + R_WH @ _PALM_OF_HAND
-    return [thing, _box(palm, R_WH, _HAND_SIDES, _SKIN), *_fingers(palm, R_WH, _at(record, "person.finger", row))]
+    return [thing, _box(palm, R_WH, _HAND_SIDES, _SKIN), *_fingers(p_WH, R_WH, _at(record, "person.finger", row))]
 
 
 def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Path) -> Figure:
@@ -137,19 +147,32 @@ def draw_near(moments: Mapping[str, Sequence[Solid]], middles: Mapping[str, Floa
     return Figure("transfer", "The gripper from near, at the moments between start and end of the scene.")
 
 
-def _fingers(palm: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
-    """Return the segments of thumb (2 joints) and of the four fingers (3 each), bent towards the palm."""
+def finger_points(finger: Floats) -> list[Floats]:
+    """Return joints and tip of thumb (2 joints) and of the four fingers (3 each) in H, bent towards the palm.
+
+    Args:
+        finger: angles of the joints, shape (14,), rad.
+    """
+    made: list[Floats] = []
+    for (root, along, lengths), angles in zip(_ROOTS, _split(finger), strict=True):
+        bent = np.cumsum(angles)[:, None]
+        ahead = np.cos(bent) * np.array(along) - np.sin(bent) * np.array([0.0, 0.0, 1.0])
+        first = _PALM_OF_HAND + np.array(root)
+        made.append(np.vstack([first, first + np.cumsum(np.array(lengths)[:, None] * ahead, axis=0)]))
+    return made
+
+
+def _fingers(p_WH: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
+    """Return the segments of thumb and fingers."""
     made: list[Solid] = []
-    for (root, along, segments), angles in zip(_ROOTS, _split(finger), strict=True):
-        at, turned = np.array(root), 0.0
-        for length, angle in zip(segments, angles, strict=True):
-            turned += angle
-            ahead = np.cos(turned) * np.array(along) - np.sin(turned) * np.array([0.0, 0.0, 1.0])
-            side = np.cross([0.0, 0.0, 1.0], along)
+    for points, (_, along, _) in zip(finger_points(finger), _ROOTS, strict=True):
+        side = np.cross([0.0, 0.0, 1.0], along)
+        for start, end in pairwise(points):
+            length = float(np.linalg.norm(end - start))
+            ahead = (end - start) / length
             R_HF = np.column_stack([ahead, side, np.cross(ahead, side)])
-            middle = palm + R_WH @ (at + 0.5 * length * ahead)
-            made.append(_box(middle, R_WH @ R_HF, (length, _FINGER_WIDTH, _FINGER_WIDTH), _SKIN))
-            at = at + length * ahead
+            middle = p_WH + R_WH @ ((start + end) / 2)
+            made.append(_box(middle, R_WH @ R_HF, (length, FINGER_WIDTH, FINGER_WIDTH), _SKIN))
     return made
 
 

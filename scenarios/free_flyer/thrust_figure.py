@@ -7,11 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from scenarios.experiment import Figure
+from scenarios.free_flyer.thrust_plots import BEYOND, QUANTITIES, commanded_wrench
 from scenarios.plotting import COLOURS, figure, leave_room
 from scenarios.record import Record
-
-_BEYOND = 2.0
-"""How far the axes reach beyond what the thrusters give at most: a command may be twenty times as much."""
 
 
 def draw_thrust(
@@ -24,16 +22,16 @@ def draw_thrust(
     """
     t = record.time
     with figure(folder / "thrust", 2, size=(9.0, 6.2)) as axes:
-        for axis, (what, unit) in zip(axes, (("f", "force (N)"), ("tau", "torque (N m)")), strict=True):
-            commanded = np.sum([record[f"{name}.{what}_cmd"] for name in controllers], axis=0)
+        for axis, (what, quantity, unit) in zip(axes, QUANTITIES, strict=True):
+            commanded = commanded_wrench(record, controllers, what)
             given = record[f"thrusters.{what}_B"]
             for i, name in enumerate("xyz"):
                 axis.plot(t, commanded[:, i], color=COLOURS[i], lw=0.9, alpha=0.45, label=f"{name}, commanded")
                 axis.plot(t, given[:, i], color=COLOURS[i], lw=1.2, label=f"{name}, given")
-            limit = _BEYOND * float(np.abs(given).max())
+            limit = BEYOND * float(np.abs(given).max())
             if float(np.abs(commanded).max()) > limit > 0.0:
                 axis.set_ylim(-limit, limit)
-            axis.set(ylabel=unit, xlim=(t[0], t[-1]))
+            axis.set(ylabel=f"{quantity.lower()} ({unit})", xlim=(t[0], t[-1]))
             shade(axis, axis is axes[0])
             leave_room(axis)
         axes[1].set_xlabel("time (s)")

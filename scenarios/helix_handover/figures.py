@@ -1,35 +1,33 @@
-"""Figures of a Helix handover: error and phases, paths, tendons, and the camera pictures of three moments."""
+"""Figures of a Helix handover: error and phases, paths, tendons, and the camera pictures of some moments."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
+from matplotlib.patches import Circle
 
-from cosim.pinhole import Pinhole
 from scenarios.experiment import Figure
 from scenarios.helix_handover.parameters import Parameters
-from scenarios.helix_handover.rig import camera_of
-from scenarios.helix_handover.snapshot import Snapshot
+from scenarios.helix_handover.plots import gripper_to_ball, tendon_name
 from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
+from scenarios.reporting.camera_picture import CameraPicture
 
 _SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
 
 
 def draw_handover(
-    parameters: Parameters, snapshots: Mapping[str, Snapshot], record: Record, folder: Path
+    parameters: Parameters, pictures: Sequence[CameraPicture], record: Record, folder: Path
 ) -> list[Figure]:
-    """Draw all figures of a run into a folder; return them in the order of a report. Snapshots are by their titles."""
-    made = [_pictures(snapshots, folder)] if snapshots else []
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    made = [_pictures(pictures, folder)] if pictures else []
     return [*made, _error(parameters, record, folder), _paths(record, folder), _tendons(record, folder)]
 
 
 def _error(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t = record.time
-    true = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
+    true = gripper_to_ball(record)
     with figure(folder / "error", 1, size=(8.0, 3.6)) as (axes,):
         shade_phases(axes, t, record["servo.phase"], record.items("servo.phase"))
         seen = record["servo.phase"] > 0
@@ -70,7 +68,7 @@ def _tendons(record: Record, folder: Path) -> Figure:
     with figure(folder / "tendons", 2, size=(8.0, 5.0)) as (lengths, tensions):
         for k in range(9):
             style: dict[str, Any] = {"color": COLOURS[k // 3], "ls": ("-", "--", ":")[k % 3], "lw": 1.2}
-            label = f"segment {k // 3 + 1}, {120 * (k % 3)}°"
+            label = tendon_name(k)
             lengths.plot(record.time, record["servo.dl_t"][:, k] * 1000, drawstyle="steps-post", label=label, **style)
             tensions.plot(record.time, record["arm.tension"][:, k], **style)
         lengths.set(ylabel="commanded change (mm)", xlim=(record.time[0], record.time[-1]))
@@ -79,31 +77,28 @@ def _tendons(record: Record, folder: Path) -> Figure:
     return Figure("tendons", "Commanded tendon lengths, from calibration, and tendon forces. A slack tendon is at 0 N.")
 
 
-def _pictures(snapshots: Mapping[str, Snapshot], folder: Path) -> Figure:
-    n = len(snapshots)
-    with figure(folder / "pictures", 2, n, size=(4.0 * n, 4.7)) as axes:
-        for i, (role, shot) in enumerate(snapshots.items()):
-            for side, axis in (("left", axes[i]), ("right", axes[i + n])):
-                _show(axis, shot, side)
-            axes[i].set_title(f"{shot.t:.1f} s, {role}")
-    caption = "Left (above) and right camera. Marked as estimated: ball (circle), wrist (cross), gripper (plus)."
+def _pictures(pictures: Sequence[CameraPicture], folder: Path) -> Figure:
+    moments = list(dict.fromkeys(p.t for p in pictures))
+    n = len(moments)
+    with figure(folder / "pictures", 2, n, size=(3.2 * n, 3.9)) as axes:
+        for p in pictures:
+            i = moments.index(p.t)
+            _show(axes[i if p.camera == "left" else i + n], p)
+            axes[i].set_title(f"{p.t:.1f} s, {p.role}")
+    caption = (
+        "Left (above) and right camera. Ball (circle), wrist (cross) and gripper (plus), yellow as measured in the "
+        "pictures, blue as the controller has them."
+    )
     return Figure("pictures", caption)
 
 
-def _show(axis: Axes, shot: Snapshot, side: str) -> None:
-    picture: NDArray[np.uint8] = getattr(shot, side)
-    axis.imshow(picture[:, :, ::-1])
+def _show(axis: Axes, picture: CameraPicture) -> None:
+    axis.imshow(picture.pixels[:, :, ::-1])
     axis.set_axis_off()
     axis.set(xlim=_SHOWN_COLUMNS, ylim=_SHOWN_ROWS)
-    camera = camera_of(side)
-    if not np.any(shot.p_WG_est):
-        return
-    ball, wrist, gripper = (_pixel(camera, p) for p in (shot.p_WO_est, shot.p_WR_est, shot.p_WG_est))
-    axis.plot(*ball, "o", ms=16, mfc="none", mec="#ffd23f", mew=1.6)
-    axis.plot(*wrist, "x", ms=8, color="#2c5fff", mew=1.8)
-    axis.plot(*gripper, "+", ms=11, color="#ff3b30", mew=1.8)
-
-
-def _pixel(camera: Pinhole, p_WP: NDArray[np.float64]) -> tuple[float, float]:
-    u, v = camera.project(p_WP)
-    return float(u), float(v)
+    for mark in picture.marks:
+        style: dict[str, Any] = {"color": mark.colour, "lw": 1.2}
+        if mark.shape == "circle":
+            axis.add_patch(Circle((mark.u, mark.v), mark.radius, fill=False, **style))
+        else:
+            axis.plot(mark.u, mark.v, {"cross": "x", "plus": "+"}[mark.shape], ms=8, color=mark.colour, mew=1.4)

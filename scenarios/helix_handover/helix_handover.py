@@ -1,6 +1,6 @@
 """A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -11,9 +11,16 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.plots import plot_handover
+from scenarios.helix_handover.published import published_of
+from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
+from scenarios.reporting.camera_picture import CameraPicture
+from scenarios.reporting.published_value import PublishedValue
+from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 
 class HelixHandover(Experiment[HandoverWatch]):
@@ -93,10 +100,26 @@ class HelixHandover(Experiment[HandoverWatch]):
         """Return the judge of one handover."""
         return HandoverWatch(parameters)
 
+    def watch_of_record(self, parameters: Parameters, pictures: Sequence[CameraPicture]) -> HandoverWatch:
+        """Return an observer with the pictures that the run's folder keeps."""
+        return HandoverWatch(parameters, pictures)
+
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: seeing and controlling."""
         return ("vision", "servo")
 
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return what table 1 and fig. 9 tell."""
+        return published_of(parameters)
+
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw errors, paths and tendons over time, and the camera pictures of three moments."""
-        return draw_handover(parameters, watch.snapshots, record, folder)
+        """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
+        return draw_handover(parameters, watch.pictures(), record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return distance to the goal, positions, tendons and gripper over time."""
+        return plot_handover(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+        """Return arm, gripper, hand, ball and cameras in space."""
+        return replay_handover(record)

@@ -1,30 +1,77 @@
-"""What both cameras saw at one moment, and where the controller took ball and arm to be."""
+"""What both cameras saw at one moment, with what vision found in it and where the controller took things to be."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from controllers.handover_vision import Params as Vision
+from cosim.pinhole import Pinhole
 from cosim.ports import Floats
 from cosim.signals import Signals
+from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.rig import camera_of
+from scenarios.reporting.camera_picture import CameraPicture, Mark
+
+MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
+_PERIOD = Fraction(1, 30)
+"""Of camera and vision, s."""
 
 _SHAPE = (720, 1280, 3)
+_SHAPES = {"p_WO": ("ball", "circle"), "p_WR": ("wrist", "cross"), "p_WG": ("gripper", "plus")}
+_SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.seen_R"}
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """Pictures, shape (720, 1280, 3), blue green red, and estimated positions in W, m."""
+def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals) -> list[CameraPicture]:
+    """Return the pictures of both cameras that hold at a time, with marks.
 
-    t: float
-    left: NDArray[np.uint8]
-    right: NDArray[np.uint8]
-    p_WO_est: Floats
-    p_WR_est: Floats
-    p_WG_est: Floats
+    Vision looks at a picture at the instant at which it is taken, so what it says is of the pictures that hold with it.
+    The controller's estimates are those of its last period.
+    """
+    return [
+        CameraPicture.take(
+            t=t,
+            camera=side.name.lower(),
+            role=role,
+            pixels=signals[f"camera.{side.name.lower()}"].reshape(_SHAPE),
+            marks=[*([] if is_covered(t, side, parameters) else _measured(side, signals)), *_estimated(side, signals)],
+        )
+        for side in (Cover.LEFT, Cover.RIGHT)
+    ]
 
-    @classmethod
-    def take(cls, t: float, signals: Signals) -> "Snapshot":
-        """Copy the pictures and estimates as they are."""
-        left, right = (signals[f"camera.{side}"].reshape(_SHAPE) for side in ("left", "right"))
-        estimates = {f"{p}_est": signals[f"servo.{p}_est"] for p in ("p_WO", "p_WR", "p_WG")}
-        return cls(t, left, right, **estimates)
+
+def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
+    """Return whether a lens was covered when the picture that holds at time t was taken."""
+    begin, end = parameters.covered(side)
+    taken = float(int(t / float(_PERIOD) + 1e-6) * _PERIOD)
+    return begin <= taken < end
+
+
+def _measured(side: Cover, signals: Signals) -> Iterator[Mark]:
+    for name in _SHAPES:
+        if signals[_SEEN_BY[name]]:
+            yield from _mark(side, name, signals[f"vision.{name}_meas"], "as measured", MEASURED)
+
+
+def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
+    if not np.any(signals["servo.p_WG_est"]):  # the controller has seen nothing yet
+        return
+    for name in _SHAPES:
+        yield from _mark(side, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
+
+
+def _mark(side: Cover, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
+    """Yield the mark of a point, unless it is behind the camera."""
+    camera = _camera(side)
+    u, v = camera.project(p_WP).tolist()
+    if np.isfinite(u) and np.isfinite(v):
+        what, shape = _SHAPES[name]
+        ball = float(camera.f[0]) * Vision().ball_radius / float(camera.depth(p_WP))
+        radius = ball if shape == "circle" else 9.0
+        yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)
+
+
+@cache
+def _camera(side: Cover) -> Pinhole:
+    return camera_of(side.name.lower())

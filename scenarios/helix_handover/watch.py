@@ -1,5 +1,7 @@
 """Judges a Helix handover by ground truth, which the arm's controller does not see."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,8 +9,10 @@ from cosim.geometry import rotation_of
 from cosim.ports import Floats
 from cosim.signals import Signals
 from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.helix_handover.parameters import Parameters
-from scenarios.helix_handover.snapshot import Snapshot
+from scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
+from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.snapshot import is_covered, take_pictures
+from scenarios.reporting.camera_picture import CameraPicture
 
 _SETTLING = 1.0
 """How long the ball must stay in the closed gripper, s (assumed)."""
@@ -16,19 +20,25 @@ _SETTLING = 1.0
 _NOTHING_SEEN = 10.0
 """How long the controller may wait for its first sight of ball and ring, s (assumed)."""
 
+_MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball"}
+_COVERED = "lens covered"
+
 
 class HandoverWatch(Watch):
-    """Follows one handover, keeps pictures of three moments and tells how it ended.
+    """Follows one handover, keeps pictures of moments that tell of it, and tells how it ended.
 
     Attributes:
-        snapshots: what the cameras saw by the moment's role, in the order of time: `start`, `at the ball` (the first
-            entry into GRASP), `end`. Moments that did not come, or came at the time of another, are not there.
         phases: the controller's phases and when each was first entered, in s.
+
+    Args:
+        parameters: the scenario's.
+        pictures: what the cameras saw, where signals hold no pictures; else they are taken.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
         self.parameters = parameters
-        self.snapshots: dict[str, Snapshot] = {}
+        self._pictures = list(pictures or ())
+        self._takes = pictures is None
         self.phases: dict[str, float] = {}
         self._t = 0.0
         self._phase = ""
@@ -37,6 +47,7 @@ class HandoverWatch(Watch):
         self._p_WO: Floats = np.zeros(3)
         self._p_GO: Floats = np.zeros(3)
         self._offset: Floats | None = None  # p_GO when the hand let go
+        self._mismatch: ModelMismatch | None = None  # when the gripper began to close
         self._error = 0.0
         self._nearest = np.inf
         self._released_at: float | None = None
@@ -50,10 +61,14 @@ class HandoverWatch(Watch):
         if phase in ("APPROACH", "DESCEND"):
             self._nearest = min(self._nearest, self._error)
         self._t = t
-        if not self.snapshots:
+        if not self._pictures:
             self._keep("start", signals)
+        if phase in _MOMENTS and phase not in self.phases:
+            self._keep(_MOMENTS[phase], signals)
         if phase == "GRASP" and phase not in self.phases:
-            self._keep("at the ball", signals)
+            self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"])
+        if self._hides(t):
+            self._keep(_COVERED, signals)
         self.phases.setdefault(phase, t)
         if holder == "GRIPPER" and self._released_at is None:
             self._released_at, self._offset = t, self._p_GO
@@ -63,9 +78,23 @@ class HandoverWatch(Watch):
         """Keep the last picture."""
         self._keep("end", signals)
 
+    def pictures(self) -> Sequence[CameraPicture]:
+        """Return what the cameras saw at the start, on first entering a phase, through a covered lens, and at the end.
+
+        Moments that did not come, or came at the time of another, are not there.
+        """
+        return tuple(self._pictures)
+
     def _keep(self, role: str, signals: Signals) -> None:
-        if all(shot.t != self._t for shot in self.snapshots.values()):
-            self.snapshots[role] = Snapshot.take(self._t, signals)
+        if self._takes and all(picture.t != self._t for picture in self._pictures):
+            self._pictures += take_pictures(self._t, role, self.parameters, signals)
+
+    def _hides(self, t: float) -> bool:
+        """Return whether a lens is covered in the pictures that hold at t, for the first time."""
+        p = self.parameters
+        if p.cover is Cover.NONE or any(picture.role == _COVERED for picture in self._pictures):
+            return False
+        return is_covered(t, p.cover, p)
 
     @property
     def over(self) -> bool:
@@ -103,6 +132,8 @@ class HandoverWatch(Watch):
             metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
         if self._released_at is not None:
             metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the hand lets go")
+        if self._mismatch is not None:
+            metrics |= _mismatch_metrics(self._mismatch)
         if self._offset is not None:
             lateral, axial = _beside_and_along(self._offset)
             metrics["grasp_offset_lateral"] = Metric(
@@ -134,6 +165,17 @@ class HandoverWatch(Watch):
         reach = "out of reach or too slow" if self._nearest > 2 * self.parameters.threshold else "no grasp"
         within = f"within {self.parameters.patience:.0f} s"
         return f"{reach}: {within} the arm came no nearer than {self._nearest:.3f} m to its goal; {where}"
+
+
+def _mismatch_metrics(m: ModelMismatch) -> dict[str, Metric]:
+    start = "place after calibration when the gripper begins to close, as in fig. 9"
+    return {
+        "model_mismatch": Metric(
+            m.apart, "m", "gripper of the commanded state f(q_sys) to the measured one when the gripper begins to close"
+        ),
+        "model_travel": Metric(m.model_travel, "m", f"gripper of the commanded state f(q_sys) from its {start}"),
+        "arm_travel": Metric(m.arm_travel, "m", f"measured gripper from its {start}"),
+    }
 
 
 def _beside_and_along(p_GO: Floats) -> tuple[float, float]:

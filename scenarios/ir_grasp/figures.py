@@ -14,12 +14,12 @@ from plants.grasp_hand import FINGERS, finger_points, palm_outline, sensor_rays
 from plants.grasp_objects import outlines
 from scenarios.experiment import Figure
 from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.plots import FINGER_NAMES, closing_cost, cost, in_sight
 from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 
-_FINGERS = ("thumb", "index", "ring")
-_OF_FINGER = (COLOURS[1], COLOURS[2], COLOURS[0])
-_PALM, _THING = "#c9d1db", "#ecd9b8"
+FINGER_COLOURS = (COLOURS[1], COLOURS[2], COLOURS[0])
+PALM_COLOUR, THING_COLOUR = "#c9d1db", "#ecd9b8"
 _GROUPS = {0: "reach", 1: "look", 2: "look", 3: "look", 4: "probe", 5: "step", 6: "close", 7: "pull", 8: "shake", 9: ""}
 """What is written over a phase: a look may include approaching and recovering motions."""
 
@@ -35,22 +35,21 @@ def draw_grasp(parameters: Parameters, moments: Mapping[str, float], record: Rec
 
 def _distances(parameters: Parameters, record: Record, folder: Path) -> Figure:
     t, reflex = record.time, ReflexParams()
-    threshold = reflex.threshold_literal if parameters.literal else reflex.threshold
+    both = in_sight(record, "reflex.distance"), in_sight(record, "scene.range")
     with figure(folder / "distances", 2, size=(8.0, 5.6), heights=(3, 2)) as (above, below):
-        for i, finger in enumerate(_FINGERS):
-            seen, true = (
-                np.where(record[s][:, i] < reflex.distance_max, 1000 * record[s][:, i], np.nan)
-                for s in ("reflex.distance", "scene.range")
-            )
-            above.plot(t, seen, color=_OF_FINGER[i], drawstyle="steps-post", label=f"{finger}, as seen")
-            above.plot(t, true, color=_OF_FINGER[i], lw=0.8, ls=":")
+        for i, finger in enumerate(FINGER_NAMES):
+            seen, true = (distances[:, i] for distances in both)
+            above.plot(t, seen, color=FINGER_COLOURS[i], drawstyle="steps-post", label=f"{finger}, as seen")
+            above.plot(t, true, color=FINGER_COLOURS[i], lw=0.8, ls=":")
         if not parameters.literal:
             above.axhline(1000 * reflex.target, color="#4d5866", lw=0.8, ls="--", label="target of thumb and ring")
         above.plot([], [], color="#4d5866", lw=0.8, ls=":", label="true, along the beam")
         above.set(ylabel="distance (mm)", ylim=(0, 82), xlim=(t[0], t[-1]))
         above.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.08))
-        below.semilogy(t, np.maximum(record["reflex.cost"] * 1e6, 0.1), color=COLOURS[3], drawstyle="steps-post")
-        below.axhline(1e6 * threshold, color="#4d5866", lw=0.8, ls="--", label="at which the hand closes")
+        below.semilogy(t, cost(record), color=COLOURS[3], drawstyle="steps-post")
+        below.axhline(
+            1e6 * closing_cost(parameters), color="#4d5866", lw=0.8, ls="--", label="at which the hand closes"
+        )
         below.legend(loc="best")
         below.set(xlabel="time (s)", ylabel="cost f (mm²)", xlim=(t[0], t[-1]))
         for axes, names in ((above, _GROUPS), (below, {})):
@@ -97,7 +96,7 @@ def _scene(parameters: Parameters, moments: Mapping[str, float], record: Record,
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
             axes.set_title(f"{record.time[k]:.1f} s, {role}")
         panels[0].set(ylabel="y (mm)")
-        for name, colour in zip(_FINGERS, _OF_FINGER, strict=True):
+        for name, colour in zip(FINGER_NAMES, FINGER_COLOURS, strict=True):
             panels[len(panels) // 2].plot([], [], color=colour, lw=5, label=name)
         panels[len(panels) // 2].legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.15), handlelength=1.0)
     caption = (
@@ -110,16 +109,18 @@ def _scene(parameters: Parameters, moments: Mapping[str, float], record: Record,
 def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> None:
     p_WH, yaw, q = record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]
     for part in _thing(parameters, record, k):
-        axes.add_patch(Polygon(part * 1000, facecolor=_THING, edgecolor="#8a6d3b", lw=1.0))
-    axes.add_patch(Polygon(palm_outline(p_WH, yaw) * 1000, facecolor=_PALM, edgecolor="#4d5866", lw=1.0))
+        axes.add_patch(Polygon(part * 1000, facecolor=THING_COLOUR, edgecolor="#8a6d3b", lw=1.0))
+    axes.add_patch(Polygon(palm_outline(p_WH, yaw) * 1000, facecolor=PALM_COLOUR, edgecolor="#4d5866", lw=1.0))
     for i, (finger, points) in enumerate(zip(FINGERS, finger_points(p_WH, yaw, q), strict=True)):
         for j, radius in enumerate(finger.radii):
-            axes.add_patch(Polygon(_capsule(points[j], points[j + 1], radius) * 1000, fc=_OF_FINGER[i], ec="w", lw=0.5))
+            axes.add_patch(
+                Polygon(_capsule(points[j], points[j + 1], radius) * 1000, fc=FINGER_COLOURS[i], ec="w", lw=0.5)
+            )
     origins, directions = sensor_rays(p_WH, yaw, q)
     for i, distance in enumerate(record["scene.range"][k]):
         met = distance < ReflexParams().distance_max
         ends = np.array([origins[i], origins[i] + min(distance, ReflexParams().distance_max) * directions[i]]) * 1000
-        axes.plot(ends[:, 0], ends[:, 1], color=_OF_FINGER[i], lw=1.0, ls="-" if met else ":")
+        axes.plot(ends[:, 0], ends[:, 1], color=FINGER_COLOURS[i], lw=1.0, ls="-" if met else ":")
 
 
 def _thing(parameters: Parameters, record: Record, k: int) -> list[Floats]:

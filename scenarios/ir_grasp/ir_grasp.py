@@ -1,6 +1,6 @@
 """A soft hand corrects its grasp by infrared reflexes, closes, pulls and shakes. [Luberto] sec. V."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -11,10 +11,16 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.ir_grasp.figures import draw_grasp
 from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.plots import plot_grasp
+from scenarios.ir_grasp.published import published_of
+from scenarios.ir_grasp.replay import replay_grasp
 from scenarios.ir_grasp.situation import Situation
 from scenarios.ir_grasp.watch import GraspWatch
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.published_value import PublishedValue
+from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 
 
 class IrGrasp(Experiment[GraspWatch]):
@@ -99,6 +105,18 @@ class IrGrasp(Experiment[GraspWatch]):
         """Return the robot's own computing."""
         return ("reflex",)
 
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return the distances of table II."""
+        return published_of(parameters)
+
     def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments, distances and cost, and the commands."""
         return draw_grasp(parameters, watch.moments, record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return distances, cost, and wrist, heading and closure over time."""
+        return plot_grasp(parameters, record)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return hand, object and beams in space."""
+        return replay_grasp(parameters, record)

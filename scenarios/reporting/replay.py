@@ -3,17 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cosim.ports import Floats
+from scenarios.reporting.meshes import Mesh
 
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """A line through points that move, such as a backbone. `points` has shape (rows, n, 3), m; NaN leaves gaps.
+    """A line or a tube through points that move, such as a backbone.
 
-    `width` is in pixels; `markers` draws the points too.
+    Attributes:
+        label: what the legend says; lines and bodies of one label are shown and hidden together.
+        colour: as "#rrggbb".
+        points: shape (rows, n, 3), m; NaN leaves gaps in a line and hides a tube. A single row stays where it is.
+        width: of a line, in pixels.
+        markers: whether the points of a line are drawn too.
+        radii: of a tube at each of its points, shape (n,), m; None for a line.
+        trail: whether what is drawn is the way of a single point until the time, not a line at the time.
+        opacity: from 0 to 1.
     """
 
     label: str
@@ -21,25 +27,26 @@ class Line:
     points: Floats
     width: float = 4.0
     markers: bool = False
+    radii: Floats | None = None
+    trail: bool = False
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A rigid body of triangles.
+    """A rigid body.
 
     Attributes:
         label, colour: the latter as "#rrggbb".
-        vertices: in the body's frame B, shape (n, 3), m.
-        triangles: indices of vertices, shape (m, 3).
-        p_WB: position over time, shape (rows, 3), m; NaN hides it.
+        mesh: in the body's frame B.
+        p_WB: position over time, shape (rows, 3), m; NaN hides it. A single row stays where it is.
         q_WB: orientation over time, shape (rows, 4), scalar first; None: that of W.
         opacity: from 0 to 1.
     """
 
     label: str
     colour: str
-    vertices: Floats
-    triangles: NDArray[np.int64]
+    mesh: Mesh
     p_WB: Floats
     q_WB: Floats | None = None
     opacity: float = 1.0
@@ -50,15 +57,20 @@ class Replay:
     """A scene over a record's time.
 
     Attributes:
-        lines, bodies: what moves; each has as many rows as the record.
+        lines, bodies: what moves; each has as many rows as the record, or one.
         fixed: lines that stay, of shape (1, n, 3), such as a path to follow or a table's edge.
-        eye: from where one looks at the scene's middle at first, in units of its size.
+        eye: from where one looks at first, seen from the middle, in units of the scene's size.
+        middle: where one looks at first, in W, m; None: at the middle of what is shown.
         phases: an enumeration's signal whose value is told beside the time; "" for none.
+        notes: sentences below the scene.
+        window: least and greatest corner of what is shown, shape (2, 3), m; None: everything that is drawn.
     """
 
     lines: Sequence[Line] = ()
     bodies: Sequence[Body] = ()
     fixed: Sequence[Line] = ()
     eye: tuple[float, float, float] = (1.3, 1.3, 0.6)
+    middle: tuple[float, float, float] | None = None
     phases: str = ""
     notes: Sequence[str] = field(default_factory=tuple[str, ...])
+    window: Floats | None = None

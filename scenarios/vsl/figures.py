@@ -13,13 +13,12 @@ from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 from scenarios.vsl.parameters import Parameters
 from scenarios.vsl.path_point import distance
+from scenarios.vsl.plots import BY_SERVOS, errors
 from scenarios.vsl.watch import PathWatch
 
 _SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[5]
 _ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
 """The arm's lines at its three moments: where they lie over each other, all are seen."""
-
-_BY_SERVOS = "tip by the servos, links taken as rigid"
 
 _LINES = (("desired", ":"), ("commanded", "--"), ("measured", "-"))
 """What the lines of joints and pressures are."""
@@ -44,7 +43,7 @@ def _path(watch: PathWatch, folder: Path) -> Figure:
         (list(watch.path), {"color": _DESIRED, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
         (
             [p.servo for p in points],
-            {"color": _SERVO, "ls": "--", "lw": 1.3, "label": _BY_SERVOS},
+            {"color": _SERVO, "ls": "--", "lw": 1.3, "label": BY_SERVOS},
         ),
         ([p.tracked for p in points], {"color": _TIP, "lw": 1.3, "label": "tip by the tracker"}),
     ]
@@ -109,21 +108,13 @@ def _errors(watch: PathWatch, folder: Path) -> Figure:
 
 def _error_over_time(watch: PathWatch, record: Record, folder: Path) -> Figure:
     t = record.time
-    goal, moving = record["planner.p_WG_goal"], record["planner.moving"]
+    moving = record["planner.moving"]
     segments = {0: "before", **{n: f"segment {n}" for n in range(1, int(np.max(record["planner.segment"])) + 1)}}
-    curves = [
-        ("arm.p_WG_meas", _TIP, "tip by the tracker"),
-        ("kinematics.p_WG_model", _SERVO, _BY_SERVOS),
-    ]
     with figure(folder / "error", 1, size=(8.0, 3.8)) as (axes,):
         shade_phases(axes, t, record["planner.segment"], segments)
-        for signal, colour, label in curves:
-            error = np.linalg.norm(record[signal] - goal, axis=1) * 1000
-            axes.plot(t[moving], error[moving], color=colour, lw=1.2, label=label)
-        if watch.hybrid:
-            error = np.linalg.norm(record["kinematics.p_WG_est"] - record["arm.p_WG"], axis=1) * 1000
-            label = "hybrid forward model, to the true tip"
-            axes.plot(t[moving], error[moving], color=_ESTIMATE, lw=1.2, label=label)
+        of_curves = errors(record, hybrid=watch.hybrid)
+        for (label, error), colour in zip(of_curves.items(), (_TIP, _SERVO, _ESTIMATE), strict=False):
+            axes.plot(t[moving], 1000 * error[moving], color=colour, lw=1.2, label=label)
         axes.axhline(
             watch.parameters.tolerance * 1000, color="#4d5866", lw=0.8, ls="--", label="tolerance for the mean"
         )

@@ -1,6 +1,6 @@
 """What both experiments share: planner, kinematics and arm, wired, and a path to follow. [Gandarias2020] sec. V."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,8 +11,12 @@ from cosim.system import System
 from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.replay import Replay
+from scenarios.reporting.time_plot import TimePlot
 from scenarios.vsl.figures import draw_path_run
 from scenarios.vsl.parameters import Parameters
+from scenarios.vsl.plots import plot_path_run
+from scenarios.vsl.replay import replay_path
 from scenarios.vsl.watch import PathWatch
 
 _MORE = 5
@@ -112,3 +116,11 @@ class PathExperiment(Experiment[PathWatch]):
     def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
         return draw_path_run(parameters, watch, record, folder)
+
+    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+        """Return error and place of the tip, joints, pressures and currents over time."""
+        return plot_path_run(parameters, record, hybrid=self.hybrid)
+
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
+        """Return arm, load, path and the tip's way in space."""
+        return replay_path(parameters, record, hybrid=self.hybrid)

@@ -68,6 +68,7 @@ def test_a_run_leaves_its_whole_folder(handover: tuple[Path, int, dict[str, Any]
     out = handover[0]
     assert sorted(p.name for p in out.iterdir()) == [
         "figures",
+        "pictures",
         "report.html",
         "run.json",
         "signals.parquet",

@@ -33,7 +33,9 @@ def summary_of(folder: Path) -> dict[str, Any]:
     """Return all of a summary that measures no time."""
     told = json.loads((folder / "summary.json").read_text())
     metrics = {k: v for k, v in told["metrics"].items() if not k.startswith(OF_TIME)}
-    return {k: v for k, v in told.items() if k not in ("wall_seconds", "cpu_seconds")} | {"metrics": metrics}
+    units = [{k: v for k, v in unit.items() if k != "cpu_seconds"} for unit in told["units"]]
+    others = {k: v for k, v in told.items() if k not in ("wall_seconds", "cpu_seconds")}
+    return others | {"metrics": metrics, "units": units}
 
 
 def assert_same(joined: Path, whole: Path) -> None:
@@ -42,6 +44,8 @@ def assert_same(joined: Path, whole: Path) -> None:
     assert summary_of(joined) == summary_of(whole)
     names = {str(p.relative_to(whole)) for p in whole.rglob("*")}
     assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
+    for picture in whole.glob("pictures/*"):
+        assert (joined / "pictures" / picture.name).read_bytes() == picture.read_bytes(), picture.name
     told, wanted = (json.loads((folder / "run.json").read_text()) for folder in (joined, whole))
     assert told | {"checkpoint": None} == wanted
 

@@ -3,7 +3,7 @@ import sys
 import pytest
 
 from scenarios.experiment import Metric
-from scenarios.report import told
+from scenarios.reporting.told_metric import told
 from scenarios.run_metrics import peak_memory
 from scenarios.run_summary import metric_data
 

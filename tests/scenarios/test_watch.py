@@ -9,19 +9,25 @@ from cosim.fmu_description import FmuPort
 from cosim.signals import Signals
 from cosim.variable import Causality, Kind
 from plants.handover_partner import Holder
-from scenarios.helix_handover.parameters import Parameters
+from scenarios.helix_handover.parameters import Cover, Parameters
+from scenarios.helix_handover.rig import camera_of
 from scenarios.helix_handover.watch import HandoverWatch
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
 P_WG = np.array([0.16, 0.0, -0.6])
+CALIBRATED = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
+P_WR = P_WG + np.array([0.0, 0.0, 0.1])
 
 
-def signals(phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0) -> Signals:
+def signals(
+    phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0, sees_ball: bool = True
+) -> Signals:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
     reals = {
         "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
         "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along])},
-        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG},
+        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
+        "vision": {"p_WO_meas": P_WG, "p_WR_meas": P_WR, "p_WG_meas": P_WG},
     }
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
         unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
@@ -30,11 +36,14 @@ def signals(phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, alo
         unit: {name: port(name, Kind.REAL, shape=v[0].shape if v[0].size > 1 else ()) for name, v in values.items()}
         for unit, values in units.items()
     }
+    for name, seen in (("seen_O", sees_ball), ("seen_R", True)):
+        units["vision"][name] = (np.array([seen]),)
+        ports["vision"][name] = port(name, Kind.BOOLEAN)
     for unit, name, item in (("servo", "phase", phase), ("hand", "holder", holder)):
         units[unit][name] = (np.array([int(item)]),)
         ports[unit][name] = port(name, Kind.ENUMERATION, items=tuple((i.name, int(i)) for i in type(item)))
-    seen = (np.array([PICTURE.ctypes.data]), np.array([PICTURE.size]))
-    units["camera"] = dict.fromkeys(("left", "right"), seen)
+    pixels = (np.array([PICTURE.ctypes.data]), np.array([PICTURE.size]))
+    units["camera"] = dict.fromkeys(("left", "right"), pixels)
     ports["camera"] = {side: port(side, Kind.BINARY) for side in ("left", "right")}
     return Signals(units, ports, PICTURE)
 
@@ -43,11 +52,11 @@ def port(name: str, kind: Kind, **more: Any) -> FmuPort:
     return FmuPort(name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), **more)
 
 
-def follow(*moments: tuple[float, Signals]) -> HandoverWatch:
-    watch = HandoverWatch(Parameters())
-    for t, seen in moments:
-        watch(t, seen)
-    watch.finish(moments[-1][1])
+def follow(*seen: tuple[float, Signals], parameters: Parameters | None = None) -> HandoverWatch:
+    watch = HandoverWatch(parameters or Parameters())
+    for t, at_t in seen:
+        watch(t, at_t)
+    watch.finish(seen[-1][1])
     return watch
 
 
@@ -77,17 +86,57 @@ def test_a_ball_that_fell_from_the_gripper_fails():
     assert "did not keep the ball" in outcome.reason
 
 
-def test_pictures_are_of_the_start_the_first_grasp_and_the_end():
+def moments(watch: HandoverWatch) -> dict[str, float]:
+    """Return the times of the pictures by role; each moment has a left and a right one."""
+    pictures = watch.pictures()
+    assert [p.camera for p in pictures] == ["left", "right"] * (len(pictures) // 2)
+    return {p.role: p.t for p in pictures}
+
+
+def test_pictures_are_of_the_start_the_first_entries_into_phases_and_the_end():
     course = (Phase.WAIT, Phase.APPROACH, Phase.DESCEND, Phase.APPROACH, Phase.DESCEND, Phase.GRASP, Phase.DESCEND)
     watch = follow(*((float(t), signals(phase)) for t, phase in enumerate((*course, Phase.GRASP, Phase.HOLD))))
-    assert {role: shot.t for role, shot in watch.snapshots.items()} == {"start": 0.0, "at the ball": 5.0, "end": 8.0}
+    assert moments(watch) == {"start": 0.0, "approach": 1.0, "descent": 2.0, "at the ball": 5.0, "end": 8.0}
 
 
 def test_a_run_that_timed_out_has_a_start_and_an_end():
     watch = follow((0.0, signals(Phase.APPROACH)), (60.0, signals(Phase.APPROACH)))
-    assert {role: shot.t for role, shot in watch.snapshots.items()} == {"start": 0.0, "end": 60.0}
+    assert moments(watch) == {"start": 0.0, "end": 60.0}
 
 
 def test_a_moment_is_shown_once():
-    watch = follow((0.0, signals(Phase.WAIT)))
-    assert list(watch.snapshots) == ["start"]
+    assert list(moments(follow((0.0, signals(Phase.WAIT))))) == ["start"]
+
+
+def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to_close():
+    metrics = follow((7.9, signals(Phase.DESCEND)), (8.0, signals(Phase.GRASP))).outcome().metrics
+    assert metrics["model_travel"].value == pytest.approx(0.0, abs=1e-12)
+    assert metrics["model_mismatch"].value == metrics["arm_travel"].value == pytest.approx(np.hypot(0.16, 0.1))
+    assert "model_mismatch" not in follow((7.9, signals(Phase.DESCEND))).outcome().metrics
+
+
+def test_a_covered_lens_is_shown_when_the_first_picture_was_taken_through_it():
+    covered = Parameters(cover=Cover.LEFT, cover_from=0.99, cover_for=2.0)
+    seen = signals(Phase.WAIT)
+    watch = follow(*((t, seen) for t in (0.0, 0.98, 0.99, 1.0, 1.02, 4.0)), parameters=covered)
+    assert moments(watch) == {"start": 0.0, "lens covered": 1.0, "end": 4.0}
+    labels = {(p.role, p.camera): [m.label for m in p.marks if "measured" in m.label] for p in watch.pictures()}
+    assert labels["lens covered", "left"] == []
+    assert len(labels["lens covered", "right"]) == len(labels["end", "left"]) == 3
+
+
+def test_marks_lie_where_the_camera_sees_what_was_measured():
+    picture = follow((0.0, signals(Phase.APPROACH))).pictures()[0]
+    ball, wrist, gripper = (m for m in picture.marks if m.label.endswith("measured"))
+    camera = camera_of("left")
+    assert (ball.shape, wrist.shape, gripper.shape) == ("circle", "cross", "plus")
+    assert (wrist.u, wrist.v) == pytest.approx(tuple(camera.project(P_WR)))
+    edge = camera.project(P_WG + 0.025 * camera.R_WC[:, 1])  # a ball's radius below its middle, as the camera sees it
+    assert ball.radius == pytest.approx(float(np.linalg.norm(edge - np.array([ball.u, ball.v]))), rel=0.05)
+
+
+def test_what_vision_does_not_see_is_not_marked():
+    picture = follow((0.0, signals(Phase.APPROACH, sees_ball=False))).pictures()[0]
+    labels = [m.label for m in picture.marks]
+    assert "ball, as measured" not in labels
+    assert {"wrist, as measured", "gripper, as measured", "ball, as the controller has it"} <= set(labels)

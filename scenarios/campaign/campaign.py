@@ -1,0 +1,124 @@
+"""Carries out a campaign: all is checked, what is done is kept, the rest is given to a crew, and the table is kept."""
+
+import contextlib
+import errno
+import os
+import shutil
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from cosim.exceptions import RecordNotWritten
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.crew import Crew
+from scenarios.campaign.plan import CampaignPlan, PlannedRun
+from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+from scenarios.campaign.run_row import RunRow, row_of
+from scenarios.campaign.table_writer import TableWriter
+from scenarios.campaign.tally import CampaignProgress, Tally
+from scenarios.run_folder import told_if_not_written
+
+
+def carry_out_campaign(
+    plan: CampaignPlan, folder: CampaignFolder, crew: Crew, progress: CampaignProgress
+) -> CampaignTable:
+    """Carry out the runs of a campaign that are not done yet, and return the table of all.
+
+    Whatever ends it, what was done stays, and the same call goes on: a run is done when it has left its folder,
+    also if a unit failed in it. Lost runs are tried again by the next call.
+
+    Raises:
+        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError, BadCrew: before anything was
+            written.
+        RecordNotWritten: there is no room.
+        CrewLost: there are no workers any more.
+        KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
+    """
+    plan = checked_plan(plan)
+    files = unit_fmus(plan)
+    check_units(plan, files)
+    with folder.opened(plan, files, crew.check) as fmus:
+        work = _Work(plan, folder, progress)
+        try:
+            work.give_to(crew, fmus)
+        finally:
+            work.table.write()
+    return CampaignTable.read(folder.table)
+
+
+class _Work:
+    """A campaign under way."""
+
+    def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: CampaignProgress) -> None:
+        self.plan, self.folder, self.progress = plan, folder, progress
+        self.table = TableWriter(plan, folder.table)
+        self.runs = {run.name: run for run in plan.runs()}
+        self._count: Counter[str] = Counter()
+        self._kept = self._keep_done()
+        progress(self.tally)
+
+    def give_to(self, crew: Crew, fmus: Mapping[str, Path]) -> None:
+        """Have the runs carried out that are not done."""
+        orders = [self._order(run, fmus) for run in self._to_do()]
+        if not orders:
+            return
+        with contextlib.ExitStack() as stack:
+            answers = crew.carry_out(orders)
+            close: Callable[[], None] | None = getattr(answers, "close", None)
+            if close is not None:
+                stack.callback(close)
+            for answer in answers:
+                self._take(answer)
+
+    @property
+    def tally(self) -> Tally:
+        """How far it has come."""
+        n = self._count
+        ended = n["done"] + n["failed"]
+        return Tally(total=len(self.runs), kept=self._kept, ended=ended, failed=n["failed"], lost=n["lost"])
+
+    def _keep_done(self) -> int:
+        """Take the rows of all runs that are done, and remove what cannot be read of a run."""
+        kept: list[RunRow] = []
+        for run in self.runs.values():
+            if not self.folder.is_done(run):
+                continue
+            row = row_of(run, self.folder.runs / run.name)
+            if row is None:
+                with told_if_not_written(self.folder.runs):
+                    shutil.rmtree(self.folder.runs / run.name)
+            else:
+                kept.append(row)
+        self.table.keep(kept)
+        self._count.update(row.status for row in kept)
+        return len(kept)
+
+    def _to_do(self) -> Sequence[PlannedRun]:
+        """Return the runs that are not done, repetition by repetition, so that a part tells of all points."""
+        left = [run for run in self.runs.values() if not self.folder.is_done(run)]
+        return sorted(left, key=lambda run: run.repetition)
+
+    def _order(self, run: PlannedRun, fmus: Mapping[str, Path]) -> RunOrder:
+        return RunOrder(
+            name=run.name,
+            scenario=self.plan.scenario,
+            parameters=tuple(f"{name}={value}" for name, value in run.parameters.items()),
+            seed=run.seed,
+            fmus={unit: str(path) for unit, path in fmus.items()},
+            runs=str(self.folder.runs.absolute()),
+            options=self.plan.options,
+        )
+
+    def _take(self, answer: RunAnswer) -> None:
+        run = self.runs[answer.name]
+        row = None if answer.lost else row_of(run, self.folder.runs / run.name)
+        if row is None:
+            if os.strerror(errno.ENOSPC) in answer.lost:
+                raise RecordNotWritten(self.folder.runs / run.name, os.strerror(errno.ENOSPC))
+            reason = answer.lost or "its folder does not say how it ended"
+            row = RunRow(run=run, status="lost", success=None, reason=reason)
+        self._count[row.status] += 1
+        self.progress(self.tally)
+        self.table.add(row)

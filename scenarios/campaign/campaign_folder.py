@@ -1,0 +1,182 @@
+"""The folder of a campaign: what it is, the FMUs that it uses, the folders of its runs, and their table."""
+
+import contextlib
+import json
+import os
+import platform
+import shutil
+from collections.abc import Callable, Generator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from cosim.exceptions import one_line
+from cosim.record.file_lock import FileLocked, folder_locked
+from scenarios.campaign.campaign_identity import differences, identity_of
+from scenarios.campaign.plan import CampaignPlan, PlannedRun
+from scenarios.catalog import SCENARIOS
+from scenarios.run_folder import BadRunFolder, check_place, sha256_of, told_if_not_written, write_whole
+
+_FILE = "campaign.json"
+
+
+class CampaignFolder:
+    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def runs(self) -> Path:
+        """The folder of the runs' folders."""
+        return self.path / "runs"
+
+    @property
+    def fmus(self) -> Path:
+        """The folder of the FMUs that the runs use."""
+        return self.path / "fmus"
+
+    @property
+    def table(self) -> Path:
+        """The table of the runs."""
+        return self.path / "runs.parquet"
+
+    @property
+    def report(self) -> Path:
+        """The report page."""
+        return self.path / "report.html"
+
+    @property
+    def figures(self) -> Path:
+        """The folder of figures."""
+        return self.path / "figures"
+
+    @property
+    def is_there(self) -> bool:
+        """Whether a campaign has begun in it."""
+        return (self.path / _FILE).is_file()
+
+    def read(self) -> dict[str, Any]:
+        """Return what `campaign.json` says.
+
+        Raises:
+            BadRunFolder: it is not the folder of a campaign, or damaged.
+        """
+        try:
+            content = json.loads((self.path / _FILE).read_bytes())
+        except OSError as e:
+            raise BadRunFolder(self.path, f"it is not the folder of a campaign: it has no {_FILE}") from e
+        except ValueError as e:
+            raise BadRunFolder(self.path, f"its {_FILE} is damaged: {one_line(e)}") from e
+        if not isinstance(content, dict):
+            raise BadRunFolder(self.path, f"its {_FILE} is damaged: it holds no JSON object")
+        return cast(dict[str, Any], content)
+
+    def check(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
+        """Check that a campaign can begin or go on here; nothing is written.
+
+        Raises:
+            BadRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
+        check_place(self.path)
+        if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
+            return
+        if not (self.path / _FILE).exists():
+            raise BadRunFolder(self.path, f"it is not empty and has no {_FILE}; name a new folder, or a campaign's")
+        differ = differences(self.read(), identity_of(plan, fmus))
+        if differ:
+            raise BadRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
+
+    @contextlib.contextmanager
+    def opened(
+        self, plan: CampaignPlan, fmus: Mapping[str, Path], check: Callable[[Path], None]
+    ) -> Generator[dict[str, Path], None, None]:
+        """Make the folder, or go on with it, and keep others from it; give the copies of the FMUs in it.
+
+        `check` is called with the folder before anything is written to it; if it raises, a folder that was not there
+        is removed.
+
+        Left-overs of runs that were killed are removed. A file's copy has its name, or, where two units have different
+        files of one name, that of the unit before it.
+
+        Raises:
+            BadRunFolder: as by `check`; or another command holds it, or it cannot be made.
+            RecordNotWritten: it cannot be written to.
+        """
+        self.check(plan, fmus)
+        with contextlib.ExitStack() as held:
+            with self._made():
+                held.enter_context(self._held())
+                self.check(plan, fmus)  # another command may have made it meanwhile
+                check(self.path)
+                self._write(plan, fmus)
+            with told_if_not_written(self.path):
+                self.runs.mkdir(exist_ok=True)
+                self.fmus.mkdir(exist_ok=True)
+                self._remove_unfinished()
+                copies = {unit: self._copy(unit, path, fmus) for unit, path in fmus.items()}
+            yield copies
+
+    def is_done(self, run: PlannedRun) -> bool:
+        """Return whether a run has left its folder; it has its name only when it is complete."""
+        return (self.runs / run.name).is_dir()
+
+    @contextlib.contextmanager
+    def _made(self) -> Generator[None, None, None]:
+        """Make the folder; if what follows fails, remove what was made and is empty."""
+        absent = [p for p in (self.path, *self.path.parents) if not p.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+        try:
+            yield
+        except BaseException:
+            with contextlib.suppress(OSError):
+                for folder in absent:
+                    folder.rmdir()
+            raise
+
+    @contextlib.contextmanager
+    def _held(self) -> Generator[None, None, None]:
+        with contextlib.ExitStack() as held:
+            try:
+                held.enter_context(folder_locked(self.path))
+            except FileLocked as e:
+                raise BadRunFolder(self.path, "another command is at work on this campaign") from e
+            except OSError as e:
+                raise BadRunFolder(self.path, f"it cannot be opened: {e.strerror}") from e
+            yield
+
+    def _counts(self, entry: Path) -> bool:
+        """Return whether something is more than what a call leaves that was killed before it wrote `campaign.json`."""
+        return entry.name != f"{_FILE}.part" and not entry.name.startswith(".")
+
+    def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
+        """Write `campaign.json`, before anything else is there: without it, nobody could go on."""
+        experiment = SCENARIOS[plan.scenario]
+        told = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
+        content = {**identity_of(plan, fmus), **told}
+        if not (self.path / _FILE).exists() or self.read() != content:
+            write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+    def _copy(self, unit: str, file: Path, fmus: Mapping[str, Path]) -> Path:
+        alike = [other for other in fmus.values() if other.name == file.name]
+        ambiguous = len({sha256_of(other) for other in alike}) > 1
+        copy = self.fmus.absolute() / (f"{unit}_{file.name}" if ambiguous else file.name)
+        if not copy.is_file() or sha256_of(copy) != sha256_of(file):
+            unfinished = copy.with_name(copy.name + ".part")
+            try:
+                shutil.copyfile(file, unfinished)
+                os.replace(unfinished, copy)
+            except OSError:
+                unfinished.unlink(missing_ok=True)
+                raise
+        return copy
+
+    def _remove_unfinished(self) -> None:
+        """Remove what killed runs have left: folders beside those of runs, whose names begin with a dot."""
+        for left in self.runs.iterdir():
+            if left.name.startswith("."):
+                shutil.rmtree(left, ignore_errors=True)

@@ -1,0 +1,46 @@
+"""Ctrl-C during a campaign: the first ends it in order, the second at once."""
+
+import os
+import signal
+from collections.abc import Callable
+from functools import partial
+from types import FrameType, TracebackType
+
+from scenarios.exit_status import ABORTED
+from scenarios.supervisor import leave
+
+_SIGNALS = [n for n in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
+
+
+class CampaignInterruption:
+    """Takes SIGINT, SIGTERM and SIGHUP over. Use it as a context manager in the main thread.
+
+    The first of them raises KeyboardInterrupt, on which a campaign drops the runs under way and writes its table. The
+    second ends this process at once with status 130; workers end when they miss it. One that is ignored, as under
+    nohup, stays so.
+    """
+
+    def __init__(self) -> None:
+        self._asked = False
+        self._undo: list[Callable[[], object]] = []
+
+    def __enter__(self) -> "CampaignInterruption":
+        for number in _SIGNALS:
+            before = signal.getsignal(number)
+            if before is not signal.SIG_IGN:
+                signal.signal(number, self._take)
+                self._undo.append(partial(signal.signal, number, before))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for undo in self._undo:
+            undo()
+
+    def _take(self, _number: int, _frame: FrameType | None) -> None:
+        if self._asked:
+            os.write(2, b"\nAborted!\n" if os.isatty(2) else b"Aborted!\n")
+            leave(ABORTED)
+        self._asked = True
+        raise KeyboardInterrupt

@@ -1,0 +1,40 @@
+"""Where a campaign's folder is if the call does not say."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_identity import identity_of
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.run_folder import BadRunFolder
+
+PLACE = Path("campaigns")
+
+
+def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
+    """Return the newest folder of this very campaign in `campaigns/` that lacks runs, else a new one.
+
+    So a call that was interrupted goes on where it stopped, and one that came to its end begins anew. The plan is a
+    checked one.
+    """
+    wanted = identity_of(plan, fmus)
+    runs = plan.runs()
+    for path in sorted(PLACE.glob(f"*_{plan.scenario}*/"), reverse=True):
+        folder = CampaignFolder(path)
+        try:
+            there = folder.read()
+        except BadRunFolder:
+            continue
+        if all(there.get(key) == value for key, value in wanted.items()):
+            return _new(plan) if all(folder.is_done(run) for run in runs) else folder
+    return _new(plan)
+
+
+def _new(plan: CampaignPlan) -> CampaignFolder:
+    name = time.strftime(f"%Y-%m-%d_%H%M%S_{plan.scenario}")
+    path, number = PLACE / name, 1
+    while path.exists():
+        number += 1
+        path = PLACE / f"{name}_{number}"
+    return CampaignFolder(path)

@@ -1,0 +1,128 @@
+"""The table of a campaign: a row for each run that has ended."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from cosim.exceptions import nearest, one_line
+from scenarios.run_folder import BadRunFolder
+
+
+class CampaignTable:
+    """Reads `runs.parquet`.
+
+    Its columns are `run`, `point`, `repetition`, `seed`, `status` ("done"; "failed": a unit failed or the run crashed;
+    "lost": no worker came back with it), `success` (null where the run is not done), `reason`, the parameters that are
+    varied or set, `simulated_seconds`, `wall_seconds`, `cpu_seconds` and the metrics. A column's metadata hold its
+    `role` (run, parameter or metric), `unit` and `description`.
+    """
+
+    def __init__(self, table: pa.Table) -> None:
+        self.table = table
+
+    @classmethod
+    def read(cls, path: Path) -> "CampaignTable":
+        """Read a campaign's table, given by its file or by the campaign's folder.
+
+        Raises:
+            BadRunFolder: there is none, or it is damaged.
+        """
+        file = path / "runs.parquet" if path.is_dir() else path
+        try:
+            return cls(pq.read_table(file))
+        except FileNotFoundError as e:
+            raise BadRunFolder(file.parent, f"it has no {file.name}") from e
+        except (OSError, pa.ArrowException) as e:
+            raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}") from e
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return self.table.num_rows
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows, each a mapping of columns to values; None is null."""
+        return self.table.to_pylist()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that were varied or set."""
+        return self._of_role("parameter")
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """Names of the metrics' columns."""
+        return self._of_role("metric")
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a column: numbers as floats, NaN where null, or as integers; all else as objects, None where null.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        column, kind = self.table.column(self._known(name)), self._kind(name)
+        if pa.types.is_floating(kind):
+            return np.asarray(column.to_numpy(), dtype=np.float64)
+        if pa.types.is_integer(kind) and column.null_count == 0:
+            return np.asarray(column.to_numpy(), dtype=np.int64)
+        values = np.empty(len(column), dtype=object)
+        values[:] = column.to_pylist()
+        return values
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a column, "1" where it has none.
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        return self._told(name, "unit") or "1"
+
+    def description(self, name: str) -> str:
+        """Return what a column is, in words; "" where nothing is said.
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        return self._told(name, "description")
+
+    def where(self, **values: Any) -> "CampaignTable":
+        """Return the rows in which columns, such as parameters, have the given values; numbers may be texts.
+
+        Raises:
+            KeyError: there is no such column. ValueError: a text is no number where the column has numbers.
+        """
+        fits = np.ones(len(self), dtype=bool)
+        for name, value in values.items():
+            fits &= self._equals(name, value)
+        return CampaignTable(self.table.filter(pa.array(fits)))
+
+    def _equals(self, name: str, value: Any) -> NDArray[np.bool_]:
+        kind = self._kind(name)
+        if isinstance(value, str) and pa.types.is_boolean(kind):
+            value = value.lower() == "true"
+        elif isinstance(value, str) and (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
+            value = float(value)
+        elif pa.types.is_list(kind):
+            wanted = list(map(float, value.split(",") if isinstance(value, str) else cast(Sequence[float], value)))
+            return np.array([row == wanted for row in self.column(name)], dtype=bool)
+        return np.array([row == value for row in self.column(name)], dtype=bool)
+
+    def _kind(self, name: str) -> pa.DataType:
+        return cast(Any, self.table.schema.field(self._known(name))).type
+
+    def _of_role(self, role: str) -> tuple[str, ...]:
+        return tuple(name for name in self.table.column_names if self._told(name, "role") == role)
+
+    def _told(self, name: str, fact: str) -> str:
+        metadata: Mapping[bytes, bytes] = self.table.schema.field(self._known(name)).metadata or {}
+        return metadata.get(fact.encode(), b"").decode()
+
+    def _known(self, name: str) -> str:
+        if name not in self.table.column_names:
+            raise KeyError(f"no column {name!r}: {nearest(name, self.table.column_names)}")
+        return name

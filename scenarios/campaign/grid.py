@@ -1,0 +1,123 @@
+"""Turns `name=values` texts into the points of a campaign; every fault is told at once, with what would be right."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cosim.exceptions import nearest
+from cosim.variable import Kind, Variable
+from scenarios.campaign.plan import MOST_RUNS
+from scenarios.experiment import Experiment
+from scenarios.parameters import BadParameter, parse_value, text_of
+
+
+def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[dict[str, str]]:
+    """Return all combinations of the given parameters' values, the last parameter varying fastest.
+
+    Values are `v1,v2,...`, of arrays `a,b,c;d,e,f;...`, or `START:STOP:N`, N evenly spaced numbers with both ends.
+    Where nothing is given, there is one point, which sets nothing.
+
+    Raises:
+        BadParameter: with every fault of the given texts.
+    """
+    known = {v.name: v for v in experiment.parameters()}
+    axes: dict[str, list[str]] = {}
+    faults: list[str] = []
+    for text in given:
+        name, equals, values = text.partition("=")
+        if not equals:
+            faults.append(f"{text!r} is not of the form name=v1,v2,... or name=START:STOP:N")
+        elif name not in known:
+            faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
+        elif name in axes:
+            faults.append(f"{name} is given twice")
+        else:
+            axes[name], found = _axis(known[name], values)
+            faults += [f"{name}: {fault}" for fault in found]
+    points = math.prod(map(len, axes.values()))
+    if points > MOST_RUNS:
+        faults.append(f"the grid has {points:,} points; at most {MOST_RUNS:,} runs can be planned")
+    if faults:
+        raise BadParameter(faults)
+    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
+
+
+def set_parameters(
+    experiment: type[Experiment[Any]], given: Sequence[str], varied: Sequence[Mapping[str, str]]
+) -> dict[str, str]:
+    """Return the parameters that are the same at all points, in the order in which they are given.
+
+    Raises:
+        BadParameter: one is unknown, given twice, or varied.
+    """
+    known = {v.name: v for v in experiment.parameters()}
+    fixed: dict[str, str] = {}
+    faults: list[str] = []
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals:
+            faults.append(f"{text!r} is not of the form name=value")
+        elif name not in known:
+            faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
+        elif name in fixed:
+            faults.append(f"{name} is given twice")
+        elif any(name in point for point in varied):
+            faults.append(f"{name} is varied and set by -p; one of both is right")
+        else:
+            fixed[name] = value
+    if faults:
+        raise BadParameter(faults)
+    return fixed
+
+
+def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
+    """Return the values of a parameter as texts, and what is wrong with them."""
+    if not text:
+        return [], ["the list of values is empty"]
+    numbers = variable.kind in (Kind.REAL, Kind.INTEGER)
+    if numbers and ":" in text:
+        values, fault = _range(variable, text)
+        if fault:
+            return [], [fault]
+    else:
+        values = text.split(";" if variable.shape else ",")
+    texts: list[str] = []
+    faults: list[str] = []
+    for value in values:
+        parsed, fault = parse_value(variable, value)
+        if not value and variable.kind is not Kind.STRING:
+            faults.append(f"{text!r} has an empty item")
+        elif fault:
+            faults.append(fault)
+        elif (canonical := text_of(variable, parsed)) in texts:
+            faults.append(f"{value} is given twice")
+        else:
+            texts.append(canonical)
+    return texts, list(dict.fromkeys(faults))
+
+
+def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:
+    """Return the values of `START:STOP:N`, rounded to 12 digits so that they read as they are meant."""
+    right = f"{text!r} is not of the form START:STOP:N"
+    parts = text.split(":")
+    if variable.shape:
+        return [], f"{variable.name} is an array, of which there are lists only, with ; between values"
+    if len(parts) != 3:
+        return [], f"{right}, such as 0.1:0.5:5"
+    try:
+        start, stop = float(parts[0]), float(parts[1])
+    except ValueError:
+        start = stop = math.nan
+    if not math.isfinite(start) or not math.isfinite(stop):
+        return [], f"{right}: START and STOP are finite numbers"
+    if not (parts[2].isascii() and parts[2].isdigit() and len(parts[2]) < 10 and int(parts[2]) >= 2):
+        return [], f"{right}: N is a whole number of values from 2 on"
+    if int(parts[2]) > MOST_RUNS:
+        return [], f"{text!r} has {int(parts[2]):,} values; at most {MOST_RUNS:,} runs can be planned"
+    if start == stop:
+        return [], f"{text!r} begins where it ends, at {start:g}"
+    between = [f"{x:.12g}" for x in np.linspace(start, stop, int(parts[2])).tolist()]
+    return [parts[0], *between[1:-1], parts[1]], None

@@ -1,0 +1,95 @@
+"""Checks all of a campaign's plan before any of its runs begins."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fmus.build import cached
+from scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
+from scenarios.chosen import fmus_of, replacements, scenario_named
+from scenarios.experiment import Experiment
+from scenarios.parameters import BadParameter, parse_parameters, text_of
+
+_MOST_TOLD = 8
+"""Faults that are told; there may be one a point."""
+
+
+def checked_plan(plan: CampaignPlan) -> CampaignPlan:
+    """Return the plan with each value in the one text that all plans of the same values have.
+
+    Raises:
+        BadCall: there is no such scenario.
+        BadParameter: it has too many runs or none, values do not fit the scenario, or do not fit each other.
+    """
+    experiment = scenario_named(plan.scenario)
+    _check_size(plan)
+    faults: dict[str, None] = {}
+    fixed: dict[str, str] = {}
+    points: list[dict[str, str]] = []
+    for point in plan.points:
+        try:
+            given = {**plan.fixed, **point}
+            parameters = parse_parameters(experiment, [f"{name}={value}" for name, value in given.items()])
+            _check_together(experiment, parameters, point)
+            texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
+            points.append({name: texts[name] for name in point})
+            fixed = {name: texts[name] for name in plan.fixed}
+        except BadParameter as e:
+            faults.update(dict.fromkeys(e.faults))
+    if len(faults) > _MOST_TOLD:
+        faults = {**dict.fromkeys(list(faults)[:_MOST_TOLD]), f"and {len(faults) - _MOST_TOLD} faults more": None}
+    if faults:
+        raise BadParameter(tuple(faults))
+    return replace(plan, points=points, fixed=fixed)
+
+
+def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
+    """Return the FMU of each unit: that of the plan, or the catalog's.
+
+    Raises:
+        BadCall: the plan has one for a unit that the scenario does not have, or the catalog's cannot be built.
+    """
+    experiment = scenario_named(plan.scenario)
+    others = replacements(experiment, [f"{name}={file}" for name, file in plan.units.items()])
+    return fmus_of(experiment, others, lambda unit: cached(unit, 3))
+
+
+def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
+    """Check that the FMUs make up the scenario's system, as those that take the place of others need not.
+
+    Raises:
+        InvalidFmu, WiringError, ScheduleError: they do not.
+    """
+    experiment = scenario_named(plan.scenario)
+    given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
+    experiment().build(parse_parameters(experiment, given), plan.seed, lambda unit: fmus[unit])
+
+
+def _check_size(plan: CampaignPlan) -> None:
+    if not plan.points or plan.repetitions < 1:
+        raise BadParameter(["the campaign has no runs"])
+    if plan.repetitions > MOST_REPETITIONS:
+        raise BadParameter([f"{plan.repetitions:,} repetitions; at most {MOST_REPETITIONS:,} can be planned"])
+    if plan.size > MOST_RUNS:
+        told = f"{len(plan.points):,} points times {plan.repetitions:,} repetitions are {plan.size:,} runs"
+        raise BadParameter([f"{told}; at most {MOST_RUNS:,} can be planned"])
+
+
+class _AtUnits(Exception):
+    """The scenario has checked its parameters and asks for its first FMU."""
+
+
+def _check_together(experiment: type[Experiment[Any]], parameters: Any, point: Mapping[str, str]) -> None:
+    """Let a scenario check its parameters against each other, which it does before it asks for FMUs."""
+
+    def stop(_unit: str) -> NoReturn:
+        raise _AtUnits
+
+    try:
+        with suppress(_AtUnits):
+            experiment().build(parameters, 0, stop)
+    except BadParameter as e:
+        where = f"at {', '.join(f'{name}={value}' for name, value in point.items())}: " if point else ""
+        raise BadParameter([f"{where}{fault}" for fault in e.faults]) from e

@@ -1,0 +1,44 @@
+"""Units as one reads them in plots and tables: mm for small lengths, degrees for angles."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True)
+class ShownUnit:
+    """A unit to show values in: what an SI value is multiplied by, and how the unit is written; "" for pure numbers."""
+
+    factor: float
+    symbol: str
+
+    def axis(self, quantity: str) -> str:
+        """Return an axis' title."""
+        return f"{quantity} ({self.symbol})" if self.symbol else quantity
+
+    def text(self, value: float) -> str:
+        """Return a value with its unit, to four digits."""
+        if not math.isfinite(value):
+            return "–"
+        return f"{value * self.factor:.4g} {self.symbol}".rstrip()
+
+
+def shown_unit(unit: str, values: ArrayLike) -> ShownUnit:
+    """Return the unit in which to show values of an SI unit, by the largest of them."""
+    x = np.abs(np.asarray(values, dtype=np.float64))
+    finite = x[np.isfinite(x)]
+    most = float(finite.max()) if finite.size else 0.0
+    smaller = {"m": (1.0, 1e3, "mm"), "m2": (1e-2, 1e6, "mm²"), "s": (0.1, 1e3, "ms"), "kg": (0.5, 1e3, "g")}
+    if unit in smaller and most < smaller[unit][0]:
+        return ShownUnit(smaller[unit][1], smaller[unit][2])
+    if unit == "s" and most >= 3.6e4:
+        return ShownUnit(1 / 3600, "h")
+    if unit in ("rad", "rad/s"):
+        return ShownUnit(180.0 / math.pi, unit.replace("rad", "°"))
+    if unit == "B":
+        return ShownUnit(1e-6, "MB")
+    if unit == "Pa" and most >= 1e3:
+        return ShownUnit(1e-3, "kPa")
+    return ShownUnit(1.0, "" if unit == "1" else unit.replace(".", "·").replace("m2", "m²").replace("s2", "s²"))

@@ -1,0 +1,170 @@
+"""Writes the table of a campaign as its runs end."""
+
+import contextlib
+import math
+import os
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from cosim.variable import Kind, Variable
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.run_row import RunRow
+from scenarios.chosen import scenario_named
+from scenarios.experiment import Metric
+from scenarios.parameters import parse_value
+from scenarios.run_folder import told_if_not_written
+
+_SHARE = 0.005
+"""Part of the time that may go into writing tables before the last one."""
+
+_PAUSE = 1.0
+"""Seconds that pass at least from table to table."""
+
+_BEGIN = (
+    ("run", pa.string(), "", "name of the run's folder in runs/"),
+    ("point", pa.int64(), "1", "number of the point, from 0"),
+    ("repetition", pa.int64(), "1", "number of the point's repetition, from 0"),
+    ("seed", pa.int64(), "1", "seed of all random numbers"),
+    ("status", pa.string(), "", "done; failed: a unit failed, or the run crashed; lost: no worker came back with it"),
+    ("success", pa.bool_(), "", "whether the task succeeded; null where the run is not done"),
+    ("reason", pa.string(), "", "how it ended"),
+)
+_SPENT = (
+    ("simulated_seconds", "simulated time"),
+    ("wall_seconds", "time that the run took"),
+    ("cpu_seconds", "time of the processor that the run took"),
+)
+_TYPES: Mapping[Kind, pa.DataType] = {
+    Kind.REAL: pa.float64(),
+    Kind.INTEGER: pa.int64(),
+    Kind.BOOLEAN: pa.bool_(),
+    Kind.ENUMERATION: pa.string(),
+    Kind.STRING: pa.string(),
+}
+
+
+class TableWriter:
+    """Keeps `runs.parquet`, the table that `CampaignTable` reads: whole at any time, seldom enough to cost nothing.
+
+    Rows are in the order of the plan. A metric that is called like another column gets the suffix `_metric`.
+    """
+
+    def __init__(self, plan: CampaignPlan, path: Path) -> None:
+        self._plan = plan
+        self._path = path
+        self._order = {run.name: number for number, run in enumerate(plan.runs())}
+        self._rows: dict[str, RunRow] = {}
+        self._next = 0.0
+
+    def add(self, row: RunRow) -> None:
+        """Take a row, in place of one of the same run.
+
+        Raises:
+            RecordNotWritten: the table cannot be written.
+        """
+        self._rows[row.run.name] = row
+        if time.monotonic() >= self._next:
+            self.write()
+
+    def keep(self, rows: Iterable[RunRow]) -> None:
+        """Take rows without writing."""
+        self._rows.update({row.run.name: row for row in rows})
+
+    @property
+    def rows(self) -> list[RunRow]:
+        """The rows."""
+        return sorted(self._rows.values(), key=lambda row: self._order[row.run.name])
+
+    def write(self) -> None:
+        """Write the table, whole or not at all.
+
+        Raises:
+            RecordNotWritten: it cannot be written.
+        """
+        began = time.monotonic()
+        unfinished = self._path.with_name(self._path.name + ".part")
+        with told_if_not_written(self._path):
+            try:
+                pq.write_table(table_of(self._plan, self.rows), unfinished)
+                os.replace(unfinished, self._path)
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    unfinished.unlink(missing_ok=True)
+                raise
+        took = time.monotonic() - began
+        self._next = began + took + max(_PAUSE, took / _SHARE)
+
+
+def table_of(plan: CampaignPlan, rows: Sequence[RunRow]) -> pa.Table:
+    """Return rows as a table; the plan is a checked one."""
+    columns: list[pa.Field[Any]] = []
+    values: list[list[Any]] = []
+
+    def add(name: str, kind: pa.DataType, role: str, unit: str, description: str, column: list[Any]) -> None:
+        columns.append(pa.field(name, kind, metadata={"role": role, "unit": unit, "description": description}))
+        values.append(column)
+
+    for name, kind, unit, description in _BEGIN:
+        add(name, kind, "run", unit, description, [_of_run(row, name) for row in rows])
+    for variable in _set_parameters(plan):
+        kind = _type_of(variable)
+        unit = variable.unit.symbol if variable.kind in (Kind.REAL, Kind.INTEGER) else ""
+        at = [_plain(variable, _text(plan, point, variable.name)) for point in range(len(plan.points))]
+        add(variable.name, kind, "parameter", unit, variable.description, [at[row.run.point] for row in rows])
+    for name, description in _SPENT:
+        add(name, pa.float64(), "run", "s", description, [getattr(row, name.partition("_")[0]) for row in rows])
+    taken = {column.name for column in columns}
+    for name, metric in _metrics(rows).items():
+        column = [_finite(row.metrics[name].value) if name in row.metrics else None for row in rows]
+        unique = f"{name}_metric" if name in taken else name
+        add(unique, pa.float64(), "metric", metric.unit, metric.description, column)
+    arrays: list[Any] = [pa.array(v, type=c.type) for v, c in zip(values, columns, strict=True)]
+    return pa.Table.from_arrays(arrays, schema=pa.schema(columns))
+
+
+def _of_run(row: RunRow, name: str) -> Any:
+    run = row.run
+    known = {"run": run.name, "point": run.point, "repetition": run.repetition, "seed": run.seed}
+    return known[name] if name in known else getattr(row, name)
+
+
+def _set_parameters(plan: CampaignPlan) -> list[Variable]:
+    """Return the parameters that the plan sets at any point, those that are varied first."""
+    known = {v.name: v for v in scenario_named(plan.scenario).parameters()}
+    names = dict.fromkeys([*(name for point in plan.points for name in point), *plan.fixed])
+    return [known[name] for name in names]
+
+
+def _text(plan: CampaignPlan, point: int, name: str) -> str | None:
+    return plan.points[point].get(name, plan.fixed.get(name))
+
+
+def _plain(variable: Variable, text: str | None) -> Any:
+    """Return a parameter's value as a column has it: what a point does not set is the parameter's start."""
+    value = variable.start if text is None else parse_value(variable, text)[0]
+    if variable.enumeration is not None:
+        return str(value.name).lower()
+    return np.asarray(value).reshape(-1).tolist() if variable.shape else value
+
+
+def _type_of(variable: Variable) -> pa.DataType:
+    kind = _TYPES[variable.kind]
+    return pa.list_(kind) if variable.shape else kind
+
+
+def _metrics(rows: Sequence[RunRow]) -> dict[str, Metric]:
+    metrics: dict[str, Metric] = {}
+    for row in rows:
+        for name, metric in row.metrics.items():
+            metrics.setdefault(name, metric)
+    return metrics
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

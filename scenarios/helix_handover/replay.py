@@ -1,0 +1,168 @@
+"""A Helix handover in space: arm, gripper, ball, hand, the cameras, and where the controller took ball and gripper."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cosim.geometry import rotation_of
+from cosim.ports import Floats
+from plants.gripper_figure import gripper
+from plants.hand_figure import hand
+from plants.limb import Limb
+from plants.stereo_camera import Params as CameraParams
+from plants.tendon_parameters import Params as ArmParams
+from scenarios.helix_handover.rig import camera_of
+from scenarios.record import Record
+from scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
+from scenarios.reporting.replay import Body, Line, Replay
+
+_ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
+_SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8357a8", "#d1602b"
+
+_PLATE_THICKNESS, _PLATE_RADIUS = 0.008, 1.15
+"""m, and over the arm's radius (assumed)."""
+
+_FRUSTUM = 0.09
+"""Length of a camera's frustum as it is drawn, m."""
+
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+_OCTAGON = np.radians(np.arange(22.5, 360.0, 45.0))
+
+
+def replay_handover(record: Record) -> Replay:
+    """Return the scene of a run over its time."""
+    arm = Line(label="arm", colour=_ARM, points=record["arm.backbone"], radii=np.full(25, CameraParams().arm_radius))
+    cameras = [_frustum(side) for side in ("left", "right")]
+    return Replay(
+        bodies=[*_plates(record), _collar(record), *_gripper_body(record), *_hand_body(record), _ball(record)],
+        lines=[arm, *_fingers(record), *_forearm(record), *_estimates(record)],
+        fixed=cameras,
+        eye=(-0.35, -1.25, 0.35),
+        middle=(-0.25, 0.0, -0.4),
+        phases="servo.phase",
+        notes=("Where things were; orange: where the controller took ball and gripper to be.",),
+        window=_window(record, cameras),
+    )
+
+
+def _ball(record: Record) -> Body:
+    mesh = ball(CameraParams().ball_radius)
+    return Body(label="ball", colour=_BALL, mesh=mesh, p_WB=record["hand.p_WO"])
+
+
+def _plates(record: Record) -> list[Body]:
+    """Return the plates that end the arm's segments: where they are along the calibrated arm, square to it."""
+    backbone, lengths = record["arm.backbone"], ArmParams().tendon_length
+    ends = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / float(np.sum(lengths)) * (backbone.shape[1] - 1)
+    radius = _PLATE_RADIUS * CameraParams().arm_radius
+    outline = radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+    mesh = prism(outline, -_PLATE_THICKNESS / 2, _PLATE_THICKNESS / 2)
+    made: list[Body] = []
+    for k in np.rint(ends).astype(int):
+        along = backbone[:, k + 1] - backbone[:, max(k - 1, 0)]
+        made.append(Body(label="arm", colour=_PLATE, mesh=mesh, p_WB=backbone[:, k], q_WB=_turned_to(along)))
+    return made
+
+
+def _turned_to(along: Floats) -> Floats:
+    """Return orientations, shape (rows, 4), that turn z the shortest way to directions, shape (rows, 3)."""
+    z = along / np.linalg.norm(along, axis=1, keepdims=True)
+    about = np.cross([0.0, 0.0, -1.0], z)  # the arm hangs, so that no direction is opposite
+    q = np.column_stack([1.0 - z[:, 2], about])
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def _collar(record: Record) -> Body:
+    """Return the eight-sided ring with the markers at the wrist."""
+    apothem = CameraParams().apothem
+    corners = apothem / np.cos(np.pi / 8.0) * np.column_stack([np.cos(_OCTAGON), np.sin(_OCTAGON)])
+    half = apothem * np.tan(np.pi / 8.0)
+    mesh = prism(corners, -half, half)
+    return Body(label="marker ring", colour=_COLLAR, mesh=mesh, p_WB=record["arm.p_WR"], q_WB=record["arm.q_WR"])
+
+
+def _gripper_body(record: Record) -> list[Body]:
+    """Return stem and knuckle, which stay as they are in G; the plant draws them first."""
+    stem = gripper(np.array([0.0, 0.0, -ArmParams().d_gripper]), np.zeros(3), np.eye(3), 0.0)[:2]
+    return [Body(label="gripper", colour=_METAL, mesh=_solid(stem), p_WB=record["arm.p_WG"], q_WB=record["arm.q_WG"])]
+
+
+def _fingers(record: Record) -> list[Line]:
+    """Return the three fingers, each from its root over its joint to its tip."""
+
+    def limbs(row: int) -> list[Limb]:
+        p_WG, R_WG = record_at["p_WG"][row], rotation_of(record_at["q_WG"][row])
+        return gripper(record_at["p_WR"][row], p_WG, R_WG, float(record_at["grip"][row]))[2:]
+
+    record_at = {name: record[f"arm.{name}"] for name in ("p_WR", "p_WG", "q_WG", "grip")}
+    seen = _followed(limbs, len(record.time))  # (rows, 9, 3, 3): root to joint, joint to pad, pad to tip, three times
+    first = limbs(0)
+    made: list[Line] = []
+    for k in range(0, len(first), 3):
+        points = np.stack([seen[:, k, 0], seen[:, k, 2], seen[:, k + 2, 2]], axis=1)
+        radii = np.array([first[k].radii[0], first[k].radii[2], first[k + 2].radii[2]])
+        made.append(Line(label="gripper", colour=_FINGER, points=points, radii=radii))
+    return made
+
+
+def _hand_body(record: Record) -> list[Body]:
+    """Return palm and fingers, which keep their shape; the hand turns about z with its forearm."""
+    p_WH = record["hand.p_WH"]
+    seen = _followed(lambda row: hand(p_WH[row])[2:], len(p_WH)) - p_WH[:, None, None]
+    pointing = seen[:, -2, 2] - seen[:, 0, 0]
+    yaw = np.unwrap(np.arctan2(pointing[:, 1], pointing[:, 0]))
+    first = [Limb(x.points - p_WH[0], x.radii, x.colour) for x in hand(p_WH[0])[2:]]
+    q_WH = Rotation.from_euler("z", (yaw - yaw[0])[:, None]).as_quat(scalar_first=True)
+    return [Body(label="hand", colour=_SKIN, mesh=_solid(first), p_WB=p_WH, q_WB=q_WH)]
+
+
+def _forearm(record: Record) -> list[Line]:
+    p_WH = record["hand.p_WH"]
+    seen, first = _followed(lambda row: hand(p_WH[row])[:2], len(p_WH)), hand(p_WH[0])[:2]
+    ends = (0, 2)
+    return [
+        Line(label="hand", colour=colour, points=seen[:, k][:, ends], radii=first[k].radii[list(ends)])
+        for k, colour in ((0, _SKIN), (1, _SLEEVE))
+    ]
+
+
+def _estimates(record: Record) -> list[Line]:
+    """Return where the controller took ball and gripper to be, from when it knew."""
+    known = (record["servo.phase"] > 0)[:, None]
+    named = (("ball, estimated", "servo.p_WO_est"), ("gripper, estimated", "servo.p_WG_est"))
+    return [
+        Line(label=label, colour=_ESTIMATE, points=np.where(known, record[signal], np.nan)[:, None], width=5.0)
+        for label, signal in named
+    ]
+
+
+def _frustum(side: str) -> Line:
+    """Return the edges of what a camera sees, near to it."""
+    camera = camera_of(side)
+    u, v = camera.c
+    depth = _FRUSTUM * np.array([[s * u / camera.f[0], t * v / camera.f[1], 1.0] for s, t in _CORNERS])
+    corners = camera.p_WC + depth @ np.transpose(camera.R_WC)
+    eye, (a, b, c, d) = camera.p_WC, corners
+    way = np.array([[eye, a, b, eye, c, d, eye, a, d, c, b]])
+    return Line(label="cameras", colour=_CAMERA, points=way, width=2.0)
+
+
+_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+
+
+def _followed(limbs: Callable[[int], list[Limb]], rows: int) -> Floats:
+    """Return the points of limbs over time, shape (rows, limbs, 3, 3)."""
+    return np.array([[x.points for x in limbs(row)] for row in range(rows)])
+
+
+def _solid(limbs: list[Limb]) -> Mesh:
+    return merged([rod(x.points, x.radii) for x in limbs])
+
+
+def _window(record: Record, cameras: list[Line]) -> Floats:
+    """Return corners around arm, gripper, ball, hand and cameras; the forearm runs out of it."""
+    seen = [record[s].reshape(-1, 3) for s in ("arm.backbone", "arm.p_WG", "hand.p_WO", "hand.p_WH")]
+    reach = 0.12  # of the gripper's fingers and of the hand, with some room
+    points = np.vstack([*(np.vstack([p - reach, p + reach]) for p in seen), *(c.points[0] for c in cameras)])
+    return np.array([points.min(axis=0), points.max(axis=0)])

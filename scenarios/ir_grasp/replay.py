@@ -1,0 +1,68 @@
+"""A grasp on the table in space: palm, phalanges, the object, and the beams of the sensors."""
+
+import numpy as np
+
+from controllers.reflex_parameters import Params as ReflexParams
+from cosim.ports import Floats
+from plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
+from plants.grasp_objects import outlines
+from scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
+from scenarios.ir_grasp.parameters import Parameters
+from scenarios.ir_grasp.plots import FINGER_NAMES
+from scenarios.record import Record
+from scenarios.reporting.meshes import Mesh, merged, prism
+from scenarios.reporting.replay import Body, Line, Replay
+
+_BEAM = "#8357a8"
+_HEIGHT, _PALM_LOW, _PALM_HIGH, _THING_HIGH = 0.025, 0.012, 0.038, 0.055
+"""Of the fingers' middles above the table, of the palm's faces and of the object, m: the scene is planar (assumed)."""
+
+
+def replay_grasp(parameters: Parameters, record: Record) -> Replay:
+    """Return hand, object and beams over a run's time."""
+    parts = [prism(outline, 0.0, _THING_HIGH) for outline in outlines(parameters.thing)]
+    fingers, beams = _moving(record)
+    return Replay(
+        bodies=[
+            _turning("palm", PALM_COLOUR, prism(np.array(PALM), _PALM_LOW, _PALM_HIGH), record, "p_WH", "yaw"),
+            _turning("object", THING_COLOUR, merged(parts), record, "p_WO", "yaw_O"),
+        ],
+        lines=[*fingers, *beams],
+        eye=(-0.35, -0.7, 1.35),
+        phases="reflex.phase",
+        notes=("The scene is planar; heights above the table are only drawn. Beams end at what they meet.",),
+    )
+
+
+def _turning(label: str, colour: str, mesh: Mesh, record: Record, place: str, yaw: str) -> Body:
+    p, half = record[f"scene.{place}"], record[f"scene.{yaw}"] / 2.0
+    none = np.zeros(len(p))
+    return Body(
+        label=label,
+        colour=colour,
+        mesh=mesh,
+        p_WB=np.column_stack([p, none]),
+        q_WB=np.column_stack([np.cos(half), none, none, np.sin(half)]),
+    )
+
+
+def _moving(record: Record) -> tuple[list[Line], list[Line]]:
+    """Return the fingers, and the beams as far as they reach."""
+    p_WH, yaw, q = record["scene.p_WH"], record["scene.yaw"], record["scene.q"]
+    hands = [finger_points(p_WH[k], float(yaw[k]), q[k]) for k in range(len(yaw))]
+    rays = [sensor_rays(p_WH[k], float(yaw[k]), q[k]) for k in range(len(yaw))]
+    origins, directions = (np.array(values) for values in zip(*rays, strict=True))
+    reach = np.minimum(record["scene.range"], ReflexParams().distance_max)[:, :, None]
+    beams = np.stack([origins, origins + reach * directions], axis=2)  # (rows, fingers, 2, 2)
+    fingers: list[Line] = []
+    for i, finger in enumerate(FINGERS):
+        points = np.array([hand[i] for hand in hands])
+        radii = np.array([*finger.radii, finger.radii[-1]])
+        fingers.append(Line(label=FINGER_NAMES[i], colour=FINGER_COLOURS[i], points=_raised(points), radii=radii))
+    lines = [Line(label="beams", colour=_BEAM, points=_raised(beams[:, i]), width=3.0) for i in range(len(FINGERS))]
+    return fingers, lines
+
+
+def _raised(points: Floats) -> Floats:
+    """Return points on the table, shape (rows, n, 2), at the fingers' height."""
+    return np.concatenate([points, np.full((*points.shape[:2], 1), _HEIGHT)], axis=2)

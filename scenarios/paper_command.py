@@ -1,0 +1,100 @@
+"""The command `handover paper`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from rich.table import Table
+from rich.text import Text
+
+from cosim.exceptions import nearest
+from scenarios.bad_call import BadCall
+from scenarios.campaign_arguments import campaign_options
+from scenarios.campaign_call import call_campaign, workforce
+from scenarios.console import open_console
+from scenarios.headed_options import HeadedCommand
+
+if TYPE_CHECKING:
+    from scenarios.campaign.campaign_folder import CampaignFolder
+    from scenarios.campaign.campaign_table import CampaignTable
+    from scenarios.published.published_experiment import PublishedExperiment
+
+_HELP = """Carry out a paper's EXPERIMENT, and put what comes out beside what was published.
+
+Without EXPERIMENT, list them.
+
+Each claim of the paper gets a verdict, reproduced, not reproduced or not comparable, with the rule that it was given
+by. Rules were laid down before the runs. Intervals are at 95 %: Clopper and Pearson's for rates, bootstrapped for times
+and distances.
+
+The folder is that of a campaign, as of `handover sweep`, with claims.json, and figures for papers in figures/. However
+it was ended, the same call goes on and repeats nothing that is done.
+
+\b
+Exit status
+  0    it ran, whatever the verdicts
+  1    interrupted with Ctrl-C; the same call goes on
+  2    bad call or bad input; nothing was written
+  3    a unit failed in a run, a run was lost, or the disk is full; what is done is kept
+  130  aborted with Ctrl-C: before the first run, or by a second one
+"""
+
+
+@click.command("paper", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
+@click.argument("experiment", required=False, metavar="[EXPERIMENT]")
+@click.option("--quick", is_flag=True, help="A fraction of the runs; most claims need all.")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of the campaign.  [default: the experiment's]")
+@campaign_options
+def paper(
+    experiment: str | None,
+    quick: bool,
+    seed: int | None,
+    out: Path | None,
+    no_report: bool,
+    workers: int | None,
+    scheduler: str | None,
+) -> None:
+    """Carry out a paper's EXPERIMENT."""
+    from scenarios.published.catalog import EXPERIMENTS  # its statistics take long to load
+
+    if experiment is None:
+        _list(EXPERIMENTS.values())
+        return
+    if experiment not in EXPERIMENTS:
+        raise BadCall(f"no experiment {experiment!r}: {nearest(experiment, EXPERIMENTS)}")
+    carried_out = EXPERIMENTS[experiment]()
+    plan = carried_out.plan(quick)
+    plan = plan if seed is None else replace(plan, seed=seed)
+    finish = partial(_finish, carried_out, report=not no_report)
+    call = call_campaign(replace(plan, experiment=experiment), out, workforce(workers, scheduler), finish)
+
+    from scenarios.published.told_results import print_results
+
+    print_results(carried_out, call.table, call.folder)
+    sys.exit(call.status)
+
+
+def _finish(experiment: PublishedExperiment, folder: CampaignFolder, table: CampaignTable, *, report: bool) -> None:
+    """Write claims, figures and, if it is wanted, the page."""
+    from scenarios.published.results import write_results
+    from scenarios.reporting.campaign_page import write_campaign_page
+
+    write_results(experiment, table, folder)
+    if report:
+        write_campaign_page(folder.path)
+
+
+def _list(experiments: Iterable[type[PublishedExperiment]]) -> None:
+    rows = Table(box=None, padding=(0, 2), pad_edge=True)
+    for heading in ("experiment", "runs", "quick", ""):
+        rows.add_column(heading, justify="right" if heading in ("runs", "quick") else "left")
+    for kind in experiments:
+        full, quick = (str(kind().plan(q).size) for q in (False, True))
+        rows.add_row(Text(kind.name), full, quick, Text(kind.title))
+    open_console().print(rows)

@@ -1,0 +1,26 @@
+"""What the claims of `helix-1` are told with."""
+
+from typing import Any
+
+from scenarios.paper import paper_values
+from scenarios.published.claim import Claim, Verdict
+from scenarios.published.helix_1_arm import Helix1Arm
+
+FEWEST = 3
+"""Runs below which no interval is told."""
+
+
+def published() -> dict[str, Any]:
+    """Return the published values by name."""
+    return paper_values("helix_handover", "published")
+
+
+def too_few(told: dict[str, Any], what: str) -> Claim:
+    """Return the claim, told but for what came out, as one that so few runs say nothing of."""
+    return Claim(**told, measured="", verdict=Verdict.NOT_COMPARABLE, reason=f"Too few runs to tell: {what}.")
+
+
+def missing(arm: Helix1Arm, *alphas: float) -> str:
+    """Tell how many runs have no time, as their gripper never began to close; nothing if all have one."""
+    number = sum(len(arm.rows[alpha]) - len(arm.times(alpha)) for alpha in alphas)
+    return f" Without {number} runs in which the gripper never began to close." if number else ""

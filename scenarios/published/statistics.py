@@ -1,0 +1,123 @@
+"""Intervals and exact tests for campaigns, by scipy.stats."""
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import binomtest, bootstrap, fisher_exact
+
+LEVEL = 0.05
+"""Of all tests; intervals are at 1 - LEVEL."""
+
+_FEWEST = 3
+"""Values below which a bootstrap says nothing: of two there are but three different resamples."""
+
+_RESAMPLES = 9999
+
+_METHODS: tuple[tuple[Literal["BCa", "percentile"], str], ...] = (
+    ("BCa", "BCa bootstrap"),
+    ("percentile", "percentile bootstrap, as BCa is not defined"),
+)
+
+Statistic = Callable[..., Any]
+"""Takes values and `axis`, like np.median."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A confidence interval, and how it was made."""
+
+    low: float
+    high: float
+    method: str
+
+
+@dataclass(frozen=True)
+class PairedTest:
+    """McNemar's exact test of pairs of successes.
+
+    Attributes:
+        only_first: pairs in which only the first succeeded.
+        only_second: pairs in which only the second did.
+        p: how probable so uneven a split, either way, is if neither does better.
+    """
+
+    only_first: int
+    only_second: int
+    p: float
+
+    @property
+    def first_is_better(self) -> bool:
+        """Whether the test rejects, and the first succeeded where the second did not more often than the reverse."""
+        return self.p < LEVEL and self.only_first > self.only_second
+
+
+def success_interval(successes: int, n: int, confidence: float = 1.0 - LEVEL) -> Interval:
+    """Return the interval of Clopper and Pearson for a rate of success.
+
+    Raises:
+        ValueError: there are no trials, or more successes than trials.
+    """
+    if n < 1 or not 0 <= successes <= n:
+        raise ValueError(f"{successes} successes of {n} trials: there must be a trial, and a success is one of them")
+    ci = binomtest(successes, n).proportion_ci(confidence_level=confidence, method="exact")
+    return Interval(float(ci.low), float(ci.high), "Clopper-Pearson")
+
+
+def time_interval(
+    values: ArrayLike, statistic: Statistic = np.median, seed: int = 0, confidence: float = 1.0 - LEVEL
+) -> Interval | None:
+    """Return the bootstrap's interval (BCa) for a statistic of values, such as np.median or np.mean.
+
+    Where BCa is not defined, as where no single value left out moves the statistic, it is the percentile interval, and
+    says so. None if there are fewer than three values. Values that are NaN do not count.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    x = x[~np.isnan(x)]
+    if len(x) < _FEWEST:
+        return None
+    for method, told in _METHODS:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that BCa is not defined: told by its interval, which is NaN
+            ci = bootstrap(
+                (x,),
+                statistic,
+                n_resamples=_RESAMPLES,
+                confidence_level=confidence,
+                method=method,
+                rng=np.random.default_rng(seed),
+            ).confidence_interval
+        if np.isfinite(ci.low) and np.isfinite(ci.high):
+            return Interval(float(ci.low), float(ci.high), told)
+    return None
+
+
+def paired_test(first: Sequence[bool], second: Sequence[bool]) -> PairedTest:
+    """Return McNemar's exact test of successes in the same scenes: a sign test on the pairs that differ.
+
+    Raises:
+        ValueError: the two are not of one length.
+    """
+    pairs = list(zip(first, second, strict=True))
+    only_first = sum(a and not b for a, b in pairs)
+    only_second = sum(b and not a for a, b in pairs)
+    differ = only_first + only_second
+    return PairedTest(only_first, only_second, float(binomtest(only_first, differ).pvalue) if differ else 1.0)
+
+
+def two_proportions(successes: int, n: int, others: int, n_others: int) -> float:
+    """Return the p-value, two-sided, of Fisher's exact test of two rates of success in trials that are not paired."""
+    table = np.array([[successes, n - successes], [others, n_others - others]])
+    return float(fisher_exact(table).pvalue)
+
+
+def compatible_counts(successes: int, n: int, n_others: int) -> tuple[int, int]:
+    """Return the fewest and the most successes of `n_others` that Fisher's test cannot tell from `successes` of `n`.
+
+    They say what the test could have found: where they span all counts, nothing.
+    """
+    kept = [k for k in range(n_others + 1) if two_proportions(k, n_others, successes, n) >= LEVEL]
+    return kept[0], kept[-1]

@@ -1,0 +1,64 @@
+"""What the end of a published experiment prints: ours beside the published, and the verdicts with their reasons."""
+
+from collections import Counter
+
+from rich.console import Console
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.console import open_console
+from scenarios.published.claim import Claim, Verdict
+from scenarios.published.comparison_table import ComparisonTable
+from scenarios.published.published_experiment import PublishedExperiment
+
+_STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red", Verdict.NOT_COMPARABLE: "bold"}
+
+
+def print_results(experiment: PublishedExperiment, table: CampaignTable, folder: CampaignFolder) -> None:
+    """Print tables, claims, and where the rest is."""
+    console = open_console()
+    console.print(f"{experiment.name}: {experiment.title}", style="bold", markup=False)
+    for compared in experiment.tables(table):
+        _print_table(console, compared)
+    claims = experiment.claims(table)
+    for beyond, heading in ((False, "Claims"), (True, "Beyond the paper")):
+        told = [claim for claim in claims if claim.beyond is beyond]
+        if told:
+            console.print(f"\n{heading}", style="bold")
+        for claim in told:
+            _print_claim(console, claim)
+    counts = Counter(claim.verdict for claim in claims)
+    console.print("\nIn all: " + ", ".join(f"{counts[v]} {v.value}" for v in Verdict if counts[v]))
+    console.print(f"claims: {folder.path / 'claims.json'}", markup=False, soft_wrap=True)
+    console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
+    if folder.report.exists():
+        console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
+
+
+def _print_table(console: Console, compared: ComparisonTable) -> None:
+    rows = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
+    for heading in compared.header:
+        rows.add_column(Text(heading), overflow="fold")
+    for row in compared.rows:
+        rows.add_row(*map(Text, row))
+    console.print(f"\n{compared.title}", style="bold", markup=False)
+    console.print(Padding(rows, (0, 0, 0, 2)))
+    if compared.note:
+        console.print(Padding(Text(compared.note, style="dim"), (0, 0, 0, 2)))
+
+
+def _print_claim(console: Console, claim: Claim) -> None:
+    """Print the verdict and the claim, the figures below, then the reason."""
+    figures = [f"published: {claim.published}"] if claim.published else []
+    figures += [f"ours: {claim.measured}"] if claim.measured else []
+    if claim.interval is not None:
+        unit = "" if claim.unit == "1" else f" {claim.unit}"
+        figures.append(f"95 % interval: {claim.interval[0]:.3g} to {claim.interval[1]:.3g}{unit}")
+    where = f" ({claim.where})" if claim.where else ""
+    console.print(Text.assemble((claim.verdict.value, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
+    if figures:
+        console.print(Padding(Text("; ".join(figures)), (0, 0, 0, 4)))
+    console.print(Padding(Text(claim.reason, style="dim"), (0, 0, 0, 4)))

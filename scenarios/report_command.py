@@ -1,0 +1,53 @@
+"""The command `handover report`."""
+
+from pathlib import Path
+
+import click
+
+from scenarios.bad_call import BadCall, told_in_one_line
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.left_run import complete_signals
+from scenarios.reporting.campaign_page import write_campaign_page
+from scenarios.reporting.run_facts import RunFacts
+from scenarios.reporting.run_figures import draw_run
+from scenarios.reporting.run_page import write_run_page
+from scenarios.run_folder import RunFolder, check_place
+
+_HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
+
+DIR is the folder of a run or of a campaign. The page is made of what is in it, also of a run that was interrupted,
+killed, or that another version left: its record is completed first, and the page holds what there is.
+"""
+
+
+@click.command("report", help=_HELP, short_help="Write the page of a run or of a campaign.")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--figures", is_flag=True, help="Draw the figures anew too, as PNG and SVG, into DIR/figures.")
+@click.option(
+    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
+)
+def report(folder: Path, figures: bool, file: Path | None) -> None:
+    """Write the page of a run or of a campaign."""
+    with told_in_one_line():
+        if not folder.is_dir():
+            raise BadCall(f"{folder} is no folder; name that of a run or of a campaign")
+        page = file or folder / "report.html"
+        if page.is_dir():
+            raise BadCall(f"{page} is a folder; name a file for the page")
+        check_place(page.parent)
+        if figures:
+            check_place(folder)
+        if CampaignFolder(folder).is_there:
+            write_campaign_page(folder, page)
+        else:
+            _write_of_run(RunFolder.left_at(folder), page, figures)
+    click.echo(f"report: {page}")
+
+
+def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
+    with left.held():
+        RunFacts.read(left)  # before anything is completed: it may be no run's folder at all
+        complete_signals(left)
+        if figures:
+            draw_run(left)
+        write_run_page(left, page)

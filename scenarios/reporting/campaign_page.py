@@ -1,0 +1,58 @@
+"""Writes the page of a campaign, of what is in its folder."""
+
+from pathlib import Path
+
+from scenarios.campaign.campaign_figures import draw_campaign
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.point_layout import layout_of
+from scenarios.published.catalog import EXPERIMENTS
+from scenarios.reporting.campaign_facts import read_claims, read_results
+from scenarios.reporting.campaign_lead import campaign_lead
+from scenarios.reporting.claims_section import claims_section, comparison_section
+from scenarios.reporting.failures_section import failures_section
+from scenarios.reporting.figures_section import figures_section
+from scenarios.reporting.page import write_page
+from scenarios.reporting.pairs_section import pairs_section
+from scenarios.reporting.points_section import points_section
+from scenarios.reporting.runs_section import runs_section
+from scenarios.reporting.section import Section
+from scenarios.reporting.setting_section import setting_section
+from scenarios.reporting.spread_section import spread_section
+from scenarios.reporting.success_section import success_section
+from scenarios.run_folder import told_if_not_written
+
+
+def write_campaign_page(folder: CampaignFolder | Path, file: Path | None = None) -> None:
+    """Write a campaign's, or a paper's, page and its `figures/`; the campaign need not be complete.
+
+    Args:
+        folder: the campaign's.
+        file: where the page goes; by default `report.html` in the folder, beside which the runs' pages are linked.
+
+    Raises:
+        BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
+        RecordNotWritten: there is no room.
+    """
+    there = CampaignFolder(folder) if isinstance(folder, Path) else folder
+    results, claims = read_results(there), read_claims(there)
+    named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
+    experiment = None if named is None else named()
+    sections: list[Section | None] = [claims_section(claims)]
+    with told_if_not_written(there.figures):
+        draw_campaign(results, there.figures)
+        if experiment is not None and results.points:
+            sections.append(comparison_section(experiment.tables(results.table)))
+            there.figures.mkdir(exist_ok=True)
+            sections.append(figures_section(experiment.draw(results.table, there.figures), there.figures))
+    if results.points:
+        layout = layout_of(results)
+        sections += [success_section(results, layout), spread_section(results, layout)]
+    sections += [
+        points_section(results),
+        pairs_section(results),
+        failures_section(results, there.path),
+        runs_section(results, there.path),
+        setting_section(results),
+    ]
+    title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
+    write_page(file or there.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])

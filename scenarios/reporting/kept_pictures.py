@@ -1,0 +1,63 @@
+"""The camera pictures in a run's folder: JPEG files, and `pictures.json` that tells what they show."""
+
+import json
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from cosim.exceptions import one_line
+from scenarios.reporting.camera_picture import CameraPicture, Mark
+from scenarios.run_folder import BadRunFolder, told_if_not_written, write_whole
+
+_TOLD = ("t", "camera", "role", "width", "height")
+
+
+def write_pictures(folder: Path, pictures: Sequence[CameraPicture]) -> None:
+    """Write pictures into a folder, in place of those that are in it; without pictures there is no folder.
+
+    Raises:
+        RecordNotWritten: they cannot be written.
+    """
+    with told_if_not_written(folder):
+        if folder.exists():
+            shutil.rmtree(folder)
+        if not pictures:
+            return
+        folder.mkdir(parents=True)
+        told: list[dict[str, Any]] = []
+        for number, picture in enumerate(pictures, start=1):
+            file = f"{number:02}_{_plain(picture.role)}_{_plain(picture.camera)}.jpg"
+            (folder / file).write_bytes(picture.jpeg)
+            facts = {name: getattr(picture, name) for name in _TOLD}
+            told.append({**facts, "file": file, "marks": [asdict(mark) for mark in picture.marks]})
+    write_whole(folder / "pictures.json", json.dumps(told, indent=2, allow_nan=False) + "\n")
+
+
+def read_pictures(folder: Path) -> list[CameraPicture]:
+    """Return the pictures in a folder, in their order; none where there is no folder of the kind.
+
+    Raises:
+        BadRunFolder: it is damaged.
+    """
+    listed = folder / "pictures.json"
+    if not listed.is_file():
+        return []
+    try:
+        return [_picture(folder, told) for told in json.loads(listed.read_bytes())]
+    except OSError as e:
+        raise BadRunFolder(folder.parent, f"its picture {e.filename} cannot be read: {e.strerror}") from e
+    except (ValueError, TypeError, KeyError) as e:
+        raise BadRunFolder(folder.parent, f"its pictures.json is damaged: {one_line(e)}") from e
+
+
+def _picture(folder: Path, told: dict[str, Any]) -> CameraPicture:
+    marks = tuple(Mark(**mark) for mark in told["marks"])
+    jpeg = (folder / Path(told["file"]).name).read_bytes()
+    return CameraPicture(jpeg=jpeg, marks=marks, **{name: told[name] for name in _TOLD})
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")

@@ -1,0 +1,81 @@
+"""Triangle meshes of simple bodies, in their own frames: boxes, balls, prisms, rods with rounded ends."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from cosim.ports import Floats
+
+
+class Mesh(NamedTuple):
+    """Vertices, shape (n, 3), m, and triangles of them, shape (m, 3), counter-clockwise seen from outside."""
+
+    vertices: Floats
+    triangles: NDArray[np.int64]
+
+    def moved(self, p: Floats) -> "Mesh":
+        """Return it at another place."""
+        return Mesh(self.vertices + p, self.triangles)
+
+
+def hull(points: Floats) -> Mesh:
+    """Return the convex hull of points, shape (n, 3)."""
+    found = ConvexHull(points)
+    triangles = found.simplices.astype(np.int64)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    triangles[inwards] = triangles[inwards][:, ::-1]
+    kept = np.unique(triangles)
+    return Mesh(points[kept], np.searchsorted(kept, triangles))
+
+
+def box(sides: Sequence[float]) -> Mesh:
+    """Return a box about the origin. Each side has corners of its own, so that its edges look sharp."""
+    return faceted(hull(np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * sides))
+
+
+def prism(outline: Floats, low: float, high: float) -> Mesh:
+    """Return a convex outline, shape (n, 2), drawn out along z from `low` to `high`, with sharp edges."""
+    return faceted(hull(np.vstack([np.column_stack([outline, np.full(len(outline), z)]) for z in (low, high)])))
+
+
+def ball(radius: float, finer: int = 2) -> Mesh:
+    """Return a sphere about the origin: an icosahedron whose triangles are divided into four `finer` times."""
+    golden = (1.0 + np.sqrt(5.0)) / 2.0
+    corners = np.array([[0.0, a, b * golden] for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
+    vertices = np.vstack([np.roll(corners, k, axis=1) for k in range(3)]) / np.hypot(1.0, golden)
+    for _ in range(finer):
+        triangles = hull(vertices).triangles
+        edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+        middles = vertices[edges].mean(axis=1)
+        vertices = np.vstack([vertices, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
+    return hull(radius * vertices)
+
+
+def rod(points: Floats, radii: Floats) -> Mesh:
+    """Return a chain of round rods with rounded ends through points, shape (n, 3), of radii there, shape (n,)."""
+    sphere = ball(1.0, finer=1).vertices
+    ends = points[:, None] + np.asarray(radii)[:, None, None] * sphere
+    apart = [k for k in range(len(points) - 1) if not np.array_equal(points[k], points[k + 1])]
+    return merged([hull(np.vstack([ends[k], ends[k + 1]])) for k in apart])
+
+
+def merged(meshes: Sequence[Mesh]) -> Mesh:
+    """Return meshes as one."""
+    firsts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+    triangles = [m.triangles + first for m, first in zip(meshes, firsts, strict=False)]
+    return Mesh(np.vstack([m.vertices for m in meshes]), np.vstack(triangles))
+
+
+def faceted(mesh: Mesh) -> Mesh:
+    """Return a mesh whose sides share no vertices, so that shading changes at their edges; coplanar triangles do."""
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    normals: Floats = np.cross(b - a, c - a)
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    side = np.unique(np.rint(1e6 * normals).astype(np.int64), axis=0, return_inverse=True)[1]
+    corners = np.column_stack([np.repeat(side.reshape(-1), 3), mesh.triangles.reshape(-1)])
+    kept, indices = np.unique(corners, axis=0, return_inverse=True)
+    return Mesh(mesh.vertices[kept[:, 1]], indices.reshape(-1, 3).astype(np.int64))

@@ -1,0 +1,157 @@
+// Draws the figures of a page in its colours. Other scripts of a page use:
+//   page.colours()          the page's colours by their names in page.css: {ink, soft, line, card, c0, ...}
+//   page.onColours(act)     calls `act` when they have changed
+//   page.draw(div, figure)  draws a Plotly figure, and again when the colours change; returns a promise
+//   page.onDraw(change)     calls `change(div, layout)` before a figure is drawn
+//   page.onReady(act)       calls `act` when the figures that are in the page have been drawn; waits for its promise
+//   page.array(packed)      a typed array of one that Plotly has packed: {dtype, bdata}
+//   page.data(element)      the content of the JSON script within an element
+"use strict";
+const page = (() => {
+  const names = ["ink", "soft", "line", "page", "card", "shade", "good", "bad", "link",
+    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
+  const touch = matchMedia("(pointer: coarse)").matches;
+  const figures = new Map();
+  let span = null;  // the range of time that was chosen
+  const listeners = [], changes = [], starts = [];
+
+  function colours() {
+    const style = getComputedStyle(document.documentElement);
+    return Object.fromEntries(names.map(name => [name, style.getPropertyValue("--" + name).trim()]));
+  }
+
+  function template() {
+    const c = colours();
+    const axis = {
+      gridcolor: c.line, linecolor: c.soft, zerolinecolor: c.line, automargin: true, zeroline: false,
+      title: {standoff: 8}, tickfont: {color: c.soft},
+    };
+    const depth = {...axis, backgroundcolor: "rgba(0,0,0,0)", showbackground: false};
+    return {layout: {
+      colorway: [c.c0, c.c1, c.c2, c.c3, c.c4, c.c5, c.c6, c.c7],
+      font: {color: c.ink, family: "system-ui, sans-serif", size: 13},
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      margin: {l: 56, r: 12, t: 30, b: 44},
+      xaxis: axis, yaxis: axis,
+      scene: {xaxis: depth, yaxis: depth, zaxis: depth},
+      hoverlabel: {bgcolor: c.card, bordercolor: c.line, font: {color: c.ink, family: "system-ui, sans-serif"}},
+      legend: {orientation: "h", x: 0, xanchor: "left", y: 0, yref: "container", yanchor: "bottom"},
+      dragmode: touch ? false : "zoom",
+      modebar: {bgcolor: "rgba(0,0,0,0)", color: c.soft, activecolor: c.ink},
+    }};
+  }
+
+  // Puts the page's colours in place of their names in a figure.
+  function coloured(part, c) {
+    if (typeof part === "string") {
+      const name = /^var\(--(\w+)\)$/.exec(part);
+      return name ? c[name[1]] : part;
+    }
+    if (Array.isArray(part)) return part.map(p => coloured(p, c));
+    if (part === null || typeof part !== "object" || ArrayBuffer.isView(part)) return part;
+    return Object.fromEntries(Object.entries(part).map(([k, p]) => [k, k === "bdata" ? p : coloured(p, c)]));
+  }
+
+  const settings = {
+    displaylogo: false, displayModeBar: touch ? false : "hover", scrollZoom: false,
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d"],
+  };
+
+  function draw(div, figure) {
+    if (!figures.has(div)) widths.observe(div);
+    figures.set(div, figure);
+    const {data, layout, config} = coloured(figure, colours());
+    const shown = {...layout, template: template(), autosize: true};
+    if (figure.layout.meta?.time) asOthers(shown);
+    if (div.clientWidth < 560) narrow(shown);
+    for (const change of changes) change(div, shown);
+    div.dataset.height ??= parseFloat(div.style.height);
+    div.dataset.width = div.clientWidth;
+    const first = !div.layout;
+    return Plotly.react(div, data, shown, {...settings, ...config}).then(() => {
+      if (first) div.on("plotly_relayout", change => follow(div, change));
+      return fit(div);
+    });
+  }
+
+  // Lets a figure show the range of time that was chosen in one of them; all heights are theirs.
+  function asOthers(layout) {
+    layout.xaxis = span ? {...layout.xaxis, range: [...span], autorange: false} : {...layout.xaxis};
+    for (const key of Object.keys(layout).filter(k => /^yaxis\d*$/.test(k)))
+      layout[key] = {...layout[key], fixedrange: true};
+  }
+
+  function follow(div, change) {
+    if (!figures.get(div).layout.meta?.time) return;
+    if (change["xaxis.autorange"]) span = null;
+    else if ("xaxis.range[0]" in change) span = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
+    else if (change["xaxis.range"]) span = change["xaxis.range"];
+    else return;
+    redraw(figure => figure.layout.meta?.time);
+  }
+
+  // On a phone: few ticks, small margins.
+  function narrow(layout) {
+    for (const key of Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)))
+      layout[key] = {nticks: key[0] === "x" ? 5 : 6, ...layout[key]};
+    layout.margin = {l: 44, r: 6, t: 30, b: 40, ...layout.margin};
+    layout.font = {size: 12, ...layout.font};
+  }
+
+  // Makes room below a figure for its legend, so that the axes keep their height.
+  function fit(div) {
+    const legend = div.querySelector("g.legend");
+    const more = legend ? Math.ceil(legend.getBBox().height) : 0;
+    const height = Number(div.dataset.height) + more;
+    if (Math.abs(parseFloat(div.style.height) - height) < 2 && !more) return null;
+    div.style.height = height + "px";
+    return Plotly.relayout(div, more ? {autosize: true, "margin.b": 48 + more} : {autosize: true});
+  }
+
+  const arrays = {
+    f8: Float64Array, f4: Float32Array, i4: Int32Array, u4: Uint32Array, i2: Int16Array, u2: Uint16Array,
+    i1: Int8Array, u1: Uint8Array,
+  };
+  function array(packed) {
+    if (Array.isArray(packed) || ArrayBuffer.isView(packed)) return packed;
+    const text = atob(packed.bdata);
+    const bytes = Uint8Array.from(text, c => c.charCodeAt(0));
+    return new arrays[packed.dtype](bytes.buffer);
+  }
+
+  function data(element) {
+    return JSON.parse(element.querySelector('script[type="application/json"]').textContent);
+  }
+
+  function redraw(which = () => true) {
+    return Promise.all([...figures].filter(([, f]) => which(f)).map(([div, figure]) => draw(div, figure)));
+  }
+
+  const widths = new ResizeObserver(entries => {
+    for (const {target} of entries)
+      if (target.clientWidth && target.clientWidth !== Number(target.dataset.width)) draw(target, figures.get(target));
+  });
+
+  function recolour() {
+    for (const act of listeners) act();
+    redraw();
+  }
+
+  async function drawAll() {
+    for (const div of document.querySelectorAll(".plot")) {
+      const figure = data(div);
+      await draw(div, figure);
+      await new Promise(done => setTimeout(done));  // the page answers between figures
+    }
+    for (const start of starts) await start();
+    document.documentElement.dataset.drawn = "all";
+  }
+
+  document.addEventListener("DOMContentLoaded", drawAll);  // when the page's other scripts have run
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+  matchMedia("print").addEventListener("change", recolour);
+  return {
+    colours, draw, array, data,
+    onColours: act => listeners.push(act), onDraw: act => changes.push(act), onReady: act => starts.push(act),
+  };
+})();

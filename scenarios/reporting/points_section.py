@@ -1,0 +1,80 @@
+"""A campaign's points in numbers: successes, and the median of the metrics that matter, with intervals."""
+
+import math
+
+import numpy as np
+
+from scenarios.campaign.campaign_results import CampaignResults, PointResults
+from scenarios.campaign.shown_unit import ShownUnit, shown_unit
+from scenarios.published.statistics import time_interval
+from scenarios.reporting.rows_table import Cell, rows_table
+from scenarios.reporting.section import Section
+
+_MOST_METRICS = 4
+_MOST_BOOTSTRAPS = 150
+"""Of one page: each takes some 20 ms."""
+
+
+def points_section(results: CampaignResults) -> Section | None:
+    """Return the table of points; None if no run has ended."""
+    points = results.points
+    if not points:
+        return None
+    metrics = results.headline[:_MOST_METRICS]
+    units = {m: shown_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
+    with_intervals = len(points) * len(metrics) <= _MOST_BOOTSTRAPS
+    rows = [
+        (
+            *_values(results, point),
+            str(len(point.rows)),
+            *_success(point),
+            *(_median(results, point, m, units[m], with_intervals) for m in metrics),
+        )
+        for point in points
+    ]
+    header = (
+        *(name.replace("_", " ") for name in results.varied or ("point",)),
+        "runs",
+        "successes",
+        "rate, 95 % interval",
+        *(units[m].axis(f"median {m.replace('_', ' ')}") for m in metrics),
+    )
+    first = len(header) - 3 - len(metrics)
+    told = "Of the runs done. Intervals of success rates: Clopper and Pearson"
+    told += "; of medians: bootstrap, from three values on." if with_intervals and metrics else "."
+    table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
+    note = type(table)("<p class='soft'>{}</p>").format(told)
+    return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
+
+
+def _values(results: CampaignResults, point: PointResults) -> list[Cell]:
+    cells: list[Cell] = []
+    for name in results.varied:
+        text = point.values.get(name, "–")
+        if results.is_number(name):
+            texts = [float(p.values[name]) for p in results.points if name in p.values]
+            cells.append(Cell(shown_unit(results.unit(name), texts).text(float(text)), float(text)))
+        else:
+            cells.append(Cell(text.replace("_", " ")))
+    return cells or [Cell("all runs")]
+
+
+def _success(point: PointResults) -> tuple[Cell, Cell]:
+    span = point.interval
+    if span is None:
+        return Cell("–", math.nan), Cell("–", math.nan)
+    told = f"{100 * point.rate:.0f} % ({100 * span.low:.0f} to {100 * span.high:.0f})"
+    return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(told, point.rate)
+
+
+def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit, with_interval: bool) -> Cell:
+    values = results.table.column(metric)[point.done]
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return Cell("–", math.nan)
+    median = float(np.median(values))
+    told = f"{median * unit.factor:.4g}"
+    span = time_interval(values) if with_interval and np.ptp(values) > 0.0 else None
+    if span is not None:
+        told += f" ({span.low * unit.factor:.3g} to {span.high * unit.factor:.3g})"
+    return Cell(told, median)

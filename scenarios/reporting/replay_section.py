@@ -1,0 +1,162 @@
+"""The part of a page that shows a run in space, with a slider over its time."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup, escape
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cosim.ports import Floats
+from scenarios.record import Record
+from scenarios.reporting.page import asset
+from scenarios.reporting.plot_html import json_html
+from scenarios.reporting.replay import Body, Line, Replay
+from scenarios.reporting.replay_frames import frame_rows, phase_changes
+from scenarios.reporting.section import Section
+
+_MARGIN = 0.04
+"""Room around what is drawn, over its greatest side."""
+_SPEEDS = ("0.5", "1", "2", "5")
+
+Drawn = Line | Body
+
+
+def replay_section(replay: Replay, record: Record) -> Section:
+    """Return a scene that can be turned, with play button, slider, time and phase, speeds and a legend.
+
+    It holds at most some 240 moments of the run; rigid bodies are held once, with their poses over time.
+
+    Raises:
+        ValueError: a line or a body has neither one row nor as many as the record.
+    """
+    rows = frame_rows(record.time)
+    drawn: list[Drawn] = [_at(d, rows, len(record.time)) for d in (*replay.bodies, *replay.lines, *replay.fixed)]
+    low, high = _window(drawn) if replay.window is None else replay.window
+    content = {
+        "time": _packed(record.time[rows]),
+        "phases": phase_changes(record, replay.phases),
+        "eye": list(replay.eye),
+        "middle": None if replay.middle is None else list(replay.middle),
+        "low": np.round(low, 4).tolist(),
+        "high": np.round(high, 4).tolist(),
+        "traces": [_trace(same) for same in _alike(drawn)],
+    }
+    return Section(
+        anchor="replay",
+        title="Replay",
+        html=_html(json_html(content), drawn, len(rows), replay.notes),
+        scripts=("replay_shapes.js", "replay.js"),
+    )
+
+
+def _at(drawn: Drawn, rows: NDArray[np.int64], all_rows: int) -> Drawn:
+    """Return what is drawn at some rows of the record only; at one if it stays."""
+    if isinstance(drawn, Line):
+        return replace(drawn, points=_thinned(drawn.label, drawn.points, rows, all_rows, keep=drawn.trail))
+    q_WB = None if drawn.q_WB is None else _thinned(drawn.label, drawn.q_WB, rows, all_rows)
+    return replace(drawn, p_WB=_thinned(drawn.label, drawn.p_WB, rows, all_rows), q_WB=q_WB)
+
+
+def _thinned(label: str, values: Floats, rows: NDArray[np.int64], all_rows: int, keep: bool = False) -> Floats:
+    if len(values) == 1:
+        return values
+    if len(values) != all_rows:
+        raise ValueError(f"replay: {label!r} has {len(values)} rows, the record {all_rows}; it needs as many, or one")
+    chosen: Floats = np.asarray(values[rows], dtype=np.float64)
+    stays = not keep and np.array_equal(chosen, np.broadcast_to(chosen[:1], chosen.shape), equal_nan=True)
+    return chosen[:1] if stays else chosen
+
+
+def _alike(drawn: Sequence[Drawn]) -> list[list[Drawn]]:
+    """Return groups that one trace can show: tubes and bodies of one look together, each line alone."""
+    groups: dict[Any, list[Drawn]] = {}
+    for d in drawn:
+        solid = isinstance(d, Body) or d.radii is not None
+        groups.setdefault((d.label, d.colour, d.opacity) if solid else id(d), []).append(d)
+    return list(groups.values())
+
+
+def _trace(same: Sequence[Drawn]) -> dict[str, Any]:
+    first = same[0]
+    look: dict[str, Any] = {"label": first.label, "colour": first.colour, "opacity": first.opacity}
+    if isinstance(first, Line) and first.radii is None:
+        line = {"width": first.width, "markers": first.markers, "trail": first.trail}
+        return {**look, **line, "points": _packed(first.points), "n": first.points.shape[1]}
+    return {**look, "parts": [_part(d) for d in same]}
+
+
+def _part(solid: Drawn) -> dict[str, Any]:
+    if isinstance(solid, Line):
+        assert solid.radii is not None
+        return {"points": _packed(solid.points), "radii": np.round(solid.radii, 5).tolist()}
+    return {
+        "vertices": _packed(solid.mesh.vertices),
+        "triangles": _packed(solid.mesh.triangles, "u2"),
+        "p": _packed(solid.p_WB),
+        "q": None if solid.q_WB is None else _packed(_continuous(solid.q_WB)),
+    }
+
+
+def _continuous(q: Floats) -> Floats:
+    """Return the same orientations by quaternions none of which is opposite to the one before."""
+    turned = np.where(np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0, -1.0, 1.0)
+    return q * np.concatenate([[1.0], np.cumprod(turned)])[:, None]
+
+
+def _packed(values: NDArray[Any], dtype: str = "f4") -> Mapping[str, str]:
+    """Return values as the page's scripts unpack them, in single precision: 0.1 um at 1 m."""
+    data = np.ascontiguousarray(values, dtype=f"<{dtype}").tobytes()
+    return {"dtype": dtype, "bdata": base64.b64encode(data).decode()}
+
+
+def _window(drawn: Sequence[Drawn]) -> tuple[Floats, Floats]:
+    """Return the least and greatest corner of all that is drawn at any time, with some room around it."""
+    with np.errstate(invalid="ignore"):
+        corners = np.array([c for d in drawn for c in _corners(d)])
+    low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+    room = max(_MARGIN * float(np.max(high - low)), 1e-3)
+    return low - room, high + room
+
+
+def _corners(drawn: Drawn) -> tuple[Floats, Floats]:
+    if isinstance(drawn, Line):
+        room = np.zeros(1) if drawn.radii is None else drawn.radii
+        points = np.concatenate([drawn.points - room[:, None], drawn.points + room[:, None]]).reshape(-1, 3)
+    else:
+        R_WB = np.eye(3)[None] if drawn.q_WB is None else Rotation.from_quat(drawn.q_WB, scalar_first=True).as_matrix()
+        turned = np.einsum("rij,nj->rni", R_WB, drawn.mesh.vertices)
+        points = np.concatenate([drawn.p_WB + reach for reach in (turned.min(axis=1), turned.max(axis=1))])
+    seen = points[np.isfinite(points).all(axis=1)]
+    if not len(seen):
+        return np.full(3, np.nan), np.full(3, np.nan)
+    return seen.min(axis=0), seen.max(axis=0)
+
+
+def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str]) -> Markup:
+    names = {d.label: d.colour for d in reversed(drawn)}
+    chips = [
+        f'<button type="button" aria-pressed="true" data-label="{escape(name)}">'
+        f'<i style="background: {escape(names[name])}"></i>{escape(name)}</button>'
+        for name in dict.fromkeys(d.label for d in drawn)
+    ]
+    speeds = [f'<option value="{s}"{" selected" if s == "1" else ""}>{s}&times;</option>' for s in _SPEEDS]
+    told = [f'<p class="soft">{escape(note)}</p>' for note in notes]
+    return Markup(
+        f"<style>{asset('replay.css')}</style>"
+        f'<div class="replay">{data}'
+        '<p class="replay-missing" hidden>The replay needs WebGL, which this browser does not offer.</p>'
+        '<div class="replay-shown"><div class="replay-stage">'
+        '<div class="replay-scene" role="img" aria-label="the scene in space"></div>'
+        '<button type="button" class="replay-wake">Tap to turn and zoom</button></div>'
+        '<div class="replay-controls"><button type="button" class="replay-play" aria-label="play">&#9654;&#xFE0E;'
+        '</button><input type="range" class="replay-time" aria-label="time in the run" min="0" '
+        f'max="{frames - 1}" step="1" value="0"><output class="replay-told"></output>'
+        f'<select class="replay-speed" aria-label="speed of the replay">{"".join(speeds)}</select>'
+        '<button type="button" class="replay-reset">reset view</button></div>'
+        f'<div class="replay-legend" role="group" aria-label="what is shown">{"".join(chips)}</div>'
+        f"</div>{''.join(told)}</div>"
+    )

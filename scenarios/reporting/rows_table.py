@@ -1,0 +1,56 @@
+"""A table of a page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell: what it says, and by which number it is sorted, if not by what it says."""
+
+    text: str | Markup
+    key: float | None = None
+
+
+def rows_table(
+    header: Sequence[str],
+    rows: Sequence[Sequence[str | Markup | Cell]],
+    numbers: Sequence[int] = (),
+    caption: str = "",
+    sortable: bool = False,
+) -> Markup:
+    """Return a table as HTML, which scrolls within itself where a page is narrow.
+
+    Args:
+        header: names of the columns.
+        rows: as many cells each.
+        numbers: columns of numbers, which stand to the right.
+        caption: what it is, above it.
+        sortable: whether a click on a column's name sorts by it; the page then needs `campaign.js`.
+    """
+    kind = Markup(' class="number"')
+    kinds = [kind if k in numbers else Markup() for k in range(len(header))]
+    name = Markup("<button type='button'>{}</button>") if sortable else Markup("{}")
+    heads = Markup().join(
+        Markup("<th{} scope='col'>{}</th>").format(c, name.format(h)) for c, h in zip(kinds, header, strict=True)
+    )
+    body = Markup("\n").join(Markup("<tr>{}</tr>").format(_cells(row, kinds)) for row in rows)
+    return Markup(
+        "<div class='scroll'><table{}>{}<thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table></div>"
+    ).format(
+        Markup(" class='sortable'") if sortable else Markup(),
+        Markup("<caption>{}</caption>").format(caption) if caption else Markup(),
+        heads,
+        body,
+    )
+
+
+def _cells(row: Sequence[str | Markup | Cell], kinds: Sequence[Markup]) -> Markup:
+    cells: list[Markup] = []
+    for cell, kind in zip(row, kinds, strict=True):
+        text, key = (cell.text, cell.key) if isinstance(cell, Cell) else (cell, None)
+        sort = Markup() if key is None else Markup(" data-key='{}'").format(f"{key:.9g}")
+        cells.append(Markup("<td{}{}>{}</td>").format(kind, sort, text))
+    return Markup().join(cells)

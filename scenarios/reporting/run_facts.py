@@ -1,0 +1,110 @@
+"""What a run's folder says of it, checked as it is read: folders come from other versions, and from broken disks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from scenarios.catalog import SCENARIOS
+from scenarios.experiment import Experiment
+from scenarios.run_folder import BadRunFolder, RunFolder
+
+_NUMBER = (int, float)
+_FORMS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
+    "run.json": {
+        "scenario": (str,), "parameters": (dict,), "seed": (int, type(None)), "master": (dict,), "units": (dict,),
+        "versions": (dict,), "title": (str,), "headline": (list,), "told_parameters": (list,), "conversions": (list,),
+        "system": (dict,),
+    },
+    "summary.json": {
+        "success": (bool,), "reason": (str,), "metrics": (dict,), "simulated_seconds": _NUMBER,
+        "wall_seconds": _NUMBER, "failure": (dict, type(None)), "master": (dict,), "units": (list,),
+    },
+}  # fmt: skip
+_NEEDED = {"run.json": ("scenario", "parameters"), "summary.json": ("success", "reason", "metrics")}
+_KILLED = "it has no summary: it was killed before its end, or the machine went down"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFacts:
+    """A run as its folder tells it.
+
+    Attributes:
+        folder: where it is.
+        run, summary: what is in `run.json` and `summary.json`; of a run that was killed, a summary that says so.
+        experiment: the scenario, if it is one of the catalog.
+        ended: whether the run came to write its summary.
+    """
+
+    folder: RunFolder
+    run: Mapping[str, Any]
+    summary: Mapping[str, Any]
+    experiment: Experiment[Any] | None
+    ended: bool
+
+    @classmethod
+    def read(cls, folder: RunFolder) -> "RunFacts":
+        """Read and check both files.
+
+        Raises:
+            BadRunFolder: it is not the folder of a run, or one of the files is damaged.
+        """
+        run, summary = folder.read_run(), folder.read_summary()
+        _check(folder, "run.json", run)
+        ended = bool(summary)
+        if not ended:
+            summary = {"success": False, "reason": _KILLED, "metrics": dict[str, Any](), "complete": False}
+            summary |= {k: run[k] for k in ("scenario", "parameters", "seed", "master") if k in run}
+        _check(folder, "summary.json", summary)
+        _check_metrics(folder, cast(Mapping[str, Any], summary["metrics"]))
+        named = SCENARIOS.get(run["scenario"])
+        return cls(folder=folder, run=run, summary=summary, experiment=None if named is None else named(), ended=ended)
+
+    @property
+    def scenario(self) -> str:
+        """Its name."""
+        return self.run["scenario"]
+
+    @property
+    def title(self) -> str:
+        """What it does, in a line; "" where nothing tells."""
+        return self.run.get("title", "" if self.experiment is None else self.experiment.title)
+
+    @property
+    def headline(self) -> Sequence[str]:
+        """Names of the metrics that are told first."""
+        return self.run.get("headline", () if self.experiment is None else self.experiment.headline)
+
+    @property
+    def parameters(self) -> Sequence[tuple[str, str, str]]:
+        """Name, value with unit, and description of each parameter."""
+        if "told_parameters" in self.run:
+            return [(str(row[0]), str(row[1]), str(row[2])) for row in self.run["told_parameters"]]
+        return [(name, _plain(value), "") for name, value in self.run["parameters"].items()]
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _check(folder: RunFolder, file: str, content: Mapping[str, Any]) -> None:
+    faults = [f"it has no {name!r}" for name in _NEEDED[file] if name not in content]
+    for name, allowed in _FORMS[file].items():
+        if name in content and not isinstance(content[name], allowed):
+            faults.append(f"{name!r} is {content[name]!r:.40}")
+    rows = content.get("told_parameters", [])
+    if isinstance(rows, list) and any(not isinstance(row, list) or len(row) != 3 for row in rows):  # pyright: ignore
+        faults.append("'told_parameters' are not rows of three")
+    if faults:
+        raise BadRunFolder(folder.path, f"its {file} is damaged: {'; '.join(faults)}")
+
+
+def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
+    for name, metric in metrics.items():
+        try:
+            fine = isinstance(metric["value"], (*_NUMBER, type(None))) and isinstance(metric["unit"], str)
+        except (KeyError, TypeError):
+            fine = False
+        if not fine:
+            raise BadRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")

@@ -1,0 +1,87 @@
+"""All runs of a campaign in a table that can be sorted and filtered."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from markupsafe import Markup
+
+from scenarios.campaign.campaign_results import CampaignResults
+from scenarios.campaign.shown_unit import ShownUnit, shown_unit
+from scenarios.reporting.rows_table import Cell, rows_table
+from scenarios.reporting.section import Section
+
+_MOST_ROWS = 2000
+_MOST_METRICS = 6
+
+
+def runs_section(results: CampaignResults, folder: Path) -> Section | None:
+    """Return the table of runs, the first 2000 of them; None if no run has ended."""
+    table = results.table
+    if not len(table):
+        return None
+    metrics = results.headline[:_MOST_METRICS]
+    varied = [name for name in results.varied if name in table.parameters]
+    units = {n: shown_unit(table.unit(n), table.column(n)) for n in (*metrics, "cpu_seconds")}
+    rows = [_row(results, row, varied, units, folder) for row in table.rows[:_MOST_ROWS]]
+    header = (
+        "run",
+        *(n.replace("_", " ") for n in varied),
+        "seed",
+        "verdict",
+        *(units[n].axis(n.replace("_", " ")) for n in metrics),
+        units["cpu_seconds"].axis("CPU time"),
+    )
+    numbers = [len(varied) + 1, *range(len(varied) + 3, len(header))]
+    left = len(table) - len(rows)
+    note = f"The first {len(rows)} of {len(table)} runs; all are in runs.parquet." if left > 0 else ""
+    html = Markup(
+        "<div class='controls'><label>Show runs with <input type='search' data-filters='all-runs' "
+        "placeholder='words, such as failed'></label></div>\n"
+        "<div id='all-runs' class='tall'>{}</div><p class='soft'>{}</p>"
+    ).format(rows_table(header, rows, numbers=numbers, sortable=True), note)
+    return Section(anchor="runs", title="Runs", html=html, scripts=("campaign.js",))
+
+
+def run_html(name: str, folder: Path) -> Markup:
+    """Return a run's name, linked to its page if that is there."""
+    place = f"runs/{name}/report.html"
+    if not (folder / place).exists():
+        return Markup("{}").format(name)
+    return Markup("<a href='{}'>{}</a>").format(quote(place), name)
+
+
+def _row(
+    results: CampaignResults, row: dict[str, Any], varied: Sequence[str], units: dict[str, ShownUnit], folder: Path
+) -> Sequence[str | Markup | Cell]:
+    return (
+        run_html(row["run"], folder),
+        *(_parameter(results, name, row[name]) for name in varied),
+        Cell(str(row["seed"]), row["seed"]),
+        _verdict(row),
+        *(_number(row[name], unit) for name, unit in units.items()),
+    )
+
+
+def _parameter(results: CampaignResults, name: str, value: Any) -> Cell:
+    if isinstance(value, float):
+        return Cell(shown_unit(results.table.unit(name), results.table.column(name)).text(value), value)
+    if isinstance(value, bool):
+        return Cell(str(value).lower())
+    return Cell(str(value).replace("_", " "), value if isinstance(value, int) else None)
+
+
+def _verdict(row: dict[str, Any]) -> Markup:
+    if row["status"] != "done":
+        kind, told = "bad", row["status"] if row["status"] == "lost" else "run failed"
+    else:
+        kind, told = ("good", "succeeded") if row["success"] else ("bad", "failed")
+    return Markup("<span class='{}' title='{}'>{}</span>").format(kind, row["reason"] or "", told)
+
+
+def _number(value: float | None, unit: ShownUnit) -> Cell:
+    if value is None or not math.isfinite(value):
+        return Cell("–", math.nan)
+    return Cell(f"{value * unit.factor:.4g}", value)

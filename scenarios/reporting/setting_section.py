@@ -1,0 +1,53 @@
+"""With what a campaign was run: parameters that are the same in all runs, options of the master, versions."""
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+from markupsafe import Markup
+
+from scenarios.campaign.campaign_results import CampaignResults
+from scenarios.campaign.shown_unit import shown_unit
+from scenarios.reporting.rows_table import rows_table
+from scenarios.reporting.section import Section
+
+
+def setting_section(results: CampaignResults) -> Section:
+    """Return tables of what is set for all runs; the scenario's defaults hold for the rest."""
+    told = results.told
+    units: Mapping[str, Any] = told.get("units", {})
+    parts = [
+        _part("Fixed parameters", {n: _value(results, n, v) for n, v in told["fixed"].items()}),
+        _part("Master", _flat(told.get("master", {}))),
+        _part("Versions", {n: str(v) for n, v in told.get("versions", {}).items()}),
+        _part("FMUs", {n: f"{u['fmu']} {u['sha256'][:12]}" for n, u in units.items()}),
+    ]
+    defaults = "Parameters that are neither varied nor fixed have the scenario's defaults; each run's run.json has all."
+    html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)
+    return Section(anchor="setting", title="Setting", html=html)
+
+
+def _part(title: str, rows: Mapping[str, str]) -> Markup:
+    if not rows:
+        return Markup()
+    return Markup("<div><h3>{}</h3>{}</div>").format(
+        title, rows_table(("name", "value"), list(rows.items()), numbers=(1,))
+    )
+
+
+def _value(results: CampaignResults, name: str, text: str) -> str:
+    if results.is_number(name):
+        return shown_unit(results.unit(name), float(text)).text(float(text))
+    unit = results.unit(name)
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def _flat(options: Mapping[str, Any]) -> dict[str, str]:
+    """Return options as texts, without those that are not chosen."""
+    flat: dict[str, str] = {}
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            flat |= {f"{name} {n}": t for n, t in _flat(cast(Mapping[str, Any], value)).items()}
+        elif value is not None:
+            text = str(value).lower() if isinstance(value, bool) else str(value)
+            flat[name.replace("_", " ")] = text
+    return flat

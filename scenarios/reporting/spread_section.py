@@ -1,0 +1,141 @@
+"""What a campaign's runs measured, run by run and point by point, one metric at a time."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import Markup
+
+from cosim.ports import Floats
+from scenarios.campaign.campaign_results import CampaignResults
+from scenarios.campaign.point_layout import PointLayout
+from scenarios.campaign.shown_unit import shown_unit
+from scenarios.reporting.plot_html import json_html, plot_html
+from scenarios.reporting.section import Section
+from scenarios.reporting.success_section import place_axis, plot_height
+
+_SUCCESS, _OTHER = "circle", "x-thin"
+
+
+def spread_section(results: CampaignResults, layout: PointLayout) -> Section | None:
+    """Return the plot of a metric that can be chosen; None if no run has any."""
+    if not results.measured:
+        return None
+    first = results.measured[0]
+    strips = _strips(results, layout)
+    figure = go.Figure()
+    choices = [_choice(results, layout, name, strips) for name in results.measured]
+    for trace, values in zip(_traces(results, layout, strips), choices[0]["traces"], strict=True):
+        figure.add_trace({**trace, **values})
+    place_axis(figure, layout)
+    figure.update_layout({"xaxis" if layout.listed else "yaxis": {"title": {"text": choices[0]["axis"]}}})
+    options = Markup().join(Markup("<option>{}</option>").format(c["name"]) for c in choices)
+    html = Markup(
+        "<div class='chooser' data-axis='{}'><div class='controls'><label>Metric <select>{}</select></label></div>\n"
+        "<p class='soft told'>{}</p>{}{}</div>\n<p class='soft'>{}</p>"
+    ).format(
+        "xaxis" if layout.listed else "yaxis",
+        options,
+        choices[0]["told"],
+        plot_html(figure, plot_height(layout) + 60, f"{first} by point"),
+        json_html(choices, "choices"),
+        "A mark is a run: a disc succeeded, a cross did not. Boxes: quartiles and median; whiskers: least and most.",
+    )
+    return Section(anchor="metrics", title="Metrics", html=html, scripts=("campaign.js",))
+
+
+Strip = tuple[int, bool, list[int], list[float]]
+"""Group, whether the runs succeeded, their rows and their places."""
+
+
+def _strips(results: CampaignResults, layout: PointLayout) -> list[Strip]:
+    success = results.table.column("success")
+    strips: list[Strip] = []
+    for group in range(len(layout.group_names)):
+        for succeeded in (True, False):
+            rows: list[int] = []
+            places: list[float] = []
+            for k, point in enumerate(results.points):
+                if layout.groups[k] == group:
+                    fits = np.array([(success[row] is True) == succeeded for row in point.rows])
+                    rows += point.rows[fits].tolist()
+                    places += layout.beside(k, len(point.rows))[fits].tolist()
+            if rows:
+                strips.append((group, succeeded, rows, places))
+    return strips
+
+
+def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Strip]) -> list[dict[str, Any]]:
+    """Return boxes by group, then strips, without their values."""
+    along = "y" if layout.listed else "x"
+    traces: list[dict[str, Any]] = []
+    for group in range(len(layout.group_names)):
+        places = [float(layout.places[k]) for k, g in enumerate(layout.groups) if g == group]
+        traces.append(
+            {
+                "type": "box",
+                along: places,
+                "orientation": "h" if layout.listed else "v",
+                "width": 0.75 * layout.room,
+                "line": {"color": "var(--soft)", "width": 1.2},
+                "fillcolor": "rgba(128,128,128,0.10)",
+                "hoverinfo": "skip",
+                "showlegend": False,
+            }
+        )
+    names, seeds, success = (results.table.column(n) for n in ("run", "seed", "success"))
+    ended = {True: "succeeded", False: "failed", None: "not done"}
+    mixed = len({succeeded for _, succeeded, _, _ in strips}) > 1
+    for group, succeeded, rows, places in strips:
+        name, outcome = layout.group_names[group], "succeeded" if succeeded else "not succeeded"
+        told = [[names[row], int(seeds[row]), ended[success[row]]] for row in rows]
+        symbol = _SUCCESS if succeeded else _OTHER
+        colour = f"var(--c{group})"
+        marker = {"symbol": symbol, "size": 7, "color": colour, "opacity": 0.8, "line": {"color": colour, "width": 2}}
+        if succeeded:
+            marker["line"] = {"width": 0}
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                along: places,
+                "name": ", ".join(filter(None, (name, outcome if mixed or not name else ""))),
+                "marker": marker,
+                "customdata": told,
+                "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{'x' if layout.listed else 'y'}"
+                ":.4g}<br>%{customdata[2]}<extra></extra>",
+            }
+        )
+    return traces
+
+
+def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Sequence[Strip]) -> dict[str, Any]:
+    """Return a metric's axis, description, and the values of the traces."""
+    column = results.table.column(name)
+    unit = shown_unit(results.table.unit(name), column)
+    values = column * unit.factor
+    across = "x" if layout.listed else "y"
+    boxes = [
+        _box([values[p.rows] for k, p in enumerate(results.points) if layout.groups[k] == group])
+        for group in range(len(layout.group_names))
+    ]
+    words = name.replace("_", " ")
+    return {
+        "name": words,
+        "axis": unit.axis(words),
+        "told": results.table.description(name),
+        "traces": [*boxes, *({across: _plain(values[rows])} for _, _, rows, _ in strips)],
+    }
+
+
+def _box(points: Sequence[Floats]) -> dict[str, Any]:
+    """Return what Plotly needs for a box at each point."""
+    shares = {"lowerfence": 0.0, "q1": 0.25, "median": 0.5, "q3": 0.75, "upperfence": 1.0}
+    kept = [x[np.isfinite(x)] for x in points]
+    return {n: _plain([np.quantile(x, share) if len(x) else np.nan for x in kept]) for n, share in shares.items()}
+
+
+def _plain(values: Any) -> list[float | None]:
+    """Return numbers to six digits, None for those that are not finite."""
+    return [float(f"{v:.6g}") if np.isfinite(v) else None for v in values]

@@ -1,0 +1,112 @@
+"""The command `handover sweep`."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cosim.master_options import MasterOptions
+from scenarios.bad_call import BadCall, told_in_one_line
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_summary import print_campaign
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.grid import parse_grid, set_parameters
+from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
+from scenarios.campaign_arguments import campaign_options
+from scenarios.campaign_call import call_campaign, workforce
+from scenarios.chosen import replacements, scenario_named
+from scenarios.headed_options import HeadedCommand
+from scenarios.limit_arguments import limit_options, limits
+from scenarios.master_arguments import coupling_of, master_options
+from scenarios.scenario_arguments import scenario_options
+from scenarios.ssp_run import is_ssp
+
+_HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
+
+\b
+NAME=VALUES is a list or a range of numbers:
+  alpha=0.1,0.2,0.4       these values; those of arrays stand between ;
+  alpha=0.1:0.4:4         START:STOP:N, 4 evenly spaced values with both ends
+
+\b
+Examples
+  handover sweep ir_grasp strategy=reflex,blind,forward --repeat 20 --paired
+  handover sweep helix_handover alpha=0.1:0.4:4 -p patience=30 --out alphas
+  handover sweep flyer_impedance force=1:20:10 --scheduler tcp://10.0.0.5:8786
+
+The folder of a campaign has a folder for each run in runs/, and runs.parquet with a row for each: parameters, seed,
+success, metrics. The table is written as results come.
+
+However a campaign was ended, the same call goes on and repeats nothing that is done. A run in which a unit fails is a
+row with its reason; a run that was lost, as with its machine, is tried again by the next call. A larger --repeat adds
+runs. Without --out, the call goes on with its newest campaign in campaigns/ that is not complete, or begins one.
+
+A run's seed follows from --seed, its point and its repetition.
+
+Progress goes to standard error: a bar on a terminal, else a line every half minute.
+
+\b
+Exit status
+  0    every run has ended, whether or not its task succeeded
+  1    interrupted with Ctrl-C; the same call goes on
+  2    bad call or bad input; nothing was written
+  3    a unit failed in a run, a run was lost, or the disk is full; what is done is kept
+  130  aborted with Ctrl-C: before the first run, or by a second one
+"""
+
+
+@click.command("sweep", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
+@click.argument("scenario", metavar="SCENARIO")
+@click.argument("grid", nargs=-1, metavar="[NAME=VALUES]...")
+@click.option("--repeat", type=click.IntRange(1, MOST_REPETITIONS), default=1, help="Runs of each combination.")
+@click.option(
+    "--paired", is_flag=True, help="Let all combinations of a repetition share a seed, to compare them run by run."
+)
+@scenario_options
+@campaign_options
+@master_options
+@limit_options
+def sweep(
+    scenario: str,
+    grid: Sequence[str],
+    repeat: int,
+    paired: bool,
+    parameters: Sequence[str],
+    seed: int,
+    replaced: Sequence[str],
+    out: Path | None,
+    no_report: bool,
+    workers: int | None,
+    scheduler: str | None,
+    call_limit: float,
+    pace: float | None,
+    **coupling: Any,
+) -> None:
+    """Run a SCENARIO many times."""
+    crew = workforce(workers, scheduler)
+    if is_ssp(scenario):
+        raise BadCall(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
+    experiment = scenario_named(scenario)
+    with told_in_one_line():
+        points = parse_grid(experiment, grid)
+        plan = CampaignPlan(
+            scenario=scenario,
+            points=points,
+            fixed=set_parameters(experiment, parameters, points),
+            repetitions=repeat,
+            seed=seed,
+            paired=paired,
+            units={name: str(file) for name, file in replacements(experiment, replaced).items()},
+            options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
+        )
+    call = call_campaign(plan, out, crew, (lambda _folder, _table: None) if no_report else _write_report)
+    print_campaign(call.plan, call.table, call.tally, call.folder)
+    sys.exit(call.status)
+
+
+def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
+    from scenarios.reporting.campaign_page import write_campaign_page  # what draws takes long to load
+
+    write_campaign_page(folder.path)

@@ -1,0 +1,90 @@
+"""A run along a path in space: the arm's links, its load, the path it is to follow, and the way of its tip."""
+
+import numpy as np
+
+from controllers.vsl_path import segments_of
+from cosim.ports import Floats
+from plants.vsl_parameters import Params as ArmParams
+from scenarios.record import Record
+from scenarios.reporting.meshes import ball, prism
+from scenarios.reporting.replay import Body, Line, Replay
+from scenarios.vsl.parameters import Parameters
+
+_LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
+_DESIRED, _WAY, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"
+_WIDER = 1.2
+"""Radius of servos, base and gripper over that of the links (assumed)."""
+_DENSITY, _BELOW = 2700.0, 0.03
+"""Density of the ball that the load is drawn as, kg/m3, and how far below the gripper it hangs, m (assumed)."""
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+
+
+def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Replay:
+    """Return the arm over a run's time; `hybrid` with where the model takes its tip to be."""
+    shape = record["arm.shape"]
+    return Replay(
+        bodies=[_ground(shape), *_joints(shape), *_load(parameters, shape)],
+        lines=[*_arm(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
+        fixed=[Line(label="desired path", colour=_DESIRED, points=_path(parameters)[None], width=4.0)],
+        eye=(0.45, -1.45, 0.35),
+        notes=("The way of the tip is that of the tip itself, not of the tracker.",),
+    )
+
+
+def _path(parameters: Parameters) -> Floats:
+    p = parameters
+    found: list[Floats] = []
+    for segment in segments_of(p.path, p.x_0, p.x_g):
+        points, _ = segment.sampled(p.points, p.speed)
+        found += [segment.x_0[None], points]
+    return np.vstack(found)
+
+
+def _arm(shape: Floats) -> list[Line]:
+    """Return the links from shoulder to elbow and from elbow to gripper, 12 points each, and the gripper."""
+    radius: float = ArmParams().R_link
+    parts = (("arm", _LINK, shape[:, 1:13], radius), ("arm", _LINK, shape[:, 12:], radius))
+    gripper = ("gripper", _SERVO, shape[:, -2:], _WIDER * radius)
+    return [
+        Line(label=label, colour=colour, points=points, radii=np.full(len(points[0]), r))
+        for label, colour, points, r in (*parts, gripper)
+    ]
+
+
+def _joints(shape: Floats) -> list[Body]:
+    """Return the base, and the servos at shoulder and elbow."""
+    radius = _WIDER * ArmParams().R_link
+    outline = radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+    base = prism(outline, 0.0, float(shape[0, 1, 2] - shape[0, 0, 2]))
+    servos = [Body(label="arm", colour=_SERVO, mesh=ball(radius), p_WB=shape[:, k]) for k in (1, 12)]
+    return [Body(label="arm", colour=_SERVO, mesh=base, p_WB=shape[:1, 0]), *servos]
+
+
+def _load(parameters: Parameters, shape: Floats) -> list[Body]:
+    if parameters.load <= 0.0:
+        return []
+    radius = (3.0 * parameters.load / (4.0 * np.pi * _DENSITY)) ** (1.0 / 3.0)
+    return [Body(label="load", colour=_LOAD, mesh=ball(radius), p_WB=shape[:, -1] - [0.0, 0.0, _BELOW])]
+
+
+def _hook(parameters: Parameters, shape: Floats) -> list[Line]:
+    if parameters.load <= 0.0:
+        return []
+    points = np.stack([shape[:, -1], shape[:, -1] - [0.0, 0.0, _BELOW]], axis=1)
+    return [Line(label="load", colour=_LOAD, points=points, width=3.0)]
+
+
+def _tips(record: Record, hybrid: bool) -> list[Line]:
+    way = Line(label="way of the tip", colour=_WAY, points=record["arm.p_WG"][:, None], width=4.0, trail=True)
+    if not hybrid:
+        return [way]
+    estimate = record["kinematics.p_WG_est"][:, None]
+    return [way, Line(label="tip, by the hybrid model", colour=_ESTIMATE, points=estimate, width=6.0)]
+
+
+def _ground(shape: Floats) -> Body:
+    """Return a plate below the arm."""
+    reach = 0.06 + float(np.max(shape[..., 0]))
+    side = max(0.15, 0.05 + float(np.max(np.abs(shape[..., 1]))))
+    outline = np.array([[-0.1, -side], [reach, -side], [reach, side], [-0.1, side]])
+    return Body(label="ground", colour=_GROUND, mesh=prism(outline, -0.006, 0.0), p_WB=np.zeros((1, 3)), opacity=0.5)

@@ -1,0 +1,40 @@
+"""Claims go to JSON and back."""
+
+import json
+
+import pytest
+
+from scenarios.published.claim import Claim, Verdict
+from scenarios.published.comparison_table import ComparisonTable
+
+CLAIM = Claim(
+    claim="It holds.",
+    published="11/15",
+    measured="79/80",
+    interval=(0.93, 1.0),
+    verdict=Verdict.NOT_REPRODUCED,
+    reason="By this rule.",
+    where="table I",
+)
+
+
+@pytest.mark.parametrize(
+    "claim", [CLAIM, Claim(claim="a", published="", measured="", verdict=Verdict.REPRODUCED, reason="")]
+)
+def test_a_claim_comes_back_from_json_as_it_was(claim: Claim):
+    assert Claim.from_data(json.loads(json.dumps(claim.as_data()))) == claim
+
+
+def test_verdicts_are_written_in_words():
+    assert CLAIM.as_data()["verdict"] == "not reproduced"
+
+
+@pytest.mark.parametrize("change", [{"verdict": "perhaps"}, {"interval": [0.5]}, {"colour": "red"}])
+def test_a_claim_of_another_form_is_refused(change: dict[str, object]):
+    with pytest.raises((KeyError, TypeError, ValueError, IndexError)):
+        Claim.from_data({**CLAIM.as_data(), **change})
+
+
+def test_a_row_of_another_length_than_the_header_is_refused():
+    with pytest.raises(ValueError, match="has 1 cells, the header 2"):
+        ComparisonTable(title="t", header=["a", "b"], rows=[["1"]])

@@ -1,0 +1,99 @@
+"""Intervals and tests give what textbooks and closed forms say."""
+
+import numpy as np
+import pytest
+
+from scenarios.published.statistics import (
+    compatible_counts,
+    paired_test,
+    success_interval,
+    time_interval,
+    two_proportions,
+)
+
+
+def test_an_interval_of_successes_is_that_of_clopper_and_pearson():
+    interval = success_interval(4, 20)
+    assert (interval.low, interval.high) == pytest.approx((0.0573340, 0.4366140), abs=1e-6)  # R's binom.test(4, 20)
+
+
+@pytest.mark.parametrize("n", [1, 3, 15, 80])
+def test_an_interval_without_a_failure_or_a_success_has_its_closed_form(n: int):
+    none, all_ = success_interval(0, n), success_interval(n, n)
+    assert (none.low, none.high) == pytest.approx((0.0, 1.0 - 0.025 ** (1.0 / n)))
+    assert (all_.low, all_.high) == pytest.approx((0.025 ** (1.0 / n), 1.0))
+
+
+@pytest.mark.parametrize(("successes", "n"), [(0, 0), (4, 3), (-1, 3)])
+def test_successes_without_trials_are_refused(successes: int, n: int):
+    with pytest.raises(ValueError, match=f"{successes} successes of {n} trials"):
+        success_interval(successes, n)
+
+
+def test_a_bootstrapped_mean_of_many_values_has_about_the_interval_of_the_normal_distribution():
+    x = np.random.default_rng(1).normal(5.0, 2.0, 400)
+    interval = time_interval(x, np.mean)
+    assert interval is not None
+    assert interval.method == "BCa bootstrap"
+    half = 1.96 * float(np.std(x, ddof=1)) / len(x) ** 0.5
+    assert (interval.low, interval.high) == pytest.approx((np.mean(x) - half, np.mean(x) + half), abs=0.1 * half)
+
+
+def test_a_bootstrap_leans_to_the_side_on_which_values_are_spread():
+    interval = time_interval(np.random.default_rng(2).exponential(1.0, 40), np.mean)
+    x = np.random.default_rng(2).exponential(1.0, 40)
+    assert interval is not None
+    assert interval.high - np.mean(x) > 1.1 * (np.mean(x) - interval.low)
+
+
+def test_a_bootstrap_is_the_same_for_the_same_seed():
+    x = [1.0, 2.5, 2.0, 4.0, 3.5]
+    assert time_interval(x, seed=3) == time_interval(x, seed=3)
+
+
+def test_a_bootstrap_of_fewer_than_three_values_says_nothing():
+    assert time_interval([1.0, 2.0]) is None
+    assert time_interval([1.0, 2.0, float("nan")]) is None
+
+
+@pytest.mark.parametrize(("values", "bounds"), [([2.0, 2.0, 2.0, 2.0], (2.0, 2.0)), ([1.0, 1.0, 1.0, 2.0], (1.0, 2.0))])
+def test_where_bca_is_not_defined_it_says_that_it_is_the_percentile_interval(
+    values: list[float], bounds: tuple[float, float]
+):
+    interval = time_interval(values)
+    assert interval is not None
+    assert (interval.low, interval.high) == bounds
+    assert interval.method.startswith("percentile bootstrap")
+
+
+def test_pairs_that_differ_decide_the_paired_test():
+    first = [True] * 9 + [False] * 1 + [True] * 30 + [False] * 5
+    second = [False] * 9 + [True] * 1 + [True] * 30 + [False] * 5
+    test = paired_test(first, second)
+    assert (test.only_first, test.only_second) == (9, 1)
+    assert test.p == pytest.approx(2 * (1 + 10) / 2**10)
+    assert test.first_is_better
+    assert not paired_test(second, first).first_is_better
+
+
+def test_five_pairs_that_differ_are_too_few_for_any_verdict():
+    assert not paired_test([True] * 5, [False] * 5).first_is_better
+    assert paired_test([True] * 6, [False] * 6).first_is_better
+
+
+def test_pairs_that_never_differ_say_nothing():
+    assert paired_test([True, False], [True, False]).p == 1.0
+
+
+def test_pairs_of_unequal_numbers_are_refused():
+    with pytest.raises(ValueError):  # noqa: PT011 (zip's own)
+        paired_test([True], [True, False])
+
+
+def test_the_lady_tasting_tea():
+    assert two_proportions(3, 4, 1, 4) == pytest.approx(34 / 70)
+
+
+def test_with_three_trials_of_theirs_hardly_a_count_can_be_told_apart():
+    assert compatible_counts(2, 3, 3) == (0, 3)
+    assert compatible_counts(0, 4, 4) == (0, 3)  # 4 of 4: p = 2 / C(8, 4)

@@ -1,0 +1,41 @@
+import os
+import shutil
+import sys
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from playwright.sync_api import Browser, sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parent))  # the modules beside the tests
+
+from scenarios.command import main
+
+_FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+)  # fmt: skip
+"""No network, no screen; space is drawn by software."""
+
+
+@pytest.fixture(scope="session")
+def browser() -> Generator[Browser, None, None]:
+    """Return a browser, one for all tests of a process."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        assert "CI" not in os.environ, "there is no chromium to look at pages with"
+        pytest.skip("there is no chromium to look at pages with")
+    with sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=chromium, args=_FLAGS)
+        yield made
+        made.close()
+
+
+@pytest.fixture(scope="session")
+def grasp(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run of `ir_grasp`; not to be changed."""
+    out = tmp_path_factory.mktemp("runs") / "grasp"
+    done = CliRunner().invoke(main, ["run", "ir_grasp", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    return out

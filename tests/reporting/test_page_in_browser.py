@@ -1,0 +1,38 @@
+"""A run's page in a browser: quiet, alone, drawn, in the colours of its reader, on a wide screen and on a phone."""
+
+from pathlib import Path
+
+import pytest
+from opened_page import opened, overflow, wait_until
+from playwright.sync_api import Browser, Page
+
+TEXT_COLOURS = "[...document.querySelectorAll('.plot .xtitle')].map(t => getComputedStyle(t).fill)"
+
+
+def drawn(page: Page) -> list[str]:
+    """Return the names of the curves in the explorer's plot."""
+    return page.evaluate("document.querySelector('.explorer .plot').data.map(trace => trace.name)")
+
+
+def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(browser: Browser, grasp: Path):
+    with opened(browser, grasp / "report.html") as page:
+        assert page.inner_text("h1") == "ir_grasp: succeeded"
+        assert page.locator(".plot").count() == page.locator(".plot:has(.main-svg)").count() > 0
+        page.fill(".explorer input", "range")
+        page.select_option(".explorer select", ["scene.range"])
+        wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")
+        assert drawn(page) == [f"scene.range[{i}]" for i in (1, 2, 3)]
+        light = page.evaluate(TEXT_COLOURS)
+        page.emulate_media(color_scheme="dark")
+        wait_until(page, f"({TEXT_COLOURS}).every((c, k) => c !== {light}[k])")
+        assert overflow(page) <= 0
+        page.set_viewport_size({"width": 400, "height": 800})
+        wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")
+        assert overflow(page) <= 0
+
+
+@pytest.mark.slow
+def test_a_page_opened_on_a_phone_in_the_dark(browser: Browser, grasp: Path):
+    with opened(browser, grasp / "report.html", width=400, scheme="dark") as page:
+        assert overflow(page) <= 0
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 23, 30)"

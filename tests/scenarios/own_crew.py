@@ -1,0 +1,54 @@
+"""A crew in this process, for tests of what is around crews: it carries runs out one after another."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+from scenarios.catalog import SCENARIOS
+from scenarios.interruption import Interruption
+from scenarios.parameters import parse_parameters
+from scenarios.run_folder import RunFolder
+from scenarios.runner import carry_out
+from scenarios.task import Task
+
+
+class OwnCrew:
+    """Carries out real runs; `before` is called with each order and may raise, or return why the run is lost."""
+
+    def __init__(self, before: Callable[[RunOrder], str] = lambda _order: "") -> None:
+        self.workers = 1
+        self.begun: list[str] = []
+        self._before = before
+
+    def check(self, folder: Path) -> None:
+        assert folder.is_dir()
+
+    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+        for order in orders:
+            self.begun.append(order.name)
+            lost = self._before(order)
+            if not lost:
+                _run(order)
+            yield RunAnswer(name=order.name, lost=lost, worker="here")
+
+
+def _run(order: RunOrder) -> None:
+    experiment = SCENARIOS[order.scenario]
+    unfinished = Path(order.runs) / f".{order.name}"
+    task = Task(
+        experiment=experiment(),
+        parameters=parse_parameters(experiment, order.parameters),
+        seed=order.seed,
+        fmus={unit: Path(file) for unit, file in order.fmus.items()},
+        folder=RunFolder(unfinished),
+        options=order.options,
+        presented=False,
+    )
+    try:
+        carry_out(task, lambda _t, _end: None, Interruption())
+    except BaseException:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise
+    os.replace(unfinished, Path(order.runs) / order.name)

@@ -1,0 +1,152 @@
+"""A campaign goes on where it stopped: what is done is kept, what is lost or damaged is done anew."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from own_crew import OwnCrew
+
+from scenarios.campaign.campaign import carry_out_campaign
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.run_order import RunOrder
+from scenarios.campaign.tally import Tally
+
+PLAN = CampaignPlan(
+    scenario="ir_grasp",
+    points=[{"forward": "0.03"}, {"forward": "0.1"}],
+    fixed={"strategy": "forward", "run_up": "0"},
+    repetitions=2,
+    seed=3,
+)
+NAMES = [run.name for run in PLAN.runs()]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("campaign") / "done"
+    carry_out_campaign(PLAN, CampaignFolder(path), OwnCrew(), lambda _tally: None)
+    return path
+
+
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path) -> CampaignFolder:
+    shutil.copytree(finished, tmp_path / "c")
+    return CampaignFolder(tmp_path / "c")
+
+
+def go_on(
+    folder: CampaignFolder, plan: CampaignPlan = PLAN, crew: OwnCrew | None = None
+) -> tuple[list[str], list[Tally]]:
+    """Return which runs were begun, and what was told."""
+    crew, told = crew or OwnCrew(), list[Tally]()
+    carry_out_campaign(plan, folder, crew, told.append)
+    return crew.begun, told
+
+
+def without_times(table: Path) -> list[dict[str, Any]]:
+    times = ("wall_", "cpu_", "pace_", "peak_memory")
+    return [{k: v for k, v in row.items() if not k.startswith(times)} for row in CampaignTable.read(table).rows]
+
+
+def test_each_run_has_a_row_in_the_plans_order(finished: Path):
+    table = CampaignTable.read(finished)
+    assert table.column("run").tolist() == NAMES
+    assert table.column("seed").tolist() == [run.seed for run in PLAN.runs()]
+    assert table.column("status").tolist() == ["done"] * 4
+    assert sorted(p.name for p in (finished / "runs").iterdir()) == NAMES
+    assert sorted(p.name for p in finished.iterdir()) == ["campaign.json", "fmus", "runs", "runs.parquet"]
+
+
+def test_what_is_done_is_not_begun_again(folder: CampaignFolder):
+    begun, told = go_on(folder)
+    assert begun == []
+    assert told == [Tally(total=4, kept=4, ended=4)]
+
+
+def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path, tmp_path: Path):
+    def interrupt(order: RunOrder) -> str:
+        if order.name == NAMES[1]:  # the third, as first repetitions of all points come first
+            raise KeyboardInterrupt
+        return ""
+
+    folder = CampaignFolder(tmp_path / "c")
+    with pytest.raises(KeyboardInterrupt):
+        go_on(folder, crew=OwnCrew(interrupt))
+    assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0], NAMES[2]]
+    begun, told = go_on(folder)
+    assert begun == [NAMES[1], NAMES[3]]
+    assert told[0] == Tally(total=4, kept=2, ended=2)
+    assert without_times(folder.table) == without_times(finished)
+
+
+def test_a_lost_run_is_a_row_with_its_reason_and_tried_again(tmp_path: Path):
+    folder = CampaignFolder(tmp_path / "c")
+    _, told = go_on(folder, crew=OwnCrew(lambda order: "its machine burnt" if order.name == NAMES[0] else ""))
+    assert told[-1] == Tally(total=4, ended=3, lost=1)
+    row = CampaignTable.read(folder.table).rows[0]
+    assert (row["status"], row["success"], row["reason"]) == ("lost", None, "its machine burnt")
+    assert (row["forward"], row["simulated_seconds"], row["steps"]) == (0.03, None, None)
+    begun, _ = go_on(folder)
+    assert begun == [NAMES[0]]
+    assert CampaignTable.read(folder.table).column("status").tolist() == ["done"] * 4
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]"])
+def test_a_run_whose_summary_is_damaged_is_done_anew(folder: CampaignFolder, content: str | None):
+    summary = folder.runs / NAMES[2] / "summary.json"
+    if content is None:
+        summary.unlink()
+    else:
+        summary.write_text(content)
+    assert go_on(folder)[0] == [NAMES[2]]
+    assert len(CampaignTable.read(folder.table)) == 4
+
+
+def test_a_run_that_was_interrupted_is_none(folder: CampaignFolder):
+    summary = folder.runs / NAMES[2] / "summary.json"
+    summary.write_text(json.dumps({**json.loads(summary.read_text()), "complete": False}))
+    assert go_on(folder)[0] == [NAMES[2]]
+
+
+def test_a_run_in_which_a_unit_failed_is_done(folder: CampaignFolder):
+    summary = folder.runs / NAMES[2] / "summary.json"
+    failed = {"complete": False, "success": False, "failure": {"kind": "x"}, "reason": "the hand broke"}
+    summary.write_text(json.dumps({**json.loads(summary.read_text()), **failed}))
+    begun, told = go_on(folder)
+    assert begun == []
+    assert told == [Tally(total=4, kept=4, ended=4, failed=1)]
+    row = CampaignTable.read(folder.table).rows[2]
+    assert (row["status"], row["success"], row["reason"]) == ("failed", None, "the hand broke")
+
+
+@pytest.mark.parametrize("damage", ["lost", "torn"])
+def test_the_table_is_made_anew_from_the_runs(folder: CampaignFolder, damage: str):
+    before = CampaignTable.read(folder.table).rows
+    if damage == "lost":
+        folder.table.unlink()
+    else:
+        folder.table.write_bytes(folder.table.read_bytes()[:2000])
+    assert go_on(folder)[0] == []
+    assert CampaignTable.read(folder.table).rows == before
+
+
+def test_left_overs_of_killed_runs_are_removed(folder: CampaignFolder):
+    left = folder.runs / f".{NAMES[0]}.abc"
+    left.mkdir()
+    (left / "signals.parquet.part").write_text("x")
+    go_on(folder)
+    assert not left.exists()
+
+
+def test_more_repetitions_add_runs(folder: CampaignFolder):
+    more = replace(PLAN, repetitions=3)
+    begun, _ = go_on(folder, more)
+    assert begun == [run.name for run in more.runs() if run.repetition == 2]
+    table = CampaignTable.read(folder.table)
+    assert table.column("run").tolist() == [run.name for run in more.runs()]
+    assert folder.read()["repetitions"] == 3

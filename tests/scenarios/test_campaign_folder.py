@@ -1,0 +1,186 @@
+"""A folder is of one campaign: another one, or something else, is refused and left as it was."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cosim.exceptions import RecordNotWritten
+from cosim.master_options import Algorithm, MasterOptions
+from cosim.record.file_lock import folder_locked
+from scenarios.campaign.bad_crew import BadCrew
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_place import place_of
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.run_folder import BadRunFolder
+
+PLAN = CampaignPlan(
+    scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"thing": "cylinder"}, repetitions=2
+)
+
+
+@pytest.fixture
+def fmus(tmp_path: Path) -> dict[str, Path]:
+    (tmp_path / "built").mkdir()
+    files = {unit: tmp_path / "built" / f"{unit}.fmu" for unit in ("scene", "reflex")}
+    for unit, file in files.items():
+        file.write_text(unit)
+    return files
+
+
+@pytest.fixture
+def folder(tmp_path: Path, fmus: dict[str, Path]) -> CampaignFolder:
+    folder = CampaignFolder(tmp_path / "c")
+    begin(folder, PLAN, fmus)
+    return folder
+
+
+def begin(folder: CampaignFolder, plan: CampaignPlan, fmus: dict[str, Path]) -> dict[str, Path]:
+    with folder.opened(plan, fmus, lambda _path: None) as copies:
+        return copies
+
+
+def content(folder: CampaignFolder) -> dict[str, bytes]:
+    return {str(p): p.read_bytes() for p in folder.path.rglob("*") if p.is_file()}
+
+
+def refusal(folder: CampaignFolder, plan: CampaignPlan, fmus: dict[str, Path]) -> str:
+    before = content(folder)
+    with pytest.raises(BadRunFolder) as caught:
+        begin(folder, plan, fmus)
+    assert content(folder) == before
+    return caught.value.fault
+
+
+def test_it_holds_copies_of_the_fmus(folder: CampaignFolder, fmus: dict[str, Path]):
+    fmus["scene"].rename(fmus["scene"].with_suffix(".moved"))
+    assert (folder.fmus / "scene.fmu").read_text() == "scene"
+    assert folder.read()["units"]["scene"]["fmu"] == "scene.fmu"
+
+
+def test_a_damaged_copy_is_made_anew(folder: CampaignFolder, fmus: dict[str, Path]):
+    (folder.fmus / "scene.fmu").write_text("half")
+    assert begin(folder, PLAN, fmus)["scene"].read_text() == "scene"
+
+
+def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fmus: dict[str, Path]):
+    (tmp_path / "other").mkdir()
+    other = fmus["reflex"].rename(tmp_path / "other" / "scene.fmu")
+    copies = begin(CampaignFolder(tmp_path / "d"), PLAN, {**fmus, "reflex": other})
+    assert {unit: (p.name, p.read_text()) for unit, p in copies.items()} == {
+        "scene": ("scene_scene.fmu", "scene"),
+        "reflex": ("reflex_scene.fmu", "reflex"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"scenario": "flyer_impedance"}, "scenario is ir_grasp there, flyer_impedance in this call"),
+        ({"points": [{"forward": "0.03"}]}, "forward is 0.03,0.1 there, 0.03 in this call"),
+        ({"points": [{"standoff": "0.1"}] * 2}, "standoff is not given there, 0.1 in this call"),
+        ({"fixed": {"thing": "paper_box_a"}}, "thing is cylinder there, paper_box_a in this call"),
+        ({"fixed": {}}, "thing is cylinder there, not given in this call"),
+        ({"seed": 5}, "seed is 0 there, 5 in this call"),
+        ({"paired": True}, "paired is False there, True in this call"),
+        ({"repetitions": 1}, "repetitions is 2 there, 1 in this call"),
+        ({"experiment": "ir-table"}, "experiment is not given there, ir-table in this call"),
+        (
+            {"options": MasterOptions(algorithm=Algorithm.JACOBI)},
+            "master's algorithm is gauss-seidel there, jacobi in this call",
+        ),
+        ({"options": MasterOptions(pace=1)}, "master's pace is not given there, 1 in this call"),
+    ],
+)
+def test_another_campaign_is_refused(folder: CampaignFolder, fmus: dict[str, Path], change: dict[str, Any], told: str):
+    fault = refusal(folder, replace(PLAN, **change), fmus)
+    assert fault.startswith("it is of another campaign: ")
+    assert told in fault
+
+
+def test_points_of_the_same_values_that_are_combined_otherwise(tmp_path: Path, fmus: dict[str, Path]):
+    def plan(*pairs: tuple[str, str]) -> CampaignPlan:
+        return replace(PLAN, points=[{"forward": forward, "standoff": standoff} for forward, standoff in pairs])
+
+    folder = CampaignFolder(tmp_path / "c")
+    begin(folder, plan(("1", "2"), ("3", "4")), fmus)
+    assert "to 2 points there" in refusal(folder, plan(("1", "2"), ("3", "4"), ("1", "4")), fmus)
+
+
+def test_another_fmu_and_another_version_are_refused(folder: CampaignFolder, fmus: dict[str, Path]):
+    fmus["scene"].write_text("another")
+    assert "unit scene is scene.fmu (sha256 " in refusal(folder, PLAN, fmus)
+    fmus["scene"].write_text("scene")
+    told = folder.read()
+    told["versions"]["numpy"] = "1.0"
+    (folder.path / "campaign.json").write_text(json.dumps(told))
+    assert "version of numpy is 1.0 there, " in refusal(folder, PLAN, fmus)
+
+
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [("{", "its campaign.json is damaged: "), ("[]", "it holds no JSON object"), ("{}", "not given")],
+)
+def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[str, Path], damage: str, told: str):
+    (folder.path / "campaign.json").write_text(damage)
+    assert told in refusal(folder, PLAN, fmus)
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path: Path, fmus: dict[str, Path]):
+    other = CampaignFolder(tmp_path / "built")
+    assert "it is not empty and has no campaign.json" in refusal(other, PLAN, fmus)
+    assert "there is a file of that name" in refusal(CampaignFolder(fmus["scene"]), PLAN, fmus)
+
+
+def test_a_second_command_is_refused(folder: CampaignFolder, fmus: dict[str, Path]):
+    with folder_locked(folder.path):
+        assert refusal(folder, PLAN, fmus) == "another command is at work on this campaign"
+
+
+def test_a_call_killed_before_it_told_its_campaign_is_no_obstacle(tmp_path: Path, fmus: dict[str, Path]):
+    folder = CampaignFolder(tmp_path / "c")
+    folder.path.mkdir()
+    (folder.path / "campaign.json.part").write_text("{")
+    begin(folder, PLAN, fmus)
+    assert folder.read()["scenario"] == "ir_grasp"
+
+
+def test_workers_that_are_refused_leave_no_folder(tmp_path: Path, fmus: dict[str, Path]):
+    def refuse(path: Path) -> None:
+        assert path.is_dir()
+        raise BadCrew("no")
+
+    folder = CampaignFolder(tmp_path / "a" / "b" / "c")
+    with pytest.raises(BadCrew), folder.opened(PLAN, fmus, refuse):
+        pass
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_disk_without_room_for_the_plan_leaves_no_folder(
+    tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+):
+    def refuse(*_given: Any, **_options: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    folder = CampaignFolder(tmp_path / "c")
+    monkeypatch.setattr("os.replace", refuse)
+    with pytest.raises(RecordNotWritten, match="No space left"):
+        begin(folder, PLAN, fmus)
+    assert not folder.path.exists()
+
+
+def test_without_a_folder_the_newest_incomplete_campaign_of_the_plan_goes_on(
+    tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert place_of(PLAN, fmus).path.parent == Path("campaigns")
+    for name, plan in (("2026-01-01", PLAN), ("2026-01-02", PLAN), ("2026-01-03", replace(PLAN, seed=1))):
+        begin(CampaignFolder(Path(f"campaigns/{name}_ir_grasp")), plan, fmus)
+    Path("campaigns/2026-01-04_ir_grasp").mkdir()
+    newest = CampaignFolder(Path("campaigns/2026-01-02_ir_grasp"))
+    assert place_of(PLAN, fmus).path == newest.path
+    for run in PLAN.runs():
+        (newest.runs / run.name).mkdir()
+    assert not place_of(PLAN, fmus).path.exists()

@@ -1,0 +1,110 @@
+"""`name=values` texts of a sweep: what they mean, and what is told of those that mean nothing."""
+
+import pytest
+
+from scenarios.campaign.grid import parse_grid, set_parameters
+from scenarios.free_flyer.robot_to_human import RobotToHuman
+from scenarios.helix_handover.helix_handover import HelixHandover
+from scenarios.ir_grasp.ir_grasp import IrGrasp
+from scenarios.parameters import BadParameter
+from scenarios.vsl.vsl_hybrid import VslHybrid
+
+
+def faults(*given: str) -> list[str]:
+    with pytest.raises(BadParameter) as caught:
+        parse_grid(HelixHandover, given)
+    return list(caught.value.faults)
+
+
+def values(text: str) -> list[str]:
+    return [next(iter(point.values())) for point in parse_grid(HelixHandover, [text])]
+
+
+def test_all_combinations_the_last_parameter_varying_fastest():
+    points = parse_grid(IrGrasp, ["strategy=reflex,blind", "perturbed=true,False"])
+    assert points == [
+        {"strategy": strategy, "perturbed": perturbed}
+        for strategy in ("reflex", "blind")
+        for perturbed in ("true", "false")
+    ]
+
+
+def test_nothing_given_is_one_point_that_sets_nothing():
+    assert parse_grid(HelixHandover, []) == [{}]
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("alpha=0.1,.20,4e-1", ["0.1", "0.2", "0.4"]),
+        ("alpha=0.1:0.4:4", ["0.1", "0.2", "0.3", "0.4"]),
+        ("alpha=1:0.5:2", ["1", "0.5"]),
+        ("height=-1:-0.5:3", ["-1", "-0.75", "-0.5"]),
+        ("place=Front,back_left", ["front", "back_left"]),
+    ],
+)
+def test_values_have_one_text_whatever_was_written(text: str, wanted: list[str]):
+    assert values(text) == wanted
+
+
+def test_a_range_of_whole_numbers():
+    assert parse_grid(VslHybrid, ["points=10:30:3"]) == [{"points": "10"}, {"points": "20"}, {"points": "30"}]
+    with pytest.raises(BadParameter, match=r"points: 12\.5 is not a whole number"):
+        parse_grid(VslHybrid, ["points=10:15:3"])
+
+
+def test_arrays_stand_between_semicolons():
+    points = parse_grid(RobotToHuman, ["p_WG_handover=0,-0.07,0;0.1,0,0"])
+    assert points == [{"p_WG_handover": "0,-0.07,0"}, {"p_WG_handover": "0.1,0,0"}]
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("alpha", "'alpha' is not of the form name=v1,v2,... or name=START:STOP:N"),
+        ("alpah=1", "helix_handover has no parameter 'alpah'; did you mean alpha?"),
+        ("alpha=", "alpha: the list of values is empty"),
+        ("alpha=0.1,,0.2", "alpha: '0.1,,0.2' has an empty item"),
+        ("alpha=0.1,", "alpha: '0.1,' has an empty item"),
+        ("alpha=1:2", "alpha: '1:2' is not of the form START:STOP:N, such as 0.1:0.5:5"),
+        ("alpha=a:b:3", "alpha: 'a:b:3' is not of the form START:STOP:N: START and STOP are finite numbers"),
+        ("alpha=0:inf:3", "alpha: '0:inf:3' is not of the form START:STOP:N: START and STOP are finite numbers"),
+        ("alpha=nan:1:3", "alpha: 'nan:1:3' is not of the form START:STOP:N: START and STOP are finite numbers"),
+        ("alpha=0:1:0", "alpha: '0:1:0' is not of the form START:STOP:N: N is a whole number of values from 2 on"),
+        ("alpha=0:1:x", "alpha: '0:1:x' is not of the form START:STOP:N: N is a whole number of values from 2 on"),
+        ("alpha=0:1:2.5", "alpha: '0:1:2.5' is not of the form START:STOP:N: N is a whole number of values from 2 on"),
+        ("alpha=0.1:1:200000", "alpha: '0.1:1:200000' has 200,000 values; at most 100,000 runs can be planned"),
+        ("alpha=1:1:3", "alpha: '1:1:3' begins where it ends, at 1"),
+        ("alpha=0.1,2", "alpha: 2.0 is out of range: from 0.01 to 1"),
+        ("alpha=0.1,nan", "alpha: nan is not finite, from 0.01 to 1"),
+        ("alpha=0.1,0.10", "alpha: 0.10 is given twice"),
+        ("place=front,rihgt", "place: 'rihgt' is none of front, front_left, left, back_left"),
+        ("place=lfet", "place: 'lfet' is none of front, front_left, left, back_left; did you mean left"),
+    ],
+)
+def test_what_means_nothing_is_told_in_a_line(text: str, fault: str):
+    (told,) = faults(text)
+    assert told.startswith(fault)
+
+
+def test_all_faults_are_told_at_once():
+    assert len(faults("alpha=9", "alpha=0.1", "beta=1", "radius=0:1")) == 4
+
+
+def test_a_grid_too_large_is_refused_before_it_is_made():
+    assert faults("alpha=0.1:0.9:9000", "radius=0:1:9000")[-1] == (
+        "the grid has 81,000,000 points; at most 100,000 runs can be planned"
+    )
+
+
+def test_a_parameter_cannot_be_varied_and_set():
+    points = parse_grid(HelixHandover, ["alpha=0.1,0.2"])
+    assert set_parameters(HelixHandover, ["patience=1"], points) == {"patience": "1"}
+    with pytest.raises(BadParameter) as caught:
+        set_parameters(HelixHandover, ["alpha=0.3", "patience=1", "patience=2", "alhpa=1", "x"], points)
+    assert list(caught.value.faults) == [
+        "alpha is varied and set by -p; one of both is right",
+        "patience is given twice",
+        "helix_handover has no parameter 'alhpa'; did you mean alpha?",
+        "'x' is not of the form name=value",
+    ]

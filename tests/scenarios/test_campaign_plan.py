@@ -1,0 +1,64 @@
+"""Names and seeds of a campaign's runs, which later calls of the same campaign rely on."""
+
+import re
+from dataclasses import replace
+
+from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
+
+PLAN = CampaignPlan(
+    scenario="ir_grasp",
+    points=[{"thing": "cylinder", "forward": "0.1"}, {"thing": "paper_box_a", "forward": "0.1"}],
+    fixed={"strategy": "forward"},
+    repetitions=3,
+    seed=7,
+)
+SEEDS = [6558637776629615, 7582661982661486, 8804234512720521, 11597181391079, 174569547476390, 5151011548111942]
+PAIRED = [1653442781704951, 1973877946906281, 8573731580185675]
+
+
+def test_seeds_are_these_for_ever():
+    assert [run.seed for run in PLAN.runs()] == SEEDS
+    assert [run.seed for run in replace(PLAN, paired=True).runs()] == PAIRED * 2
+
+
+def test_runs_are_in_the_order_of_points_and_have_all_parameters():
+    assert [(run.point, run.repetition) for run in PLAN.runs()] == [(p, r) for p in range(2) for r in range(3)]
+    assert PLAN.runs()[3].parameters == {"strategy": "forward", "thing": "paper_box_a", "forward": "0.1"}
+    assert PLAN.size == 6
+
+
+def test_more_repetitions_leave_names_and_seeds_of_the_others():
+    before = {run.name: run.seed for run in PLAN.runs()}
+    after = {run.name: run.seed for run in replace(PLAN, repetitions=2000).runs()}
+    assert {name: after[name] for name in before} == before
+
+
+def test_all_runs_of_a_large_campaign_differ_in_seed_and_name():
+    runs = CampaignPlan(scenario="ir_grasp", points=[{"forward": "0.1"}] * 10, repetitions=1000).runs()
+    assert len({run.seed for run in runs}) == len({run.name for run in runs}) == 10_000
+    assert [run.name for run in runs] == sorted(run.name for run in runs)
+    assert all(0 <= run.seed < 2**53 for run in runs)
+
+
+def test_names_are_those_of_files_whatever_the_values_are():
+    values = {"model": "/home/x/my model.json", "load": "0.1", "pressure": "1" * 90}
+    (run, *_, last) = CampaignPlan(scenario="vsl_hybrid", points=[values], repetitions=MOST_REPETITIONS).runs()
+    assert run.name.startswith("000_model=-home-x-my-model.json_load=0.1_pressure=111")
+    assert re.fullmatch(r"[A-Za-z0-9.,=+_-]{80}", run.name)
+    assert last.name.endswith("_r9999")
+
+
+def test_a_campaign_that_varies_nothing_has_plain_names():
+    assert [run.name for run in CampaignPlan(scenario="ir_grasp", points=[{}], repetitions=2).runs()] == [
+        "000_r0000",
+        "000_r0001",
+    ]
+
+
+def test_paired_points_of_different_scenes_share_no_seed():
+    points = [{"thing": thing, "strategy": s} for thing in ("cylinder", "baby_cup_a") for s in ("reflex", "blind")]
+    plan = CampaignPlan(scenario="ir_grasp", points=points, repetitions=3, paired=True, scenes=("thing",))
+    seeds = [[r.seed for r in plan.runs() if r.point == point] for point in range(4)]
+    assert seeds[0] == seeds[1]
+    assert seeds[2] == seeds[3]
+    assert len({*seeds[0], *seeds[2]}) == 6

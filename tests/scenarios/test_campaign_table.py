@@ -1,0 +1,141 @@
+"""The table of a campaign: what its columns hold, and how they are read."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.run_row import RunRow
+from scenarios.campaign.table_writer import TableWriter, table_of
+from scenarios.experiment import Metric
+from scenarios.run_folder import BadRunFolder
+
+PLAN = CampaignPlan(
+    scenario="vsl_hybrid",
+    points=[{"load": "0.1", "path": "linear"}, {"load": "0.2", "path": "custom", "x_0": "0.3,0,0.05"}],
+    fixed={"points": "10", "model": ""},
+    repetitions=2,
+)
+MEAN = Metric(0.25, "m", "mean error")
+
+
+def rows() -> list[RunRow]:
+    first, second, third, _ = PLAN.runs()
+    metrics = {"mean": MEAN, "load": Metric(1.0, "kg", "what it carried"), "none": Metric(math.nan)}
+    spent = {"simulated": 5.0, "wall": 1.0, "cpu": 0.5}
+    return [
+        RunRow(run=first, status="done", success=True, reason="there", metrics=metrics, **spent),
+        RunRow(run=second, status="lost", success=None, reason="its machine burnt"),
+        RunRow(run=third, status="failed", success=None, reason="the arm broke", metrics={"late": MEAN}, **spent),
+    ]
+
+
+@pytest.fixture
+def table() -> CampaignTable:
+    return CampaignTable(table_of(PLAN, rows()))
+
+
+def test_columns_are_typed_and_told(table: CampaignTable):
+    schema: Any = table.table.schema
+    kinds = {name: str(schema.field(name).type) for name in table.table.column_names}
+    assert kinds == {
+        "run": "string",
+        "point": "int64",
+        "repetition": "int64",
+        "seed": "int64",
+        "status": "string",
+        "success": "bool",
+        "reason": "string",
+        "load": "double",
+        "path": "string",
+        "x_0": "list<item: double>",
+        "points": "int64",
+        "model": "string",
+        "simulated_seconds": "double",
+        "wall_seconds": "double",
+        "cpu_seconds": "double",
+        "mean": "double",
+        "load_metric": "double",
+        "none": "double",
+        "late": "double",
+    }
+    assert table.parameters == ("load", "path", "x_0", "points", "model")
+    assert table.metrics == ("mean", "load_metric", "none", "late")
+    assert [table.unit(name) for name in ("load", "path", "mean", "none", "cpu_seconds")] == ["kg", "1", "m", "1", "s"]
+    assert table.description("mean") == "mean error"
+
+
+def test_columns_as_arrays(table: CampaignTable):
+    np.testing.assert_array_equal(table.column("mean"), [0.25, math.nan, math.nan])
+    np.testing.assert_array_equal(table.column("none"), [math.nan] * 3)
+    assert table.column("success").tolist() == [True, None, None]
+    assert table.column("points").dtype == np.int64
+    assert table.column("x_0").tolist() == [[0.3, 0, 0.05]] * 3  # a point that does not set it has its start
+    with pytest.raises(KeyError, match="no column 'meen': did you mean mean"):
+        table.column("meen")
+
+
+@pytest.mark.parametrize(
+    ("values", "found"),
+    [
+        ({"load": 0.1}, 2),
+        ({"load": "0.10"}, 2),
+        ({"load": 0.2, "path": "custom"}, 1),
+        ({"load": 0.3}, 0),
+        ({"success": "true"}, 1),
+        ({"success": None}, 2),
+        ({"x_0": "0.3,0,0.05"}, 3),
+        ({"x_0": [0, 0, 0]}, 0),
+        ({"point": 0, "repetition": 1}, 1),
+        ({}, 3),
+    ],
+)
+def test_rows_of_given_values(table: CampaignTable, values: dict[str, Any], found: int):
+    assert len(table.where(**values)) == found
+
+
+def test_without_rows_it_has_its_columns():
+    table = CampaignTable(table_of(PLAN, []))
+    assert (table.rows, table.metrics, table.column("load").tolist()) == ([], (), [])
+
+
+def test_rows_come_in_any_order_and_are_in_the_plans(tmp_path: Path, table: CampaignTable):
+    writer = TableWriter(PLAN, tmp_path / "runs.parquet")
+    for row in reversed(rows()):
+        writer.add(row)
+    writer.write()
+    assert CampaignTable.read(tmp_path).column("run").tolist() == table.column("run").tolist()
+    assert CampaignTable.read(tmp_path).metrics == table.metrics
+
+
+def test_it_is_written_seldom_while_runs_come_fast(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    now = [100.0]
+    written: list[float] = []
+    write_table: Any = pq.write_table
+
+    def take_a_second(*given: Any) -> None:
+        write_table(*given)
+        written.append(now[0])
+        now[0] += 0.05
+
+    monkeypatch.setattr("scenarios.campaign.table_writer.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("scenarios.campaign.table_writer.pq.write_table", take_a_second)
+    writer = TableWriter(PLAN, tmp_path / "runs.parquet")
+    for _ in range(1000):
+        now[0] += 0.1
+        writer.add(rows()[0])
+    assert 9 <= len(written) <= 10  # 0.05 s each in 100 s
+
+
+def test_a_table_that_is_none_or_torn_is_told(tmp_path: Path, table: CampaignTable):
+    with pytest.raises(BadRunFolder, match=r"it has no runs\.parquet"):
+        CampaignTable.read(tmp_path)
+    pq.write_table(table.table, tmp_path / "runs.parquet")
+    (tmp_path / "runs.parquet").write_bytes((tmp_path / "runs.parquet").read_bytes()[:900])
+    with pytest.raises(BadRunFolder, match=r"its runs\.parquet is damaged"):
+        CampaignTable.read(tmp_path)

@@ -1,0 +1,65 @@
+"""Camera pictures in a run's folder: what is written is read back, and nothing of an earlier end stays."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from scenarios.reporting.camera_picture import CameraPicture, Mark
+from scenarios.reporting.kept_pictures import read_pictures, write_pictures
+from scenarios.run_folder import BadRunFolder
+
+MARK = Mark(label="ball, as measured", shape="circle", u=30.5, v=20.0, radius=6.0, colour="#ffd23f")
+
+
+def shaded() -> NDArray[np.uint8]:
+    """Return a picture of 40 rows and 60 columns, bright and blue towards the right."""
+    pixels = np.zeros((40, 60, 3), dtype=np.uint8)
+    pixels[..., 0] = np.linspace(0, 250, 60, dtype=np.uint8)
+    return pixels
+
+
+def taken(role: str, t: float = 0.0, *marks: Mark) -> CameraPicture:
+    return CameraPicture.take(t=t, camera="left", role=role, pixels=shaded(), marks=marks)
+
+
+def test_pictures_are_read_back_as_they_were(tmp_path: Path):
+    pictures = [taken("start"), taken("at the ball", 8.0, MARK)]
+    write_pictures(tmp_path / "pictures", pictures)
+    assert read_pictures(tmp_path / "pictures") == pictures
+    told = json.loads((tmp_path / "pictures" / "pictures.json").read_text())
+    assert {name: told[1][name] for name in ("t", "camera", "role", "file", "width", "height")} == {
+        "t": 8.0, "camera": "left", "role": "at the ball", "file": "02_at_the_ball_left.jpg", "width": 60, "height": 40,
+    }  # fmt: skip
+    mark = {"label": "ball, as measured", "shape": "circle", "u": 30.5, "v": 20.0, "radius": 6.0, "colour": "#ffd23f"}
+    assert told[1]["marks"] == [mark]
+
+
+def test_the_pixels_are_those_that_were_taken_but_for_jpegs_loss():
+    assert np.max(np.abs(taken("start").pixels.astype(int) - shaded())) < 25
+
+
+def test_pictures_of_an_earlier_end_do_not_stay(tmp_path: Path):
+    write_pictures(tmp_path / "pictures", [taken("start"), taken("end", 3.0)])
+    write_pictures(tmp_path / "pictures", [taken("start")])
+    assert sorted(p.name for p in (tmp_path / "pictures").iterdir()) == ["01_start_left.jpg", "pictures.json"]
+    write_pictures(tmp_path / "pictures", [])
+    assert not (tmp_path / "pictures").exists()
+    assert read_pictures(tmp_path / "pictures") == []
+
+
+@pytest.mark.parametrize("content", ["[{]", '[{"t": 0.0}]', "[1]", '{"a": 1}'])
+def test_a_damaged_list_is_told_as_such(content: str, tmp_path: Path):
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "pictures" / "pictures.json").write_text(content)
+    with pytest.raises(BadRunFolder, match=r"its pictures\.json is damaged"):
+        read_pictures(tmp_path / "pictures")
+
+
+def test_a_picture_that_is_gone_is_named(tmp_path: Path):
+    write_pictures(tmp_path / "pictures", [taken("start")])
+    (tmp_path / "pictures" / "01_start_left.jpg").unlink()
+    with pytest.raises(BadRunFolder, match=r"01_start_left\.jpg cannot be read: No such file"):
+        read_pictures(tmp_path / "pictures")

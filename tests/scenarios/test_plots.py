@@ -1,0 +1,121 @@
+"""What scenarios give to be drawn over time, from real runs: what it is, in its unit, however short the record is."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from flyer_runs import metric, run
+
+from scenarios.catalog import SCENARIOS
+from scenarios.ended import Ended
+from scenarios.experiment import Experiment
+from scenarios.parameters import parse_parameters
+from scenarios.record import Record
+from scenarios.reporting.time_plot import Curve, TimePlot
+
+FAST = {
+    "ir_grasp": (),
+    "flyer_impedance": (),
+    "vsl_hybrid": ("points=5", "settle=1", "speed=0.2"),
+    "helix_handover": ("patience=1",),
+    "flyer_robot_to_human": ("patience=1",),
+}
+
+
+class Run:
+    """A run, with what it was asked for and what it left."""
+
+    def __init__(self, name: str, given: tuple[str, ...], out: Path) -> None:
+        scenario: type[Experiment[Any]] = SCENARIOS[name]
+        self.ended: Ended = run(scenario, out, *given)
+        self.experiment, self.parameters = scenario(), parse_parameters(scenario, given)
+        self.file = out / "signals.parquet"
+        self.record = Record(self.file)
+        self.plots = {p.title: p for p in self.experiment.plots(self.parameters, self.record)}
+
+    def curve(self, title: str, label: str) -> Curve:
+        return next(c for c in self.plots[title].curves if c.label == label)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
+    folder = tmp_path_factory.mktemp("runs")
+    return {name: Run(name, given, folder / name) for name, given in FAST.items()}
+
+
+def check(plots: list[TimePlot], record: Record) -> None:
+    for plot in plots:
+        labels = [c.label for c in plot.curves]
+        assert len(set(labels)) == len(labels)
+        assert all(c.values.shape == record.time.shape for c in plot.curves), plot.title
+        assert not plot.phases or record.items(plot.phases)
+
+
+@pytest.mark.parametrize("name", FAST)
+def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: dict[str, Run]):
+    done = runs[name]
+    assert 3 <= len(done.plots) <= 7
+    check(list(done.plots.values()), done.record)
+    assert all(any(np.isfinite(c.values).any() for c in p.curves) for p in done.plots.values())
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+@pytest.mark.parametrize("name", FAST)
+def test_a_record_of_a_row_or_two_is_no_fault(name: str, rows: int, runs: dict[str, Run], tmp_path: Path):
+    done = runs[name]
+    pq.write_table(pq.read_table(done.file).slice(0, rows), tmp_path / "signals.parquet")
+    short = Record(tmp_path / "signals.parquet")
+    check(list(done.experiment.plots(done.parameters, short)), short)
+
+
+def test_every_scenario_has_plots_of_its_own():
+    assert all(s.plots is not Experiment.plots for s in SCENARIOS.values())
+
+
+def test_the_helix_true_distance_ends_where_the_summary_says(runs: dict[str, Run]):
+    done = runs["helix_handover"]
+    curve = done.curve("Distance to the goal", "gripper to ball, true")
+    assert curve.values[-1] == pytest.approx(1000 * metric(done.ended, "final_distance"))
+    descends, grasps = done.plots["Distance to the goal"].levels
+    assert (descends.value, grasps.value) == pytest.approx((50.0, 20.0))
+
+
+def test_a_push_disagrees_with_the_model_as_much_as_the_summary_says(runs: dict[str, Run]):
+    done = runs["flyer_impedance"]
+    title = "Error of the gripper's position, rest minus actual"
+    apart = [
+        np.nanmax(
+            np.abs(done.curve(title, f"{axis}, actual").values - done.curve(title, f"{axis}, by the model").values)
+        )
+        for axis in "xyz"
+    ]
+    assert max(apart) == pytest.approx(1000 * metric(done.ended, "disagreement_position"))
+
+
+def test_joints_are_in_degrees_and_the_error_is_drawn_on_the_path_only(runs: dict[str, Run]):
+    done = runs["vsl_hybrid"]
+    assert done.curve("Joints", "J2, measured").values == pytest.approx(np.degrees(done.record["arm.q_meas"][:, 1]))
+    error = done.curve("Error of the tip, on the path", "tip by the tracker").values
+    assert (np.isfinite(error) == done.record["planner.moving"]).all()
+    assert np.nanmax(error) >= 1000 * metric(done.ended, "max_error") - 1e-9
+
+
+def test_fingers_that_see_nothing_are_not_drawn(runs: dict[str, Run]):
+    done = runs["ir_grasp"]
+    title = "Distances of the fingers from the object"
+    for i, finger in enumerate(("thumb", "index", "ring")):
+        seen = done.curve(title, f"{finger}, as seen").values
+        assert np.array_equal(np.isnan(seen), done.record["reflex.distance"][:, i] >= 0.065)
+    assert done.plots["Cost of thumb and ring, [Luberto] eq. (4)"].logarithmic
+    assert min(done.curve("Cost of thumb and ring, [Luberto] eq. (4)", "cost f").values) > 0.0
+
+
+def test_commands_far_beyond_the_thrusters_are_left_out(runs: dict[str, Run]):
+    done = runs["flyer_robot_to_human"]
+    commanded = done.curve("Force of the thrusters in B", "x, commanded").values
+    asked = done.record["impedance.f_cmd"][:, 0] + done.record["pose.f_cmd"][:, 0]
+    drawn = np.isfinite(commanded)
+    assert commanded[drawn] == pytest.approx(asked[drawn])
+    assert np.nanmax(np.abs(commanded)) <= 2.0 * np.abs(done.record["thrusters.f_B"]).max()

@@ -1,0 +1,67 @@
+"""Every scenario can be seen in space: its replay is complete, finite and small."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
+
+from flyer_runs import run
+
+from scenarios.catalog import SCENARIOS
+from scenarios.parameters import parse_parameters
+from scenarios.record import Record
+from scenarios.reporting.replay import Body, Line
+from scenarios.reporting.replay_section import replay_section
+
+MUST_SHOW = {
+    "helix_handover": {"arm", "gripper", "hand", "ball", "cameras"},
+    "vsl_model_based": {"arm", "gripper", "load", "desired path", "way of the tip"},
+    "vsl_hybrid": {"arm", "gripper", "load", "desired path", "way of the tip", "tip, by the hybrid model"},
+    "flyer_impedance": {"robot", "gripper", "push", "place of rest"},
+    **{
+        f"flyer_{task}": {"robot", "arm", "gripper", "object", "hand"}
+        for task in ("robot_to_human", "human_to_robot", "failed_reception", "collaborative")
+    },
+    "ir_grasp": {"palm", "thumb", "index", "ring", "object", "beams"},
+}
+FIRST = ("helix_handover", "vsl_hybrid", "flyer_human_to_robot")
+SHORT = {"helix_handover": ("patience=1",)}
+LARGEST = 400_000
+
+
+def test_every_scenario_is_looked_at_here():
+    assert set(MUST_SHOW) == set(SCENARIOS)
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
+def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
+    given = SHORT.get(name, ())
+    run(SCENARIOS[name], tmp_path / "run", *given)
+    record = Record(tmp_path / "run" / "signals.parquet")
+    replay = SCENARIOS[name]().replay(parse_parameters(SCENARIOS[name], given), record)
+    assert replay is not None
+    drawn = [*replay.bodies, *replay.lines, *replay.fixed]
+    assert {d.label for d in drawn} >= MUST_SHOW[name]
+    for d in drawn:
+        check(d, len(record.time))
+    assert len(replay_section(replay, record).html) < LARGEST
+
+
+def check(drawn: Line | Body, rows: int) -> None:
+    if isinstance(drawn, Line):
+        assert len(drawn.points) in (1, rows)
+        assert drawn.points.ndim == 3
+        gone = np.isnan(drawn.points).any(axis=(1, 2))
+        assert np.isfinite(drawn.points[~gone]).all()
+        assert drawn.radii is None or drawn.radii.shape == drawn.points.shape[1:2]
+        return
+    assert len(drawn.p_WB) in (1, rows)
+    assert np.isfinite(drawn.mesh.vertices).all()
+    assert np.isfinite(drawn.p_WB).all()
+    assert 0 <= drawn.mesh.triangles.min() <= drawn.mesh.triangles.max() < len(drawn.mesh.vertices)
+    if drawn.q_WB is not None:
+        assert len(drawn.q_WB) == len(drawn.p_WB)
+        np.testing.assert_allclose(np.linalg.norm(drawn.q_WB, axis=1), 1.0, atol=1e-9)

@@ -1,0 +1,76 @@
+"""What a run's folder tells of its title, parameters, units and connections, so that a page can be made of it later."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from failing_systems import failing_ssp, native_fmu, start
+from flyer_runs import run
+
+from cosim.system import System
+from fmus.build import cached
+from scenarios.command import main
+from scenarios.ir_grasp.ir_grasp import IrGrasp
+from scenarios.told_system import told_system
+
+
+def read(out: Path, name: str) -> dict[str, Any]:
+    return json.loads((out / name).read_text())
+
+
+def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):
+    ended = run(IrGrasp, tmp_path / "out", "thing=paper_box_a")
+    told = read(tmp_path / "out", "run.json")
+    assert told["title"] == IrGrasp.title
+    assert told["headline"] == list(IrGrasp.headline)
+    names = [name for name, _, _ in told["told_parameters"]]
+    assert names == [v.name for v in IrGrasp.parameters()]
+    assert ["forward", "0.035 m", "how far forward, for that strategy"] in told["told_parameters"]
+    assert told["told_parameters"][0][1] == "paper_box_a"
+    assert told["system"]["units"] == [
+        {"name": "scene", "model": "GraspScene", "fmi": "3", "period": 0.015, "sampled": False},
+        {"name": "reflex", "model": "IrReflex", "fmi": "3", "period": 0.015, "sampled": True},
+    ]
+    assert {"source": "scene.ticks", "target": "reflex.ticks", "unit": "tick", "size": 3, "kind": "real"} in (
+        told["system"]["connections"]
+    )
+    scene, reflex = ended.summary["units"]
+    assert (scene["name"], scene["model"], scene["step"]) == ("scene", "GraspScene (FMI 3)", "15 ms")
+    assert reflex["steps"] == pytest.approx(ended.summary["simulated_seconds"] / 0.015, abs=1)
+    assert 0.0 < reflex["cpu_seconds"] < scene["cpu_seconds"] < ended.summary["cpu_seconds"]
+
+
+def test_an_ssp_tells_the_same_and_a_unit_without_period_has_none(tmp_path: Path):
+    file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
+    done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), "--adaptive", "1e-3"])
+    assert done.exit_code == 0, done.output
+    told = read(out, "run.json")
+    assert told["told_parameters"] == told["headline"] == []
+    assert file.name in told["title"]
+    assert {unit["period"] for unit in told["system"]["units"]} == {None}
+    assert [u["name"] for u in read(out, "summary.json")["units"]] == [u["name"] for u in told["system"]["units"]]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no process can be forked that tells")
+def test_a_run_that_crashed_tells_its_units_but_not_their_cost(tmp_path: Path):
+    going = start(tmp_path, failing_ssp(tmp_path, "crashes"), "--out", "r")
+    going.communicate(timeout=120)
+    assert going.returncode == 3
+    units = read(tmp_path / "r", "summary.json")["units"]
+    assert [u["name"] for u in units] == [u["name"] for u in read(tmp_path / "r", "run.json")["system"]["units"]]
+    assert {(u["steps"], u["cpu_seconds"]) for u in units} == {(None, None)}
+
+
+def test_units_are_told_as_their_sources_have_them_and_pictures_as_binary():
+    s = System()
+    a, b = s.add("a", native_fmu("workshop", 3)), s.add("b", native_fmu("si", 3))
+    s.connect(a.y.length, b.u.length_in)
+    camera, vision = s.add("camera", cached("StereoCamera", 3)), s.add("vision", cached("HandoverVision", 3))
+    s.connect(camera.y.left, vision.u.left)
+    s.check()
+    length, picture = told_system(s, adaptive=False)["connections"]
+    assert (length["unit"], length["kind"], length["size"]) == ("mm", "real", 1)
+    assert picture == {"source": "camera.left", "target": "vision.left", "unit": "", "size": 1, "kind": "binary"}
