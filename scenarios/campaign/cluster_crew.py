@@ -47,7 +47,7 @@ class ClusterCrew:
 
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
-        self._batches: set[str] = set()
+        self._batch = uuid.uuid4().hex
         self._versions = versions()
 
     @property
@@ -70,7 +70,7 @@ class ClusterCrew:
             told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
         finally:
             mark.unlink()
-        self._refuse({w: f"{folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
+        self._refuse({w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
 
     def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
         """Give each order to a worker; yield the answers as they come.
@@ -81,8 +81,6 @@ class ClusterCrew:
         Raises:
             CrewLost: the scheduler has gone, or no worker has been there for a while.
         """
-        batch = uuid.uuid4().hex
-        self._batches.add(batch)
         waiting = iter(orders)
         going: dict[Any, tuple[RunOrder, Future[RunAnswer]]] = {}
         done: queue.SimpleQueue[Future[RunAnswer]] = queue.SimpleQueue()
@@ -90,7 +88,7 @@ class ClusterCrew:
         def give() -> None:
             for order in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(going))):
                 key = f"run-{uuid.uuid4().hex}"
-                future = self._client.submit(carry_out_run, order, batch, self._versions, key=key, pure=False)
+                future = self._client.submit(carry_out_run, order, self._batch, self._versions, key=key, pure=False)
                 going[future.key] = order, future
                 future.add_done_callback(done.put)
 
@@ -102,20 +100,16 @@ class ClusterCrew:
                 give()
                 yield answer
         finally:
-            with contextlib.suppress(Exception):  # of a cluster that is gone nothing is left to end
-                self._client.cancel([future for _, future in going.values()], force=True)
-            self._end(batch)
+            if going:
+                with contextlib.suppress(Exception):  # of a cluster that is gone nothing is left to end
+                    self._client.cancel([future for _, future in going.values()], force=True)
+                self.end()
 
     def end(self) -> None:
-        """End what workers do for this crew, and the processes that they keep for it."""
-        for batch in list(self._batches):
-            self._end(batch)
-
-    def _end(self, batch: str) -> None:
-        if batch in self._batches:
-            self._batches.remove(batch)
-            with contextlib.suppress(Exception):
-                self._ask(end_runs, batch)
+        """End the runs that workers carry out for this crew, and the servers that they keep for it."""
+        ended, self._batch = self._batch, uuid.uuid4().hex  # what comes later is no part of it
+        with contextlib.suppress(Exception):
+            self._ask(end_runs, ended)
 
     def _next(self, done: "queue.SimpleQueue[Future[RunAnswer]]") -> "Future[RunAnswer]":
         """Wait for a run's end."""

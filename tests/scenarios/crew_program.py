@@ -1,15 +1,15 @@
-"""A program that gives orders to an embedded crew of two, one JSON line of answers each: to be killed meanwhile."""
+"""A program that gives orders to a crew, embedded or at an address, and prints the answers: to be killed meanwhile."""
 
 import pickle
 import sys
 from pathlib import Path
 
 if __name__ == "__main__":
-    from scenarios.campaign.dask_crew import embedded_crew
+    from scenarios.campaign.dask_crew import crew_at, embedded_crew
 
     orders = pickle.loads(Path(sys.argv[1]).read_bytes())
     try:
-        with embedded_crew(2) as crew:
+        with crew_at(sys.argv[2]) if sys.argv[2:] else embedded_crew(2) as crew:
             for answer in crew.carry_out(orders):
                 print(answer.name, answer.lost, flush=True)
     except KeyboardInterrupt:

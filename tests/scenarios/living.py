@@ -27,6 +27,23 @@ def family(process: int) -> list[int]:
     return [below for child in children(process) for below in (child, *family(child))]
 
 
+def servers(process: int) -> list[int]:
+    """Return the run servers below a process; the runs that they have forked bear their name."""
+
+    def named(process: int) -> bool:
+        with contextlib.suppress(ProcessLookupError, FileNotFoundError):
+            return b"scenarios.campaign.run_server" in Path(f"/proc/{process}/cmdline").read_bytes()
+        return False
+
+    return [child for above in (process, *family(process)) if not named(above) for child in children(above)
+            if named(child)]  # fmt: skip
+
+
+def parent(process: int) -> int:
+    """Return the process that has started a process."""
+    return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
+
+
 def until(there: Callable[[], bool], seconds: float = 60.0) -> None:
     """Wait until something is so, for at most some time."""
     end = time.monotonic() + seconds

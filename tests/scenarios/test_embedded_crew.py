@@ -13,7 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from crew_orders import bad_order, order
-from living import family, lives, until
+from living import family, lives, parent, servers, until
 
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.dask_crew import cores, embedded_crew
@@ -45,15 +45,6 @@ def going(runs: Path) -> bool:
     return len(list(runs.glob(".*/signals.tail"))) == 2
 
 
-def of_server(process: int) -> bool:
-    return b"scenarios.campaign.run_server" in Path(f"/proc/{process}/cmdline").read_bytes()
-
-
-def servers(process: int) -> list[int]:
-    """Return the run servers below a process."""
-    return [p for p in family(process) if of_server(p)]
-
-
 def test_all_are_answered_and_one_that_fails_ends_no_other(crew: Crew, runs: Path, tmp_path: Path):
     orders = [*(order(runs, f"run_{i}", seed=i) for i in range(5)), bad_order(runs, "Crashes", tmp_path)]
     orders.append(bad_order(runs, "IsKilled", tmp_path, "killed"))
@@ -64,7 +55,6 @@ def test_all_are_answered_and_one_that_fails_ends_no_other(crew: Crew, runs: Pat
     assert "was killed" in told[1].lost
     assert sorted(p.name for p in runs.iterdir()) == ["bad", *(f"run_{i}" for i in range(5))]
     assert len({answer.worker for answer in told}) == 2
-    assert servers(os.getpid()) == []
 
 
 def test_a_killed_worker_is_replaced_and_its_run_begun_anew(crew: Crew, runs: Path):
@@ -73,8 +63,7 @@ def test_a_killed_worker_is_replaced_and_its_run_begun_anew(crew: Crew, runs: Pa
     for answer in crew.carry_out(orders):
         if not told:
             server = servers(os.getpid())[0]
-            worker = int(Path(f"/proc/{server}/stat").read_text().rpartition(")")[2].split()[1])
-            os.kill(worker, signal.SIGKILL)
+            os.kill(parent(server), signal.SIGKILL)
             until(lambda: not lives(server))  # noqa: B023 (awaited here)
         told.append(answer.name)
         assert answer.lost == ""

@@ -1,0 +1,98 @@
+"""What a campaign costs beside its runs, and what a second worker brings.
+
+`pytest tests/benchmarks/test_campaign_speed.py --benchmark-enable -s` prints the figures. Runs are of helix_handover
+and give up after a second of simulated time, which takes one to two seconds of wall time on an idle core.
+
+Counted is from the first order to the last answer, when the workers are up and have carried out one run each, in which
+they load what runs need (2 to 4 s a worker, once). A run's own time are the `wall_seconds` of its summary: from when
+its system is built until its summary is written. Overhead is what remains: forking, the folder's name, ending the
+process, and Dask.
+"""
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from cosim.master_options import MasterOptions
+from fmus.build import cached
+from scenarios.campaign.crew import Crew
+from scenarios.campaign.dask_crew import embedded_crew
+from scenarios.campaign.run_order import RunOrder
+from scenarios.catalog import SCENARIOS
+
+pytestmark = pytest.mark.slow
+
+RUNS, ROUNDS = 10, 3
+OVERHEAD = 0.05
+"""Most that a campaign takes more than its runs, relative to these."""
+FASTER = 1.8
+"""How many times as fast two workers are at least as one."""
+
+
+def orders(runs: Path, count: int) -> Sequence[RunOrder]:
+    """Return orders of short runs into a folder of their own."""
+    runs.mkdir(parents=True)
+    fmus = {unit: str(cached(block, 3)) for unit, block in SCENARIOS["helix_handover"].units.items()}
+    return [
+        RunOrder(
+            name=f"run_{i}",
+            scenario="helix_handover",
+            parameters=("patience=1",),
+            seed=i,
+            fmus=fmus,
+            runs=str(runs),
+            options=MasterOptions(),
+        )
+        for i in range(count)
+    ]
+
+
+def carried_out(crew: Crew, given: Sequence[RunOrder]) -> tuple[float, float]:
+    """Return the seconds that a crew takes for orders, and the runs' own seconds in all."""
+    began = time.perf_counter()
+    answers = list(crew.carry_out(given))
+    took = time.perf_counter() - began
+    assert [answer.lost for answer in answers] == [""] * len(given)
+    summaries = [json.loads(Path(order.runs, order.name, "summary.json").read_text()) for order in given]
+    return took, sum(summary["wall_seconds"] for summary in summaries)
+
+
+def test_a_campaign_costs_little_beside_its_runs(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
+    relative: list[float] = []
+
+    def measure() -> None:
+        took, spent = carried_out(crew, orders(tmp_path / f"{len(relative)}", RUNS if benchmark.enabled else 2))
+        relative.append((took - spent) / spent)
+        told.append(f"{took:.2f} s, of which the runs {spent:.2f} s")
+
+    told: list[str] = []
+    with embedded_crew(1) as crew:
+        carried_out(crew, orders(tmp_path / "first", 1))
+        benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
+    print(f"\n{RUNS} runs on one worker: {'; '.join(told)}; overhead {min(relative):.1%}")
+    benchmark.extra_info["overhead"] = min(relative)
+    if benchmark.enabled:  # else other tests run beside it
+        assert min(relative) <= OVERHEAD
+
+
+def test_two_workers_are_nearly_twice_as_fast_as_one(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
+    took: dict[int, list[float]] = {1: [], 2: []}
+
+    def measure() -> None:
+        for workers, seconds in took.items():
+            with embedded_crew(workers) as crew:
+                carried_out(crew, orders(tmp_path / f"first_{workers}_{len(seconds)}", workers))
+                given = orders(tmp_path / f"{workers}_{len(seconds)}", RUNS if benchmark.enabled else 2)
+                seconds.append(carried_out(crew, given)[0])
+
+    benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
+    faster = min(took[1]) / min(took[2])
+    told = ", ".join(f"{workers} workers {min(seconds):.2f} s" for workers, seconds in took.items())
+    print(f"\n{RUNS} runs: {told}; {faster:.2f} times as fast")
+    benchmark.extra_info["faster"] = faster
+    if benchmark.enabled:
+        assert faster >= FASTER

@@ -1,0 +1,119 @@
+"""A cluster that the user runs: workers with several threads, and workers that cannot be used."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from clusters import scheduler, worker
+from crew_orders import bad_order, order
+from living import lives, parent, servers, until
+
+from scenarios.campaign.bad_crew import BadCrew
+from scenarios.campaign.dask_crew import crew_at
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc"),
+]
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str, None, None]:
+    with scheduler(tmp_path_factory.mktemp("scheduler")) as address:
+        yield address
+
+
+def test_threads_of_a_worker_carry_out_runs_side_by_side(address: str, tmp_path: Path):
+    runs = tmp_path / "runs"
+    orders = [order(runs, f"run_{i}", seed=i) for i in range(4)]
+    orders.append(bad_order(runs, "Crashes", tmp_path))
+    with worker(tmp_path, address, threads=2) as process:
+        with crew_at(address.removeprefix("tcp://")) as crew:
+            assert crew.workers == 2
+            crew.check(runs)
+            answers = [(answer.name, answer.lost) for answer in crew.carry_out(orders)]
+            assert len(servers(process)) == 2
+        assert sorted(answers) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
+        assert servers(process) == []  # though the cluster lives on
+
+
+def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp_path: Path):
+    runs = tmp_path / "runs"
+    orders = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
+    (tmp_path / "orders").write_bytes(pickle.dumps(orders))
+    program = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders"), address]
+    with worker(tmp_path, address, threads=2) as process:
+        with subprocess.Popen(program) as command:
+            until(lambda: len(list(runs.glob(".*/signals.tail"))) == 2)
+            below = servers(process)
+            assert len(below) == 2
+            command.kill()
+        until(lambda: not any(map(lives, below)))
+        until(lambda: list(runs.iterdir()) == [])
+
+
+def test_a_cluster_without_workers_is_refused(address: str):
+    with (
+        pytest.raises(BadCrew, match=f"{address} has no workers; `dask worker {address}` starts some"),
+        crew_at(address),
+    ):
+        pass
+
+
+def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path):
+    other = tmp_path / "handover_cosim-9.9.dist-info"
+    other.mkdir()
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: handover-cosim\nVersion: 9.9\n")
+    places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    with (
+        worker(tmp_path, address, PYTHONPATH=places),
+        crew_at(address) as crew,
+        pytest.raises(BadCrew, match=r"worker tcp://[\d.:]+ has other versions: handover-cosim 9\.9 \(here "),
+    ):
+        crew.check(tmp_path)
+
+
+def test_a_worker_without_this_package_is_refused(address: str, tmp_path: Path):
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios" / "__init__.py").touch()
+    places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    with (
+        worker(tmp_path, address, PYTHONPATH=places),
+        crew_at(address) as crew,
+        pytest.raises(BadCrew, match=r"worker tcp://[\d.:]+ cannot run this package: .*scenarios\.campaign"),
+    ):
+        crew.check(tmp_path)
+
+
+def test_a_worker_that_does_not_see_the_folder_is_refused(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    with worker(tmp_path, address), crew_at(address) as crew:
+        (tmp_path / "here").mkdir()
+        monkeypatch.chdir(tmp_path / "here")
+        with pytest.raises(
+            BadCrew, match=r"worker tcp://[\d.:]+: .* does not see what is written there \(No such file"
+        ):
+            crew.check(Path("/proc/self/cwd"))  # another folder in each process
+        assert list((tmp_path / "here").iterdir()) == []
+
+
+def test_workers_that_are_killed_are_replaced(address: str, tmp_path: Path):
+    runs = tmp_path / "runs"
+    with worker(tmp_path, address) as process, crew_at(address) as crew:
+        told: list[str] = []
+        for answer in crew.carry_out([order(runs, f"run_{i}", seed=i) for i in range(4)]):
+            if not told:
+                (server,) = servers(process)
+                os.kill(parent(server), signal.SIGKILL)
+            assert answer.lost == ""
+            told.append(answer.name)
+    assert sorted(told) == [f"run_{i}" for i in range(4)]

@@ -1,0 +1,75 @@
+"""Schedulers that cannot be used are refused in one line, before anything is sent to them."""
+
+import socket
+import sys
+import threading
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from clusters import closed_port
+
+from scenarios.campaign.bad_crew import BadCrew
+from scenarios.campaign.dask_crew import crew_at
+
+
+def refused(address: str) -> str:
+    with pytest.raises(BadCrew) as caught, crew_at(address):
+        pass
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@pytest.fixture(params=[b"", b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n"], ids=["silent", "HTTP"])
+def other_server(request: pytest.FixtureRequest) -> Generator[str, None, None]:
+    """Gives the address of a server that accepts connections and is no scheduler."""
+    accepted: list[socket.socket] = []
+
+    def accept() -> None:
+        while True:
+            try:
+                connection, _ = server.accept()
+            except OSError:
+                return
+            connection.sendall(request.param)
+            accepted.append(connection)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        accepting = threading.Thread(target=accept)
+        accepting.start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        server.shutdown(socket.SHUT_RDWR)
+        accepting.join()
+    for connection in accepted:
+        connection.close()
+
+
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        ("nonsense", "scheduler 'nonsense' has no port"),
+        ("", "scheduler '' has no host"),
+        ("tcp://", "scheduler 'tcp://' has no host"),
+        ("tcp://127.0.0.1", "scheduler 'tcp://127.0.0.1' has no port"),
+        ("127.0.0.1:99999", "scheduler '127.0.0.1:99999': Port out of range 0-65535"),
+        ("tcp://127.0.0.1:abc", "scheduler 'tcp://127.0.0.1:abc': Port could not be cast to integer value as 'abc'"),
+        ("http://127.0.0.1:80", "scheduler 'http://127.0.0.1:80': there is no protocol 'http', only "),
+        ("[::1", "scheduler '[::1': Invalid IPv6 URL"),
+    ],
+)
+def test_a_malformed_address_is_refused(address: str, told: str):
+    assert refused(address).startswith(told)
+
+
+@pytest.mark.slow
+def test_an_address_where_nothing_is_is_refused():
+    address = f"tcp://127.0.0.1:{closed_port()}"
+    assert refused(address).startswith(f"no scheduler can be reached at {address}: ")
+
+
+@pytest.mark.slow
+def test_a_server_that_is_no_scheduler_is_refused(other_server: str):
+    assert refused(other_server).startswith(f"{other_server} ")
