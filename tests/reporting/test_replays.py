@@ -36,9 +36,7 @@ def test_every_scenario_is_looked_at_here():
     assert set(MUST_SHOW) == set(SCENARIOS)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
 def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
     given = SHORT.get(name, ())
     run(SCENARIOS[name], tmp_path / "run", *given)
