@@ -22,13 +22,15 @@ class UnusableParameters(Refusal):
 class Params:
     """Values of appendix A and eq. (11); a description that says own choice gives the stated value after it, if any.
 
-    The estimate lies epsilon_pose_bound off the measurement, on the command's side. A Jacobian loop that is made to go
-    on by a smaller epsilon_control takes that back from the command, period by period. So the command does not wind up
-    while slack tendons hide it from the arm, but the loop stalls where the error falls to epsilon_pose_bound / alpha:
-    the stated 0.005 m with alpha = 0.1 stalls at the stated threshold, 0.05 m. Lengths weigh more than stated in the
-    estimate, since a metre is a lot more than a radian: equal weights explain a sagging arm by segments of half their
-    length. The wrist filter lags by about three control periods, so with alpha = 0.4 the arm still moves when the
-    filtered error first is small: hence settle_steps.
+    The estimate lies epsilon_pose_bound off the measurement, on the command's side. A Jacobian loop that is made to
+    go on by a smaller epsilon_control takes that back from the command, period by period. So the command does not
+    wind up while slack tendons hide it from the arm, but the loop stalls where the error falls to
+    epsilon_pose_bound / alpha: the stated 0.005 m with alpha = 0.1 stalls at the stated threshold, 0.05 m. As
+    stated, epsilon_control is the same, so that the last digits decide whether the loop goes on, and with alpha =
+    0.1 how many steps it takes. Lengths weigh more than stated in the estimate, since a metre is a lot more than a
+    radian: equal weights explain a sagging arm by segments of half their length. The wrist filter lags by about
+    three control periods, so with alpha = 0.4 the arm still moves when the filtered error first is small: hence
+    settle_steps.
     """
 
     control_period: Second = parameter(

@@ -13,6 +13,7 @@ from cosim.system import System
 from cosim.variable import Causality, Variable
 from scenarios.record import Record
 from scenarios.reporting.camera_picture import CameraPicture
+from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
@@ -114,6 +115,10 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
     def replay(self, parameters: Any, record: Record) -> Replay | None:  # noqa: ARG002
         """Return what the report shows in space; nothing by default."""
         return None
+
+    def published(self, parameters: Any) -> Sequence[PublishedValue]:  # noqa: ARG002
+        """Return what the paper tells of runs with such parameters; nothing by default."""
+        return ()
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,9 @@ from pathlib import Path
 import click
 
 from scenarios.bad_call import BadCall, told_in_one_line
+from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.left_run import complete_signals
+from scenarios.reporting.campaign_page import write_campaign_page
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_figures import draw_run
 from scenarios.reporting.run_page import write_run_page
@@ -35,7 +37,10 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
         check_place(page.parent)
         if figures:
             check_place(folder)
-        _write_of_run(RunFolder.left_at(folder), page, figures)
+        if CampaignFolder(folder).is_there:
+            write_campaign_page(folder, page)
+        else:
+            _write_of_run(RunFolder.left_at(folder), page, figures)
     click.echo(f"report: {page}")
 
 

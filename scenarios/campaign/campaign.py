@@ -120,5 +120,5 @@ class _Work:
             reason = answer.lost or "its folder does not say how it ended"
             row = RunRow(run=run, status="lost", success=None, reason=reason)
         self._count[row.status] += 1
-        self.table.add(row)
         self.progress(self.tally)
+        self.table.add(row)

@@ -50,6 +50,11 @@ class CampaignFolder:
         """The folder of figures."""
         return self.path / "figures"
 
+    @property
+    def is_there(self) -> bool:
+        """Whether a campaign has begun in it."""
+        return (self.path / _FILE).is_file()
+
     def read(self) -> dict[str, Any]:
         """Return what `campaign.json` says.
 

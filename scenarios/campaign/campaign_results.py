@@ -72,6 +72,19 @@ class CampaignResults:
         return tuple(n for n in names if len({values.get(n) for values in self._values}) > 1)
 
     @cached_property
+    def independent(self) -> tuple[str, ...]:
+        """Those of `varied` that do not follow from one before them, as a period that goes with a step size."""
+        kept: list[str] = []
+        for name in self.varied:
+            if not any(self._follows(name, other) for other in kept):
+                kept.append(name)
+        return tuple(kept)
+
+    def _follows(self, name: str, other: str) -> bool:
+        pairs = {(values.get(other), values.get(name)) for values in self._values}
+        return len(pairs) == len({first for first, _ in pairs})
+
+    @cached_property
     def declared(self) -> Mapping[str, Variable]:
         """The scenario's parameters by name; none if this version does not know the scenario."""
         experiment = SCENARIOS.get(self.scenario)
@@ -137,5 +150,5 @@ class CampaignResults:
 
     def label(self, point: PointResults) -> str:
         """Return what tells a point from the others."""
-        texts = [self.value_text(name, point.values[name]) for name in self.varied if name in point.values]
+        texts = [self.value_text(name, point.values[name]) for name in self.independent if name in point.values]
         return ", ".join(texts) or "all runs"

@@ -40,7 +40,7 @@ def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
     """
     with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
         try:
-            with _deaf_to_ctrl_c():  # so are the threads that are started here, and what these start
+            with _told_nothing_of_semaphores(), _deaf_to_ctrl_c():  # so are the threads that are started here, and what these start
                 cluster = LocalCluster(
                     n_workers=workers or cores(),
                     threads_per_worker=1,
@@ -99,6 +99,21 @@ def _quiet() -> Generator[None, None, None]:
         finally:
             for logger, level in zip(loggers, before, strict=True):
                 logger.setLevel(level)
+
+
+@contextlib.contextmanager
+def _told_nothing_of_semaphores() -> Generator[None, None, None]:
+    """Let Python's process that cleans up after a killed command do so without telling."""
+    name = "PYTHONWARNINGS"
+    before = os.environ.get(name)
+    os.environ[name] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 @contextlib.contextmanager

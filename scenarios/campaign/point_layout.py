@@ -41,6 +41,12 @@ class PointLayout:
     group_names: Sequence[str] = ("",)
     listed: bool = False
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Where the axis begins and ends."""
+        edge = 0.75 * self.room
+        return float(self.places.min()) - edge, float(self.places.max()) + edge
+
     def beside(self, k: int, n: int) -> Floats:
         """Return the places of n runs of a point: spread over half its room, evenly and always alike."""
         spread = (np.arange(n) * (math.sqrt(5.0) - 1.0) / 2.0 + 0.5) % 1.0 - 0.5
@@ -53,7 +59,9 @@ def layout_of(results: CampaignResults) -> PointLayout:
     One varied parameter is the axis; of two, that with more values, or the only number, is the axis, and the other is
     told by colour. Points that differ otherwise, or whose names need more room, are a list.
     """
-    varied = results.varied
+    varied = results.independent
+    if any(name not in p.values for p in results.points for name in varied):
+        return _list(results)
     if len(varied) == 1:
         return _side_by_side(results, varied[0], None)
     if len(varied) == 2:

@@ -56,6 +56,11 @@ class ServerProcess:
         threading.Thread(target=self._listen, daemon=True).start()
 
     @property
+    def pid(self) -> int:
+        """Its number."""
+        return self._process.pid
+
+    @property
     def lives(self) -> bool:
         """Whether it can be given orders."""
         return self._process.poll() is None

@@ -13,10 +13,12 @@ from scenarios.free_flyer.impedance_figures import draw_push
 from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from scenarios.free_flyer.impedance_plots import plot_push
 from scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from scenarios.free_flyer.published import published_of_push
 from scenarios.free_flyer.replay import replay_push
 from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from scenarios.paper import paper_values
 from scenarios.record import Record
+from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
@@ -88,6 +90,10 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing."""
         return ("impedance",)
+
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return how far robot and impedance model differ at most."""
+        return published_of_push(parameters)
 
     def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""

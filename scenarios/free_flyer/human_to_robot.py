@@ -1,9 +1,12 @@
 """A person puts an object into the robot's gripper, which closes when it is pushed. [Fernandes2020] sec. 4.3.2."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from scenarios.free_flyer.flyer_handover import FlyerHandover
+from scenarios.free_flyer.handover_parameters import Parameters
+from scenarios.free_flyer.published import published_of_receiving
+from scenarios.reporting.published_value import PublishedValue
 
 
 class HumanToRobot(FlyerHandover):
@@ -14,3 +17,7 @@ class HumanToRobot(FlyerHandover):
     task: ClassVar[str] = "human_to_robot"
     person: ClassVar[Mapping[str, Any]] = {"motion": "give", "object_with": "hand"}
     receivers: ClassVar[tuple[str, ...]] = ("GRIPPER",)
+
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return the threshold of sec. 4.1.2."""
+        return published_of_receiving(parameters)

@@ -12,11 +12,13 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.helix_handover.figures import draw_handover
 from scenarios.helix_handover.parameters import Cover, Parameters
 from scenarios.helix_handover.plots import plot_handover
+from scenarios.helix_handover.published import published_of
 from scenarios.helix_handover.replay import replay_handover
 from scenarios.helix_handover.rig import calibration
 from scenarios.helix_handover.watch import HandoverWatch
 from scenarios.record import Record
 from scenarios.reporting.camera_picture import CameraPicture
+from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
@@ -105,6 +107,10 @@ class HelixHandover(Experiment[HandoverWatch]):
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: seeing and controlling."""
         return ("vision", "servo")
+
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return what table 1 and fig. 9 tell."""
+        return published_of(parameters)
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw errors, paths and tendons over time, and the camera pictures of some moments."""

@@ -12,11 +12,13 @@ from scenarios.experiment import Experiment, Figure, FmuOf
 from scenarios.ir_grasp.figures import draw_grasp
 from scenarios.ir_grasp.parameters import Parameters
 from scenarios.ir_grasp.plots import plot_grasp
+from scenarios.ir_grasp.published import published_of
 from scenarios.ir_grasp.replay import replay_grasp
 from scenarios.ir_grasp.situation import Situation
 from scenarios.ir_grasp.watch import GraspWatch
 from scenarios.parameters import BadParameter
 from scenarios.record import Record
+from scenarios.reporting.published_value import PublishedValue
 from scenarios.reporting.replay import Replay
 from scenarios.reporting.time_plot import TimePlot
 
@@ -102,6 +104,10 @@ class IrGrasp(Experiment[GraspWatch]):
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing."""
         return ("reflex",)
+
+    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+        """Return the distances of table II."""
+        return published_of(parameters)
 
     def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments, distances and cost, and the commands."""

@@ -58,7 +58,7 @@ def _moving(record: Record) -> tuple[list[Line], list[Line]]:
     for i, finger in enumerate(FINGERS):
         points = np.array([hand[i] for hand in hands])
         radii = np.array([*finger.radii, finger.radii[-1]])
-        fingers.append(Line(label=FINGERS[i], colour=FINGER_COLOURS[i], points=_raised(points), radii=radii))
+        fingers.append(Line(label=FINGER_NAMES[i], colour=FINGER_COLOURS[i], points=_raised(points), radii=radii))
     lines = [Line(label="beams", colour=_BEAM, points=_raised(beams[:, i]), width=3.0) for i in range(len(FINGERS))]
     return fingers, lines
 

@@ -6,10 +6,11 @@ import numpy as np
 
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import FEWEST, p_text, published, too_few
+from scenarios.published.helix_1_telling import FEWEST, published, too_few
 from scenarios.published.helix_1_time_claims import time_claims
 from scenarios.published.ratio_interval import ratio_interval
 from scenarios.published.statistics import success_interval, time_interval, two_proportions
+from scenarios.published.verdict_rules import told_p
 
 _READING = 0.01
 """What the lengths of fig. 9 are told to, m."""
@@ -45,7 +46,7 @@ def _rate(arm: Helix1Arm, claim: str, successes: int) -> Claim:
         measured=f"{successes} of {arm.tried}",
         interval=(interval.low, interval.high),
         verdict=Verdict.REPRODUCED if successes == arm.tried else Verdict.NOT_REPRODUCED,
-        reason=f"{rule}. Fisher's exact test against the published rate: p = {p_text(p)}.{_broken(arm)}",
+        reason=f"{rule}. Fisher's exact test against the published rate: p = {told_p(p)}.{_broken(arm)}",
     )
 
 
@@ -113,12 +114,12 @@ def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
     )
     if min(len(theirs), len(ours)) < FEWEST:
         return too_few(told, f"{len(theirs)} and {len(ours)} balls taken")
-    low, high = ratio_interval(ours, theirs, np.median)
+    interval = ratio_interval(ours, theirs, np.median)
     return Claim(
         **told,
         measured=f"{np.median(ours):.4f} m against {np.median(theirs):.4f} m (medians)",
-        interval=(low, high),
-        verdict=Verdict.REPRODUCED if high < 1.0 else Verdict.NOT_REPRODUCED,
+        interval=interval,
+        verdict=Verdict.REPRODUCED if interval and interval[1] < 1.0 else Verdict.NOT_REPRODUCED,
         reason="Reproduced if the bootstrap's interval of the ratio of medians, ours to the thesis's, lies below 1.",
     )
 

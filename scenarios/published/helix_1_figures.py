@@ -85,7 +85,7 @@ def _our_times(axis: Axes, i: int, arm: Helix1Arm, alpha: float) -> None:
     if not rows:
         return
     times = np.array([row["arm_time"] for row in rows])
-    x = i + 0.2 + 0.16 * (np.linspace(-0.5, 0.5, len(rows)) if len(rows) > 1 else np.zeros(1))
+    x = i + 0.2 + 0.2 * (np.linspace(-0.5, 0.5, len(rows)) if len(rows) > 1 else np.zeros(1))
     held = np.array([bool(row["success"]) for row in rows])
     axis.plot(x[held], times[held], "o", ms=5, color=COLOURS[0], alpha=0.85, mew=0)
     axis.plot(x[~held], times[~held], "x", ms=6, color=COLOURS[1], mew=1.6)
@@ -117,7 +117,8 @@ def _errors(arm: Helix1Arm, alpha: float, runs: Path) -> list[Floats]:
             continue
         record = Record(path)
         amid = (np.arange(round(row["steps"]), dtype=np.float64) + 0.5) * row["control_period"]  # between two updates
-        index = np.minimum(np.searchsorted(record.time, amid), len(record.time) - 1)
+        after = np.asarray(np.searchsorted(record.time, amid), dtype=np.int64)
+        index = np.minimum(after, len(record.time) - 1)
         seen: NDArray[np.bool_] = record["servo.phase"][index] != int(Phase.WAIT)
         found.append(np.where(seen, record["servo.error"][index], np.nan))
     return found

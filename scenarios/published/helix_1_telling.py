@@ -24,8 +24,3 @@ def missing(arm: Helix1Arm, *alphas: float) -> str:
     """Tell how many runs have no time, as their gripper never began to close; nothing if all have one."""
     number = sum(len(arm.rows[alpha]) - len(arm.times(alpha)) for alpha in alphas)
     return f" Without {number} runs in which the gripper never began to close." if number else ""
-
-
-def p_text(p: float) -> str:
-    """Return a p-value as it is told."""
-    return f"{p:.3f}" if p >= 0.001 else "< 0.001"

@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
+from scenarios.paper import paper_values
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import FEWEST, missing, p_text, published, too_few
+from scenarios.published.helix_1_telling import FEWEST, missing, published, too_few
 from scenarios.published.ratio_interval import ratio_interval
 from scenarios.published.statistics import LEVEL, time_interval
+from scenarios.published.verdict_rules import told_p
 
 
 def time_claims(arm: Helix1Arm) -> list[Claim]:
@@ -37,7 +39,7 @@ def _falls(arm: Helix1Arm) -> Claim:
         measured=", ".join(f"{m:.1f}" if np.isfinite(m) else "never" for m in ours) + " s (medians)",
         verdict=Verdict.REPRODUCED if falls else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if the medians fall, and Page's exact test of a trend within places rejects: p = "
-        f"{p_text(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as longer "
+        f"{told_p(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as longer "
         "than any.",
     )
 
@@ -53,13 +55,16 @@ def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
     x, y = arm.times(small), arm.times(large)
     if min(len(x), len(y)) < FEWEST:
         return too_few(told, f"{len(x)} and {len(y)} runs")
-    low, high = ratio_interval(x, y, np.median)
+    interval = ratio_interval(x, y, np.median)
+    if interval is None:
+        return too_few(told, "no times to divide by")
+    low, high = interval
     halves, stays = low <= half <= high, low <= 1.0 <= high
     verdict = Verdict.REPRODUCED if halves else Verdict.NOT_REPRODUCED
     return Claim(
         **told,
         measured=f"{np.median(x) / np.median(y):.2f} times (medians)",
-        interval=(low, high),
+        interval=interval,
         verdict=Verdict.NOT_COMPARABLE if halves and stays else verdict,
         reason="Reproduced if the bootstrap's interval of the ratio of medians holds 2 and not 1; not comparable if it "
         f"holds both, as the runs are then too few to tell.{missing(arm, small, large)}",
@@ -86,8 +91,21 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
         interval=(interval.low, interval.high),
         unit="s",
         verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {p_text(p)}, {len(x)} runs against "
-        f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}",
+        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {told_p(p)}, {len(x)} runs against "
+        f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
+        f"{_stall(arm, alpha)}",
+    )
+
+
+def _stall(arm: Helix1Arm, alpha: float) -> str:
+    """Tell of a step size at which the error can stall above the threshold."""
+    settings = paper_values("helix_handover", arm.tuning.name.lower())
+    stall = round(settings["epsilon_pose_bound"] / alpha, 6)
+    if settings["epsilon_control"] > settings["epsilon_pose_bound"] or stall < settings["threshold_grasp"]:
+        return ""
+    return (
+        f" At this step size the error can stall near ε_pose,bound / α = {1000 * stall:.0f} mm, the threshold, and the "
+        "last digits of two equal bounds decide whether it does: see the note on control steps."
     )
 
 
@@ -101,16 +119,16 @@ def _narrows(arm: Helix1Arm) -> Claim:
     times = [arm.times(alpha) for alpha in arm.alphas]
     if min(map(len, times)) < FEWEST:
         return too_few(told, f"{min(map(len, times))} runs at a step size")
-    low, high = ratio_interval(times[0], times[-1], _spread)
+    interval = ratio_interval(times[-1], times[0], _spread)
     ours = [float(np.std(x, ddof=1)) for x in times]
-    narrows = all(a > b for a, b in pairwise(ours)) and low > 1.0
+    narrows = all(a > b for a, b in pairwise(ours)) and interval is not None and interval[1] < 1.0
     return Claim(
         **told,
         measured=", ".join(f"{s:.1f}" for s in ours) + " s (standard deviations)",
-        interval=(low, high),
+        interval=interval,
         verdict=Verdict.REPRODUCED if narrows else Verdict.NOT_REPRODUCED,
-        reason="Reproduced if the standard deviations fall and the bootstrap's interval of the ratio of the first to "
-        f"the last lies above 1.{missing(arm, *arm.alphas)}",
+        reason="Reproduced if the standard deviations fall and the bootstrap's interval of the ratio of the last to "
+        f"the first lies below 1.{missing(arm, *arm.alphas)}",
     )
 
 

@@ -75,9 +75,5 @@ def _labels(results: CampaignResults, a: PointResults, b: PointResults) -> tuple
     """Return what two points have in common, and what each has for itself."""
     name = _difference(a, b)
     shared = [results.value_text(n, a.values[n]) for n in results.varied if n != name]
-    own = (
-        ("", "")
-        if name is None
-        else (results.value_text(name, a.values[name]), results.value_text(name, b.values[name]))
-    )
-    return ", ".join(shared) or "all", *own
+    first, second = ("", "") if name is None else (results.value_text(name, p.values[name]) for p in (a, b))
+    return ", ".join(shared) or "all", first, second

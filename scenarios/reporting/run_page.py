@@ -8,8 +8,12 @@ from markupsafe import Markup
 
 from scenarios.parameters import BadParameter, parameters_of
 from scenarios.record import Record
+from scenarios.reporting.cpu_section import cpu_section
 from scenarios.reporting.explorer_section import explorer_section
+from scenarios.reporting.graph_section import graph_section
 from scenarios.reporting.page import write_page
+from scenarios.reporting.pictures_section import pictures_section
+from scenarios.reporting.published_section import published_section
 from scenarios.reporting.replay_section import replay_section
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_lead import run_lead
@@ -35,8 +39,12 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     record = record_of(folder)
     sections = [
         metrics_section(facts),
+        published_section(facts.summary, facts.run),
         *_seen(facts, record),
+        pictures_section(folder),
         None if record is None else explorer_section(record),
+        graph_section(facts.run),
+        cpu_section(facts.summary),
         parameters_section(facts),
         master_section(facts),
         files_section(facts),

@@ -14,11 +14,12 @@ from scenarios.reporting.section import Section
 def setting_section(results: CampaignResults) -> Section:
     """Return tables of what is set for all runs; the scenario's defaults hold for the rest."""
     told = results.told
+    units: Mapping[str, Any] = told.get("units", {})
     parts = [
         _part("Fixed parameters", {n: _value(results, n, v) for n, v in told["fixed"].items()}),
-        _part("Replaced units", {n: str(v) for n, v in told.get("units", {}).items()}),
-        _part("Master", _flat(told.get("options", {}))),
+        _part("Master", _flat(told.get("master", {}))),
         _part("Versions", {n: str(v) for n, v in told.get("versions", {}).items()}),
+        _part("FMUs", {n: f"{u['fmu']} {u['sha256'][:12]}" for n, u in units.items()}),
     ]
     defaults = "Parameters that are neither varied nor fixed have the scenario's defaults; each run's run.json has all."
     html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)

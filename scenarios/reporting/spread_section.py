@@ -86,8 +86,9 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
         )
     names, seeds, success = (results.table.column(n) for n in ("run", "seed", "success"))
     ended = {True: "succeeded", False: "failed", None: "not done"}
+    mixed = len({succeeded for _, succeeded, _, _ in strips}) > 1
     for group, succeeded, rows, places in strips:
-        name = layout.group_names[group]
+        name, outcome = layout.group_names[group], "succeeded" if succeeded else "not succeeded"
         told = [[names[row], int(seeds[row]), ended[success[row]]] for row in rows]
         symbol = _SUCCESS if succeeded else _OTHER
         colour = f"var(--c{group})"
@@ -99,7 +100,7 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
                 "type": "scatter",
                 "mode": "markers",
                 along: places,
-                "name": (f"{name}, " if name else "") + ("succeeded" if succeeded else "not succeeded"),
+                "name": ", ".join(filter(None, (name, outcome if mixed or not name else ""))),
                 "marker": marker,
                 "customdata": told,
                 "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{'x' if layout.listed else 'y'}"

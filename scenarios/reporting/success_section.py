@@ -56,9 +56,7 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
 
 def place_axis(figure: Any, layout: PointLayout) -> None:
     """Give a figure the axis along which points stand."""
-    edge = 0.6 * layout.room * max(len(layout.group_names), 1) / 0.8
-    low, high = float(layout.places.min()) - edge, float(layout.places.max()) + edge
-    axis: dict[str, Any] = {"title": {"text": layout.title}, "range": [low, high]}
+    axis: dict[str, Any] = {"title": {"text": layout.title}, "range": list(layout.limits)}
     if layout.ticks is not None:
         names = [name for _, name in layout.ticks]
         if layout.listed:

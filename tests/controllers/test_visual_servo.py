@@ -114,6 +114,19 @@ def test_steps_to_the_handover_are_of_the_published_size(alpha: float, fewest: i
         assert fewest <= len(run.history) <= most
 
 
+@pytest.mark.parametrize(("alpha", "least"), [(0.1, 1.6), (0.4, 0.8)])
+def test_the_stated_bounds_are_equal_and_small_steps_hang_on_which_is_larger(alpha: float, least: float):
+    """Published at 0.1: 71 steps in the middle, from 31 to 156."""
+    steps: list[float] = []
+    for epsilon_control in (0.0045, 0.0055):
+        runs = [loop(seed, dt=1.45, alpha=alpha, **(THESIS | {"epsilon_control": epsilon_control})) for seed in (1, 2)]
+        for run in runs:
+            assert run.run(Phase.GRASP, lambda _t: ball_at(45.0), noise=0.001).phase is Phase.GRASP
+        steps.append(sum(len(run.history) for run in runs))
+    stalls, goes_on = steps
+    assert least < stalls / goes_on < 1.6 * least
+
+
 def test_a_larger_step_size_takes_fewer_steps():
     steps: list[int] = []
     for alpha in (0.1, 0.2, 0.4):

@@ -10,6 +10,9 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Request
 _OF_DRIVERS = ("[.WebGL-", "Canvas2D: Multiple readback")
 """How messages begin that a browser which draws by software has for any page with pictures of space."""
 
+_PATIENCE = 120_000
+"""ms; other tests may be using all of the machine."""
+
 
 @contextmanager
 def opened(
@@ -32,8 +35,9 @@ def opened(
     page.on("pageerror", lambda error: messages.append(str(error)))
     page.on("request", ask)
     try:
-        page.goto(file.as_uri())
-        page.wait_for_selector("html[data-drawn]")
+        page.set_default_timeout(_PATIENCE)
+        page.goto(file.as_uri(), wait_until="commit")
+        page.wait_for_selector("html[data-drawn]", state="attached")
         yield page
         assert messages == []
         assert requests == [file.as_uri()]
@@ -47,13 +51,13 @@ def overflow(page: Page) -> int:
 
 
 def wait_until(page: Page, condition: str) -> None:
-    """Wait until a JavaScript expression is true; fail after 20 s.
+    """Wait until a JavaScript expression is true; fail after long.
 
     Playwright's own `wait_for_function` compiles code in the page, which the page forbids.
     """
     page.evaluate(
         f"""new Promise((done, fail) => {{
-            const late = performance.now() + 20000;
+            const late = performance.now() + {_PATIENCE};
             const look = () => {{
                 if ({condition}) done();
                 else if (performance.now() > late) fail(new Error("it never came true"));

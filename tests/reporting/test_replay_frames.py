@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from cosim.ports import Floats
 from scenarios.record import Record
 from scenarios.reporting.replay_frames import MOST, frame_rows, phase_changes
 
@@ -21,13 +22,15 @@ def test_moments_lie_evenly_in_time_where_rows_do_not():
 
 @pytest.mark.parametrize("n", [1, 2, 3, 100])
 def test_a_short_record_is_shown_whole(n: int):
-    np.testing.assert_array_equal(frame_rows(np.arange(n) * 0.5), np.arange(n))
+    time: Floats = np.linspace(0.0, 0.5, n)
+    np.testing.assert_array_equal(frame_rows(time), np.arange(n))
 
 
 def test_phases_are_told_when_they_begin(tmp_path: Path):
     phase = pa.field("servo.phase", pa.int64(), metadata={"items": "0 WAIT, 1 GIVEN_UP"})
     columns = [pa.array([0.0, 1.0, 2.0, 3.0]), pa.array([0, 0, 1, 1])]
-    pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema([("time", pa.float64()), phase])), tmp_path / "s")
+    schema = pa.schema([pa.field("time", pa.float64()), phase])
+    pq.write_table(pa.Table.from_arrays(columns, schema=schema), tmp_path / "s")
     record = Record(tmp_path / "s")
     assert phase_changes(record, "servo.phase") == [(0.0, "wait"), (2.0, "given up")]
     assert phase_changes(record, "") == []

@@ -12,12 +12,12 @@ from click.testing import CliRunner
 sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
 
 from failing_systems import failing_ssp, native_fmu
+from scenarios.report import write_report
 
 from cosim.ssp.writing import write_ssp
 from cosim.system import System
 from scenarios.command import main
 from scenarios.master_rows import master_rows
-from scenarios.report import write_report
 from scenarios.run_folder import RunFolder
 
 

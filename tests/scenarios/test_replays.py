@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "scenarios"))  # flyer_runs
+sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
 
 from flyer_runs import run
 

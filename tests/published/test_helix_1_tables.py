@@ -34,10 +34,15 @@ def test_a_place_tells_its_runs_and_which_lost_the_ball():
     assert rows["back-left"][2] == "26.0, never ✗"
 
 
+def test_lengths_of_figure_9_are_beside_the_published_ones():
+    table = Helix1().tables(table_of(TIMES, model_mismatch=0.1, arm_travel=0.2, model_travel=0.25))[3]
+    assert table.rows[0] == ["model to arm", "0.14", "0.100", "0.100", "0.100"]
+
+
 def test_settings_without_runs_have_no_tables():
-    assert len(Helix1().tables(table_of(TIMES))) == 3
+    assert len(Helix1().tables(table_of(TIMES))) == 4
     both = pa.concat_tables([table_of(TIMES).table, table_of(TIMES, "own").table])
-    assert len(Helix1().tables(CampaignTable(both))) == 6
+    assert len(Helix1().tables(CampaignTable(both))) == 8
 
 
 def test_times_are_drawn_and_errors_of_runs_that_left_a_record(tmp_path: Path):

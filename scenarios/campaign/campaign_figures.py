@@ -1,0 +1,142 @@
+"""Figures of a campaign for papers: success rates and metrics by point, with intervals."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from cosim.ports import Floats
+from scenarios.campaign.campaign_results import CampaignResults
+from scenarios.campaign.point_layout import PointLayout, layout_of
+from scenarios.campaign.shown_unit import ShownUnit, shown_unit
+from scenarios.experiment import Figure
+from scenarios.plotting import COLOURS, figure
+from scenarios.published.statistics import time_interval
+
+_MOST_METRICS = 4
+_MOST_INTERVALS = 60
+"""Points above which medians have none: each takes some 20 ms."""
+
+_LINE = 0.24
+"""Height of a point of a list, in inches."""
+
+_MOST_LISTED = 80
+_LETTERS_ALONG = 60
+
+
+def draw_campaign(results: CampaignResults, folder: Path) -> list[Figure]:
+    """Draw success rates and the metrics that are told first into a folder, as PNG and SVG.
+
+    Nothing if no run is done, or if the points are more than a figure has room for.
+    """
+    if not any(len(p.done) for p in results.points):
+        return []
+    layout = layout_of(results)
+    if layout.listed and len(results.points) > _MOST_LISTED:
+        return []
+    folder.mkdir(parents=True, exist_ok=True)
+    metrics = results.headline[:_MOST_METRICS]
+    return [_success(results, layout, folder), *(_metric(results, layout, name, folder) for name in metrics)]
+
+
+def _success(results: CampaignResults, layout: PointLayout, folder: Path) -> Figure:
+    with figure(folder / "success_by_point", 1, size=_size(layout)) as [axes]:
+        for k, point in enumerate(results.points):
+            span = point.interval
+            if span is not None:
+                low, middle, high = 100 * span.low, 100 * point.rate, 100 * span.high
+                _bar(axes, layout, float(layout.places[k]), (low, middle, high), COLOURS[layout.groups[k]])
+        _place(axes, layout)
+        _across(axes, layout, "success rate (%)", (-3.0, 103.0))
+    caption = "Share of the runs done that succeeded, with 95 % intervals of Clopper and Pearson."
+    return Figure("success_by_point", caption)
+
+
+def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Path) -> Figure:
+    """Draw every run of a metric, a disc if it succeeded and else a cross, and the points' medians."""
+    column, success = results.table.column(name), results.table.column("success")
+    unit = shown_unit(results.table.unit(name), column)
+    words = name.replace("_", " ")
+    with figure(folder / f"{name}_by_point", 1, size=_size(layout)) as [axes]:
+        for k, point in enumerate(results.points):
+            values, colour = column[point.rows] * unit.factor, COLOURS[layout.groups[k]]
+            fine = np.array([success[row] is True for row in point.rows])
+            places = layout.beside(k, len(values)) - 0.12 * layout.room
+            for chosen, marker, width in ((fine, "o", 0.0), (~fine, "x", 1.1)):
+                x, y = _ordered(layout, places[chosen], values[chosen])
+                axes.plot(x, y, marker, ms=4, mew=width, color=colour, alpha=0.6)
+            if len(results.points) <= _MOST_INTERVALS:
+                _median(axes, layout, k, (column[point.done], unit))
+        _place(axes, layout)
+        _across(axes, layout, unit.axis(words), None)
+    told = results.table.description(name) or words
+    caption = (
+        f"{told[0].upper()}{told[1:]}: runs that succeeded (discs) and others (crosses); medians of the runs done "
+    )
+    return Figure(f"{name}_by_point", caption + "with their 95 % bootstrap intervals.")
+
+
+def _median(axes: Axes, layout: PointLayout, k: int, measured: tuple[Floats, ShownUnit]) -> None:
+    values, unit = measured
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return
+    median = float(np.median(values))
+    span = time_interval(values) if np.ptp(values) > 0.0 else None
+    low, high = (median, median) if span is None else (span.low, span.high)
+    scaled = (low * unit.factor, median * unit.factor, high * unit.factor)
+    _bar(axes, layout, float(layout.places[k]) + 0.38 * layout.room, scaled, "#1c2330")
+
+
+def _bar(axes: Axes, layout: PointLayout, place: float, span: tuple[float, float, float], colour: str) -> None:
+    """Draw low, middle and high of a point."""
+    low, middle, high = span
+    reach = [[middle - low], [high - middle]]
+    if layout.listed:
+        axes.errorbar([middle], [place], xerr=reach, color=colour, marker="o", ms=5, capsize=2.5, lw=1.3)
+    else:
+        axes.errorbar([place], [middle], yerr=reach, color=colour, marker="o", ms=5, capsize=2.5, lw=1.3)
+
+
+def _ordered(layout: PointLayout, places: Floats, values: Floats) -> tuple[Floats, Floats]:
+    return (values, places) if layout.listed else (places, values)
+
+
+def _size(layout: PointLayout) -> tuple[float, float]:
+    return (8.0, 1.0 + _LINE * max(len(layout.places), 2)) if layout.listed else (8.0, 3.6)
+
+
+def _across(axes: Axes, layout: PointLayout, title: str, limits: tuple[float, float] | None) -> None:
+    if layout.listed:
+        axes.set(xlabel=title, **({} if limits is None else {"xlim": limits}))
+    else:
+        axes.set(ylabel=title, **({} if limits is None else {"ylim": limits}))
+
+
+def _place(axes: Axes, layout: PointLayout) -> None:
+    """Give axes the names of the points, and the colours' names."""
+    low, high = layout.limits
+    if layout.listed:
+        axes.set(ylim=(low, high), ylabel=layout.title)
+        axes.grid(visible=False, axis="y")
+    else:
+        axes.set(xlim=(low, high), xlabel=layout.title)
+        axes.grid(visible=False, axis="x")
+    if layout.ticks is not None:
+        places, names = [place for place, _ in layout.ticks], [name for _, name in layout.ticks]
+        (axes.set_yticks if layout.listed else axes.set_xticks)(places, names)
+        if not layout.listed and _crowded(names):
+            axes.tick_params(axis="x", rotation=30)
+    if len(layout.group_names) > 1:
+        for colour, name in zip(COLOURS, layout.group_names, strict=False):
+            axes.plot([], [], "o", color=colour, label=name)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(layout.group_names))
+
+
+def _crowded(names: Sequence[str]) -> bool:
+    return len(names) * max(map(len, names)) > 1.4 * _LETTERS_ALONG
+
+
+def _columns(names: Sequence[str]) -> int:
+    return max(1, min(len(names), _LETTERS_ALONG // (4 + max(map(len, names)))))

@@ -1,0 +1,74 @@
+"""What the thesis tells of pushes and handovers with given parameters. [Fernandes2020] sec. 4.1, 4.3."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
+from scenarios.free_flyer.impedance_parameters import Parameters as PushParameters
+from scenarios.free_flyer.impedance_parameters import Wrench
+from scenarios.reporting.published_value import PublishedValue
+
+_PAPER = "free_flyer"
+
+
+def published_of_push(p: PushParameters) -> Sequence[PublishedValue]:
+    """Return the bounds of how far robot and impedance model differ; nothing for other pushes than the published."""
+    given = PushParameters()
+    alike = p.force == given.force if p.kind is Wrench.FORCE else p.torque == given.torque
+    if not alike or not p.ideal or p.delay:
+        return ()
+    note = "over all pushes and twists; how long they lasted is not told"
+    return [
+        PublishedValue(
+            metric=f"disagreement_{what}",
+            paper=_PAPER,
+            name="model_agreement",
+            index=(k,),
+            relation="at most",
+            note=note,
+        )
+        for k, what in enumerate(("position", "orientation"))
+    ]
+
+
+def published_of_giving(p: HandoverParameters) -> Sequence[PublishedValue]:
+    """Return what is told of handovers from robot to human at the published place."""
+    if not _is_published(p):
+        return ()
+    return [
+        PublishedValue(
+            metric="transfer_displacement_z",
+            paper=_PAPER,
+            name="transfer_displacement_z",
+            index=(int(p.behaviour),),
+            note="of one run; how strongly the person pulled is not told",
+        ),
+        _threshold(p, "velocity_hand"),
+        PublishedValue(
+            metric="phase_move_to_handover",
+            paper=_PAPER,
+            name="fetched",
+            note="where the object is at first is not told; it was put where the robot has it about then",
+        ),
+    ]
+
+
+def published_of_receiving(p: HandoverParameters) -> Sequence[PublishedValue]:
+    """Return what is told of handovers from human to robot at the published place."""
+    return [_threshold(p, "velocity_gripper")] if _is_published(p) else ()
+
+
+def _threshold(p: HandoverParameters, name: str) -> PublishedValue:
+    return PublishedValue(
+        metric="transfer_speed",
+        paper=_PAPER,
+        name=name,
+        index=(int(p.behaviour),),
+        relation="above",
+        note="the robot's threshold, which is the thesis's here too",
+    )
+
+
+def _is_published(p: HandoverParameters) -> bool:
+    return np.array_equal(p.p_WG_handover, HandoverParameters().p_WG_handover)

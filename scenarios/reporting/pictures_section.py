@@ -1,0 +1,78 @@
+"""Shows what cameras saw at moments of a run, with what was detected drawn over it."""
+
+import base64
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+from markupsafe import Markup
+
+from scenarios.reporting.camera_picture import CameraPicture, Mark
+from scenarios.reporting.kept_pictures import read_pictures
+from scenarios.reporting.page import template
+from scenarios.reporting.section import Section
+from scenarios.run_folder import RunFolder
+
+_WIDTHS = (960, 800, 640, 480, 360)
+"""Widths of which the greatest is taken with which all pictures have room, px."""
+
+_QUALITY = 80
+_ROOM = 1_200_000
+"""What pictures may take of a page as base64, bytes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Shown:
+    """A picture in the page: where it comes from, and what one hears who cannot see it."""
+
+    picture: CameraPicture
+    data: str
+
+    @property
+    def told(self) -> str:
+        p = self.picture
+        marked = ", ".join(mark.label for mark in p.marks)
+        return f"{p.camera} camera at {p.t:.1f} s, {p.role}" + (f"; marked: {marked}" if marked else "; nothing marked")
+
+
+def pictures_section(folder: RunFolder) -> Section | None:
+    """Return the pictures in a run's folder, those of one moment beside each other; None where there are none.
+
+    Raises:
+        BadRunFolder: they are damaged.
+    """
+    pictures = read_pictures(folder.pictures)
+    if not pictures:
+        return None
+    moments: dict[tuple[float, str], list[_Shown]] = {}
+    for picture, data in zip(pictures, _inline(pictures), strict=True):
+        moments.setdefault((picture.t, picture.role), []).append(_Shown(picture=picture, data=data))
+    marks = {mark.label: mark for picture in pictures for mark in picture.marks}
+    html = template("pictures.html").render(moments=moments, legend=list(marks.values()), place=_place)
+    return Section(anchor="pictures", title="What the cameras saw", html=Markup(html))
+
+
+def _inline(pictures: Sequence[CameraPicture]) -> list[str]:
+    """Return the pictures as the page holds them, in the greatest width in which all have room."""
+    made: list[str] = []
+    for width in _WIDTHS:
+        made = [base64.b64encode(_narrowed(p, width)).decode() for p in pictures]
+        if sum(map(len, made)) <= _ROOM:
+            break
+    return made
+
+
+def _narrowed(picture: CameraPicture, width: int) -> bytes:
+    if picture.width <= width:
+        return picture.jpeg
+    height = math.ceil(picture.height * width / picture.width)
+    pixels = cv2.resize(picture.pixels, (width, height), interpolation=cv2.INTER_AREA)
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+
+
+def _place(mark: Mark, picture: CameraPicture) -> str:
+    """Return the style that puts a mark over its place in a picture of any size."""
+    left, top = 100.0 * (mark.u + 0.5) / picture.width, 100.0 * (mark.v + 0.5) / picture.height
+    wide = 100.0 * 2.0 * mark.radius / picture.width
+    return f"left:{left:.3f}%;top:{top:.3f}%;width:{wide:.3f}%;color:{mark.colour}"

@@ -1,0 +1,58 @@
+"""A value that a paper tells of what a run measured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scenarios.paper import paper_entry
+
+
+@dataclass(frozen=True, kw_only=True)
+class PublishedValue:
+    """A published value beside a metric, both in the metric's unit.
+
+    Attributes:
+        metric: the run's.
+        paper: the package of `scenarios` whose `paper.toml` has the value.
+        name: of the value in that file's group `published`.
+        index: of the one that belongs to the run, where the value is an array.
+        span: names of the least and the greatest of what was published, indexed alike; none if it was one value.
+        relation: how the two compare, such as "at most"; "" if they are of the same.
+        note: what else has to be known to compare them, in a sentence without its point.
+    """
+
+    metric: str
+    paper: str
+    name: str
+    index: Sequence[int] = ()
+    span: Sequence[str] = ()
+    relation: str = ""
+    note: str = ""
+
+    @property
+    def value(self) -> float:
+        """The published value."""
+        return self._of(self.name)
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """The least and the greatest, where they were published."""
+        return (self._of(self.span[0]), self._of(self.span[1])) if self.span else None
+
+    @property
+    def where(self) -> str:
+        """Its place in the paper."""
+        return self._entry(self.name)["where"]
+
+    @property
+    def status(self) -> str:
+        """Whether it was stated, derived, assumed or read off a figure."""
+        return self._entry(self.name)["status"]
+
+    def _of(self, name: str) -> float:
+        return float(np.asarray(self._entry(name)["value"], dtype=np.float64)[tuple(self.index)])
+
+    def _entry(self, name: str) -> dict[str, Any]:
+        return paper_entry(self.paper, "published", name)

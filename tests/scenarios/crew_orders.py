@@ -1,0 +1,30 @@
+"""Orders for crews: short grasps, also with units that fail."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from cosim.master_options import MasterOptions
+from fmus.build import build_block, cached
+from scenarios.campaign.run_order import RunOrder
+from scenarios.catalog import SCENARIOS
+
+
+def order(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_grasp", seed: int = 3) -> RunOrder:
+    """Return an order of a run that goes well."""
+    runs.mkdir(exist_ok=True)
+    fmus = {unit: str(cached(block, 3)) for unit, block in SCENARIOS[scenario].units.items()}
+    options = MasterOptions()
+    return RunOrder(
+        name=name, scenario=scenario, parameters=parameters, seed=seed, fmus=fmus, runs=str(runs), options=options
+    )
+
+
+def bad_order(runs: Path, reflex: str, built: Path, name: str = "bad", call_limit: float | None = None) -> RunOrder:
+    """Return an order of a run with a reflex of `failing_reflex`, whose FMU is built into a folder."""
+    good = order(runs, name)
+    fmu = built / f"{reflex}.fmu"
+    if not fmu.exists():
+        fmu = build_block(f"failing_reflex:{reflex}", 3, built, step=Fraction(3, 200))
+    options = good.options if call_limit is None else replace(good.options, call_limit=call_limit)
+    return replace(good, fmus={**good.fmus, "reflex": str(fmu)}, options=options)

@@ -1,0 +1,35 @@
+"""Processes that live, by /proc, and waiting for what comes."""
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+
+def lives(process: int) -> bool:
+    """Return whether a process is there and no zombie."""
+    with contextlib.suppress(ProcessLookupError, FileNotFoundError):
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+def children(process: int) -> list[int]:
+    """Return the processes that a process has started and that are there."""
+    found: list[int] = []
+    with contextlib.suppress(ProcessLookupError, FileNotFoundError):
+        for thread in Path(f"/proc/{process}/task").iterdir():
+            found += map(int, (thread / "children").read_text().split())
+    return found
+
+
+def family(process: int) -> list[int]:
+    """Return a process's children, their children, and so on."""
+    return [below for child in children(process) for below in (child, *family(child))]
+
+
+def until(there: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait until something is so, for at most some time."""
+    end = time.monotonic() + seconds
+    while not there():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.05)

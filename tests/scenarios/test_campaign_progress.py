@@ -1,0 +1,58 @@
+"""How far a campaign has come, as it is told."""
+
+import io
+
+import pytest
+
+from scenarios.campaign.campaign_progress import CampaignProgress, told_done, told_left
+from scenarios.campaign.tally import Tally
+
+
+@pytest.mark.parametrize(
+    ("tally", "elapsed", "told"),
+    [
+        (Tally(total=60), 5.0, ""),
+        (Tally(total=60, ended=60), 5.0, ""),
+        (Tally(total=60, ended=30), 30.0, "30 s left"),
+        (Tally(total=60, kept=20, ended=30), 30.0, "2 min left"),
+        (Tally(total=60, ended=5, lost=5), 1200.0, "1.7 h left"),
+        (Tally(total=60, ended=59), 1.0, "1 s left"),
+    ],
+)
+def test_what_is_left_is_reckoned_from_the_runs_of_this_call(tally: Tally, elapsed: float, told: str):
+    assert told_left(tally, elapsed) == told
+
+
+def test_failed_and_lost_runs_are_told_where_there_are_any():
+    assert told_done(Tally(total=60, ended=12)) == "12 of 60 runs done"
+    assert told_done(Tally(total=60, ended=12, failed=2, lost=1)) == "12 of 60 runs done, 2 failed, 1 lost"
+
+
+def test_a_log_gets_a_line_every_half_minute():
+    now, stream = [0.0], io.StringIO()
+    with CampaignProgress(stream, lambda: now[0]) as progress:
+        for ended in range(11):
+            progress(Tally(total=10, ended=ended))
+            now[0] += 8.0
+    assert stream.getvalue().splitlines() == [
+        "4 of 10 runs done, 48 s left",
+        "8 of 10 runs done, 16 s left",
+    ]
+    assert progress.tally == Tally(total=10, ended=10)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_gets_a_bar_that_goes_at_the_end(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("TERM", "xterm")
+    now, stream = [0.0], Terminal()
+    with CampaignProgress(stream, lambda: now[0]) as progress:
+        progress(Tally(total=10))
+        now[0] = 5.0
+        progress(Tally(total=10, ended=5, failed=1))
+    assert "5 of 10 runs done, 1 failed" in stream.getvalue()
+    assert "5 s left" in stream.getvalue()
+    assert stream.getvalue().endswith("\x1b[2K")

@@ -1,0 +1,121 @@
+"""An embedded crew carries out orders whatever is killed, and leaves no process and no half folder."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Generator, Sequence
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from crew_orders import bad_order, order
+from living import family, lives, until
+
+from scenarios.campaign.crew import Crew
+from scenarios.campaign.dask_crew import cores, embedded_crew
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc"),
+]
+
+
+@pytest.fixture(scope="module")
+def crew() -> Generator[Crew, None, None]:
+    with embedded_crew(2) as crew:
+        yield crew
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> Path:
+    return tmp_path / "runs"
+
+
+def carried_out(crew: Crew, orders: Sequence[RunOrder]) -> list[RunAnswer]:
+    return sorted(crew.carry_out(orders), key=lambda answer: answer.name)
+
+
+def going(runs: Path) -> bool:
+    """Return whether both of two workers carry out a run."""
+    return len(list(runs.glob(".*/signals.tail"))) == 2
+
+
+def of_server(process: int) -> bool:
+    return b"scenarios.campaign.run_server" in Path(f"/proc/{process}/cmdline").read_bytes()
+
+
+def servers(process: int) -> list[int]:
+    """Return the run servers below a process."""
+    return [p for p in family(process) if of_server(p)]
+
+
+def test_all_are_answered_and_one_that_fails_ends_no_other(crew: Crew, runs: Path, tmp_path: Path):
+    orders = [*(order(runs, f"run_{i}", seed=i) for i in range(5)), bad_order(runs, "Crashes", tmp_path)]
+    orders.append(bad_order(runs, "IsKilled", tmp_path, "killed"))
+    crew.check(runs)
+    told = carried_out(crew, orders)
+    assert [answer.name for answer in told] == ["bad", "killed", *(f"run_{i}" for i in range(5))]
+    assert [answer.name for answer in told if answer.lost] == ["killed"]
+    assert "was killed" in told[1].lost
+    assert sorted(p.name for p in runs.iterdir()) == ["bad", *(f"run_{i}" for i in range(5))]
+    assert len({answer.worker for answer in told}) == 2
+    assert servers(os.getpid()) == []
+
+
+def test_a_killed_worker_is_replaced_and_its_run_begun_anew(crew: Crew, runs: Path):
+    orders = [order(runs, f"run_{i}", seed=i) for i in range(8)]
+    told: list[str] = []
+    for answer in crew.carry_out(orders):
+        if not told:
+            server = servers(os.getpid())[0]
+            worker = int(Path(f"/proc/{server}/stat").read_text().rpartition(")")[2].split()[1])
+            os.kill(worker, signal.SIGKILL)
+            until(lambda: not lives(server))  # noqa: B023 (awaited here)
+        told.append(answer.name)
+        assert answer.lost == ""
+    assert sorted(told) == sorted(p.name for p in runs.iterdir()) == [f"run_{i}" for i in range(8)]
+
+
+def test_a_run_that_always_takes_its_worker_with_it_is_given_up(crew: Crew, runs: Path, tmp_path: Path):
+    (told,) = crew.carry_out([bad_order(runs, "KillsItsWorker", tmp_path)])
+    assert told.lost == "its worker was lost 4 times: killed, or out of memory"
+    assert list(runs.iterdir()) == []
+    assert carried_out(crew, [order(runs)])[0].lost == ""
+
+
+def test_an_iteration_that_is_left_ends_its_runs(crew: Crew, runs: Path, tmp_path: Path):
+    hanging = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
+    answers = crew.carry_out([order(runs), *hanging])
+    assert next(iter(answers)).name == "run"
+    answers.close()  # pyright: ignore[reportAttributeAccessIssue]
+    assert servers(os.getpid()) == []
+    assert [p.name for p in runs.iterdir()] == ["run"]
+
+
+def test_by_default_there_is_a_worker_for_each_core():
+    assert cores() == len(os.sched_getaffinity(0))
+    with embedded_crew(None) as crew:
+        assert crew.workers == cores()
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGKILL, -9), (signal.SIGINT, 130)])
+def test_a_command_that_is_ended_leaves_no_process_and_says_nothing(
+    number: signal.Signals, status: int, runs: Path, tmp_path: Path
+):
+    hanging = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
+    (tmp_path / "orders").write_bytes(pickle.dumps(hanging))
+    command = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    until(lambda: going(runs))
+    below = family(process.pid)
+    assert len(below) >= 6  # two workers, two servers, two runs
+    os.killpg(process.pid, number) if number == signal.SIGINT else process.kill()  # as Ctrl-C in a terminal does
+    assert process.communicate(timeout=60) == (b"", b"")
+    assert process.returncode == status
+    until(lambda: not any(map(lives, below)))
+    until(lambda: list(runs.iterdir()) == [])

@@ -1,0 +1,63 @@
+"""Real runs of `helix-1`: what its claims and figures are read from is what campaigns leave."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from own_crew import OwnCrew
+
+from scenarios.campaign.campaign import carry_out_campaign
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_progress import CampaignProgress
+from scenarios.campaign.dask_crew import embedded_crew
+from scenarios.campaign.plan_check import checked_plan
+from scenarios.published.claim import Verdict
+from scenarios.published.helix_1 import Helix1
+from scenarios.published.results import write_results
+
+FAST = {"alpha": "0.4", "control_period": "1.45", "place": "front", "tuning": "thesis"}
+
+
+def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
+    """Carry out one run of the plan and return the claims that are left, by their texts."""
+    plan = Helix1().plan(quick=True)
+    (point,) = [p for p in plan.points if p == FAST]
+    plan = checked_plan(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
+    place = CampaignFolder(folder)
+    table = carry_out_campaign(plan, place, OwnCrew(), CampaignProgress(StringIO()))
+    write_results(Helix1(), table, place)
+    assert len(Helix1().tables(table)) == 4
+    return {claim["claim"]: claim for claim in json.loads((folder / "claims.json").read_text("utf-8"))}
+
+
+def test_an_arm_that_has_no_time_to_move_is_told_as_such(tmp_path: Path):
+    claims = one_run(tmp_path / "campaign", patience="1")
+    closes = next(claim for text, claim in claims.items() if "begins to close" in text)
+    assert isinstance(closes, dict)
+    assert (closes["measured"], closes["verdict"]) == ("0 of 1", "not reproduced")
+    assert not list((tmp_path / "campaign" / "figures").iterdir())
+
+
+@pytest.mark.slow
+def test_a_run_takes_its_ball_and_is_drawn(tmp_path: Path):
+    claims = one_run(tmp_path / "campaign")
+    succeeds = claims["Every handover succeeds"]
+    assert isinstance(succeeds, dict)
+    assert succeeds["measured"] == "1 of 1"
+    assert {f.stem for f in (tmp_path / "campaign" / "figures").iterdir()} == {"times", "errors"}
+
+
+@pytest.mark.paper
+def test_table_1_at_full_size(tmp_path: Path):
+    experiment, folder = Helix1(), CampaignFolder(tmp_path / "campaign")
+    plan = checked_plan(experiment.plan(quick=False))
+    with embedded_crew(None) as crew:
+        table = carry_out_campaign(plan, folder, crew, CampaignProgress(StringIO()))
+    assert set(table.column("status")) == {"done"}
+    verdicts = {claim.claim: claim.verdict for claim in experiment.claims(table)}
+    assert verdicts["The arm reaches the ball and the gripper begins to close in every run"] is Verdict.REPRODUCED
+    assert verdicts["The arm's time falls with the step size"] is Verdict.REPRODUCED
+    assert verdicts["With our settings every handover succeeds"] is Verdict.REPRODUCED

@@ -1,0 +1,150 @@
+"""A run server answers for each order, whatever the run does to its process, and leaves whole folders or none."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from click.testing import CliRunner
+from crew_orders import bad_order, order
+from living import children, lives, until
+
+from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
+from scenarios.command import main
+from scenarios.record import Record
+
+slow = pytest.mark.slow
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
+
+
+def yes() -> bool:
+    return True
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[ServerProcess, None, None]:
+    server = ServerProcess()
+    yield server
+    server.end()
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("built")
+
+
+def summary_in(runs: Path, name: str = "bad") -> dict[str, Any]:
+    """Return the summary of the only run in a folder."""
+    assert [p.name for p in runs.iterdir()] == [name]
+    return json.loads((runs / name / "summary.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("scenario", "parameters"),
+    [("ir_grasp", ()), pytest.param("helix_handover", ("patience=1",), marks=slow)],
+)
+def test_the_signals_are_those_of_the_same_run_by_itself(
+    scenario: str, parameters: tuple[str, ...], server: ServerProcess, tmp_path: Path
+):
+    alone, runs = tmp_path / "alone", tmp_path / "runs"
+    chosen = [text for parameter in parameters for text in ("-p", parameter)]
+    CliRunner().invoke(main, ["run", scenario, *chosen, "--seed", "3", "--out", str(alone)])
+    assert server.carry_out(order(runs, "run", *parameters, scenario=scenario), yes) == ""
+    assert (runs / "run" / "signals.parquet").read_bytes() == (alone / "signals.parquet").read_bytes()
+    assert sorted(p.name for p in (runs / "run").iterdir()) == ["figures", "run.json", "signals.parquet", "summary.json"]
+    assert list((runs / "run" / "figures").iterdir()) == []
+
+
+def test_a_unit_that_fails_is_in_the_summary(server: ServerProcess, built: Path, tmp_path: Path):
+    assert server.carry_out(bad_order(tmp_path / "runs", "Raises", built), yes) == ""
+    summary = summary_in(tmp_path / "runs")
+    assert (summary["success"], summary["failure"]["kind"]) == (False, "error")
+    assert "a sensor broke" in summary["reason"]
+
+
+@pytest.mark.parametrize(("reflex", "kind"), [("Crashes", "crash"), pytest.param("Hangs", "hang", marks=slow)])
+def test_a_unit_that_does_not_come_back_ends_its_run_only(
+    reflex: str, kind: str, server: ServerProcess, built: Path, tmp_path: Path
+):
+    assert server.carry_out(bad_order(tmp_path / "runs", reflex, built, call_limit=0.5), yes) == ""
+    summary = summary_in(tmp_path / "runs")
+    assert (summary["failure"]["kind"], summary["failure"]["instance"]) == (kind, "reflex")
+    assert 0.0 < summary["cpu_seconds"] < 60.0
+    assert Record(tmp_path / "runs" / "bad" / "signals.parquet").time[-1] == pytest.approx(0.09)
+    assert server.lives
+
+
+@pytest.mark.parametrize(
+    ("reflex", "told"),
+    [("IsKilled", "the run was killed at t = 0.105 s, in "), pytest.param("FillsTheDisk", "cannot be written: File too large", marks=slow)],
+)
+def test_a_run_without_a_summary_leaves_nothing(
+    reflex: str, told: str, server: ServerProcess, built: Path, tmp_path: Path
+):
+    lost = server.carry_out(bad_order(tmp_path / "runs", reflex, built), yes)
+    assert told in lost
+    assert "\n" not in lost
+    assert list((tmp_path / "runs").iterdir()) == []
+
+
+def test_what_is_refused_is_told(server: ServerProcess, tmp_path: Path):
+    assert "has no parameter 'gloss'" in server.carry_out(order(tmp_path / "runs", "run", "gloss=1"), yes)
+    unknown = replace(order(tmp_path / "runs"), scenario="juggle")
+    assert "no scenario 'juggle'" in server.carry_out(unknown, yes)
+    assert list((tmp_path / "runs").iterdir()) == []
+
+
+@slow
+def test_what_a_run_prints_is_kept_beside_its_record(server: ServerProcess, built: Path, tmp_path: Path):
+    assert server.carry_out(bad_order(tmp_path / "runs", "Prints", built), yes) == ""
+    log = tmp_path / "runs" / "bad" / "log.txt"
+    assert log.read_text() == "from Python\nfrom native code\ninput: ''\n"
+
+
+@slow
+def test_a_run_that_was_carried_out_twice_is_there_once(server: ServerProcess, tmp_path: Path):
+    for _ in range(2):
+        assert server.carry_out(order(tmp_path / "runs"), yes) == ""
+    assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
+
+
+@slow
+def test_a_server_that_is_killed_takes_its_run_with_it(built: Path, tmp_path: Path):
+    server, seen = ServerProcess(), list[int]()
+
+    def kill() -> bool:
+        if not seen and list((tmp_path / "runs").glob(".bad.*/signals.tail")):
+            seen.extend(children(server.pid))
+            os.kill(server.pid, signal.SIGKILL)
+        return True
+
+    with pytest.raises(ServerLost, match="ended with status -9"):
+        server.carry_out(bad_order(tmp_path / "runs", "Hangs", built), kill)
+    assert len(seen) == 1
+    until(lambda: not lives(seen[0]))
+    assert list((tmp_path / "runs").iterdir()) == []
+    assert not server.lives
+
+
+@slow
+def test_a_run_that_is_not_wanted_any_more_is_ended(built: Path, tmp_path: Path):
+    server, seen = ServerProcess(), list[int]()
+
+    def wanted() -> bool:
+        if list((tmp_path / "runs").glob(".bad.*/signals.tail")):
+            seen.extend(children(server.pid))
+        return not seen
+
+    with pytest.raises(NotWanted):
+        server.carry_out(bad_order(tmp_path / "runs", "Hangs", built), wanted)
+    assert [lives(process) for process in (server.pid, *seen)] == [False, False]
+    assert list((tmp_path / "runs").iterdir()) == []
+

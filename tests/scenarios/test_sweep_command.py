@@ -1,0 +1,189 @@
+"""`handover sweep`: what it prints, with which status it ends, and what a call is refused for."""
+
+import contextlib
+import errno
+import os
+from collections.abc import Callable, Generator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from own_crew import OwnCrew
+
+from cosim.exceptions import RecordNotWritten
+from scenarios.campaign import dask_crew
+from scenarios.campaign.bad_crew import BadCrew, CrewLost
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.run_order import RunOrder
+from scenarios.command import main
+
+CALL = [
+    "sweep",
+    "ir_grasp",
+    "forward=0.03,0.1",
+    "-p",
+    "strategy=forward",
+    "-p",
+    "run_up=0",
+    "--out",
+    "c",
+    "--no-report",
+]
+ALL = ("000_forward=0.03_r0000", "001_forward=0.1_r0000")
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def sweep(
+    monkeypatch: pytest.MonkeyPatch, *call: str, before: Callable[[RunOrder], str] = lambda _order: ""
+) -> tuple[Result, list[str]]:
+    """Return how a command ended, and which runs it began."""
+    crew = OwnCrew(before)
+
+    @contextlib.contextmanager
+    def own_crew(_workers: int | None) -> Generator[OwnCrew, None, None]:
+        yield crew
+
+    monkeypatch.setattr(dask_crew, "embedded_crew", own_crew)
+    return CliRunner().invoke(main, call), crew.begun
+
+
+def raising(error: BaseException, at: int) -> Callable[[RunOrder], str]:
+    """Return what raises an error before the run of a number, from 0."""
+    counted: list[str] = []
+
+    def count(order: RunOrder) -> str:
+        counted.append(order.name)
+        if len(counted) > at:
+            raise error
+        return ""
+
+    return count
+
+
+def test_a_campaign_ends_with_a_row_for_each_point(monkeypatch: pytest.MonkeyPatch):
+    result, begun = sweep(monkeypatch, *CALL)
+    assert result.exit_code == 0, result.output
+    assert begun == list(ALL)
+    assert "ir_grasp: 2 of 2 runs done" in result.output
+    assert [line.split()[:5] for line in result.output.splitlines() if " of 1 " in line] == [
+        ["0.03", "1", "0", "of", "1"],
+        ["0.1", "1", "1", "of", "1"],
+    ]
+    assert "0 % to 98 %" in result.output
+    assert "table: c/runs.parquet" in result.output
+
+
+def test_an_interrupted_call_goes_on(monkeypatch: pytest.MonkeyPatch):
+    result, _ = sweep(monkeypatch, *CALL, before=raising(KeyboardInterrupt(), at=1))
+    assert (result.exit_code, result.output) == (1, "1 of 2 runs done in c; the same call goes on\n")
+    assert len(CampaignTable.read(Path("c"))) == 1
+    result, begun = sweep(monkeypatch, *CALL)
+    assert (result.exit_code, begun) == (0, [ALL[1]])
+
+
+def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyPatch):
+    call = [*CALL[:-3], "--no-report"]
+    result, _ = sweep(monkeypatch, *call, before=raising(KeyboardInterrupt(), at=1))
+    (folder,) = Path("campaigns").iterdir()
+    assert result.output == f"1 of 2 runs done in {folder}; the same call goes on\n"
+    result, begun = sweep(monkeypatch, *call)
+    assert (result.exit_code, begun) == (0, [ALL[1]])
+    assert list(Path("campaigns").iterdir()) == [folder]
+
+
+def test_a_lost_run_is_told_by_the_status(monkeypatch: pytest.MonkeyPatch):
+    result, _ = sweep(monkeypatch, *CALL, before=lambda order: "its machine burnt" if order.name == ALL[0] else "")
+    assert result.exit_code == 3
+    assert "1 of 2 runs done, 1 lost" in result.output
+    assert "1 lost: its machine burnt" in result.output
+
+
+def test_a_full_disk_stops_and_what_is_done_stays(monkeypatch: pytest.MonkeyPatch):
+    full = RecordNotWritten(Path("c/x"), os.strerror(errno.ENOSPC))
+    told: list[str] = []
+
+    def fill(order: RunOrder) -> str:
+        told.append(order.name)
+        return str(full) if len(told) > 1 else ""
+
+    result, begun = sweep(monkeypatch, *CALL, "--repeat", "3", before=fill)
+    assert result.exit_code == 3
+    assert len(begun) == 2
+    assert result.output == (
+        "Error: c/runs/001_forward=0.1_r0000 cannot be written: No space left on device; "
+        "1 of 6 runs done; the same call goes on\n"
+    )
+    assert CampaignTable.read(Path("c")).column("run").tolist() == [ALL[0]]
+
+
+def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
+    replace = os.replace
+
+    def refuse(source: str | Path, target: str | Path) -> None:
+        if Path(target).name == "runs.parquet":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", refuse)
+    result, _ = sweep(monkeypatch, *CALL)
+    assert (result.exit_code, result.output) == (
+        3,
+        "Error: c/runs.parquet cannot be written: No space left on device; 1 of 2 runs done; the same call goes on\n",
+    )
+    assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]
+
+
+def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
+    result, _ = sweep(monkeypatch, *CALL, before=raising(CrewLost("the scheduler is gone"), at=1))
+    assert (result.exit_code, result.output) == (
+        3,
+        "Error: the scheduler is gone; 1 of 2 runs done; the same call goes on\n",
+    )
+
+
+def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytest.MonkeyPatch):
+    @contextlib.contextmanager
+    def refuse(_workers: int | None) -> Generator[OwnCrew, None, None]:
+        raise BadCrew("there are none")
+        yield OwnCrew()
+
+    monkeypatch.setattr(dask_crew, "embedded_crew", refuse)
+    result = CliRunner().invoke(main, CALL)
+    assert (result.exit_code, result.output) == (2, "Error: there are none\n")
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (["ir_gasp"], "no scenario 'ir_gasp': did you mean ir_grasp?"),
+        (["x.ssp"], "x.ssp: a scenario can be swept, an SSP has no parameters of its own"),
+        (["ir_grasp", "thing=cylindr"], "thing: 'cylindr' is none of cylinder, baby_cup_a"),
+        (["ir_grasp", "forward=0.1", "-p", "forward=0.2"], "forward is varied and set by -p; one of both is right"),
+        (["ir_grasp", "shift_least=0.01,0.06"], "at shift_least=0.06: shift_least 0.06 m must be at most"),
+        (["ir_grasp", "--unit", "sceen=x.fmu"], "ir_grasp has no unit 'sceen': did you mean scene?"),
+        (["ir_grasp", "--unit", "scene=absent.fmu"], "absent.fmu"),
+        (["ir_grasp", "forward=0:0.3:20000", "--repeat", "9"], "are 180,000 runs; at most 100,000 can be planned"),
+        (["ir_grasp", "--workers", "2", "--scheduler", "tcp://h:1"], "a scheduler has workers of its own"),
+        (["ir_grasp", "--first-step", "0.1"], "with --adaptive only"),
+    ],
+)
+def test_bad_calls_are_told_in_a_line_and_leave_nothing(
+    here: Path, call: list[str], told: str, monkeypatch: pytest.MonkeyPatch
+):
+    result, begun = sweep(monkeypatch, "sweep", *call)
+    assert result.exit_code == 2
+    assert told in result.output
+    assert len(result.output.splitlines()) == 1
+    assert begun == []
+    assert list(here.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", [["--repeat", "0"], ["--repeat", "x"], ["--workers", "0"], ["--seed", "-1"]])
+def test_options_out_of_range(option: list[str]):
+    assert CliRunner().invoke(main, [*CALL, *option]).exit_code == 2
