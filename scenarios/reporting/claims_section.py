@@ -29,8 +29,16 @@ def verdict_html(verdict: Verdict) -> Markup:
 
 def _row(claim: Claim) -> tuple[str | Markup, ...]:
     where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
-    reason = Markup("{}<br><span class='soft'>{}</span>").format(verdict_html(claim.verdict), claim.reason)
-    return Markup("{}{}").format(claim.claim, where), claim.published, claim.measured, _span(claim), reason
+    reason = Markup("<div class='prose'>{}<br><span class='soft'>{}</span></div>").format(
+        verdict_html(claim.verdict), claim.reason
+    )
+    return (
+        Markup("<div class='prose'>{}{}</div>").format(claim.claim, where),
+        claim.published,
+        claim.measured,
+        _span(claim),
+        reason,
+    )
 
 
 def _span(claim: Claim) -> str:

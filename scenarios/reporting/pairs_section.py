@@ -37,7 +37,8 @@ def pairs_section(results: CampaignResults) -> Section | None:
     if left:
         told += f" {left} pairs of points more are left out."
     header = ("of", "first", "second", "pairs", "both", "only first", "only second", "neither", "p")
-    html = rows_table(header, rows, numbers=range(3, 9), sortable=True) + Markup("<p class='soft'>{}</p>").format(told)
+    table = rows_table(header, rows, numbers=range(3, 9), sortable=True)
+    html = Markup("<div class='tall'>{}</div><p class='soft'>{}</p>").format(table, told)
     return Section(anchor="pairs", title="Paired comparisons", html=html, scripts=("campaign.js",))
 
 
@@ -74,6 +75,6 @@ def _row(
 def _labels(results: CampaignResults, a: PointResults, b: PointResults) -> tuple[str, str, str]:
     """Return what two points have in common, and what each has for itself."""
     name = _difference(a, b)
-    shared = [results.value_text(n, a.values[n]) for n in results.varied if n != name]
+    shared = [results.value_text(n, a.values[n]) for n in results.varied if n != name and n in a.values]
     first, second = ("", "") if name is None else (results.value_text(name, p.values[name]) for p in (a, b))
     return ", ".join(shared) or "all", first, second

@@ -50,8 +50,10 @@ def points_section(results: CampaignResults) -> Section | None:
 def _values(results: CampaignResults, point: PointResults) -> list[Cell]:
     cells: list[Cell] = []
     for name in results.varied:
-        text = point.values.get(name, "–")
-        if results.is_number(name):
+        text = point.values.get(name)
+        if text is None:
+            cells.append(Cell("–"))
+        elif results.is_number(name):
             texts = [float(p.values[name]) for p in results.points if name in p.values]
             cells.append(Cell(shown_unit(results.unit(name), texts).text(float(text)), float(text)))
         else:

@@ -36,7 +36,9 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
     )
     numbers = [len(varied) + 1, *range(len(varied) + 3, len(header))]
     left = len(table) - len(rows)
-    note = f"The first {len(rows)} of {len(table)} runs; all are in runs.parquet." if left > 0 else ""
+    note = f"The first {len(rows)} of {len(table)} runs; all are in runs.parquet. " if left > 0 else ""
+    if not any(_page_of(name, folder) for name in table.column("run")):
+        note += f"handover report {folder.name}/runs/NAME writes the page of a run."
     html = Markup(
         "<div class='controls'><label>Show runs with <input type='search' data-filters='all-runs' "
         "placeholder='words, such as failed'></label></div>\n"
@@ -47,10 +49,14 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
 
 def run_html(name: str, folder: Path) -> Markup:
     """Return a run's name, linked to its page if that is there."""
+    place = _page_of(name, folder)
+    return Markup("<a href='{}'>{}</a>").format(quote(place), name) if place else Markup("{}").format(name)
+
+
+def _page_of(name: str, folder: Path) -> str:
+    """Return where a run's page is within a campaign's folder; "" if it is not there."""
     place = f"runs/{name}/report.html"
-    if not (folder / place).exists():
-        return Markup("{}").format(name)
-    return Markup("<a href='{}'>{}</a>").format(quote(place), name)
+    return place if (folder / place).exists() else ""
 
 
 def _row(
@@ -66,6 +72,8 @@ def _row(
 
 
 def _parameter(results: CampaignResults, name: str, value: Any) -> Cell:
+    if value is None:
+        return Cell("–")
     if isinstance(value, float):
         return Cell(shown_unit(results.table.unit(name), results.table.column(name)).text(value), value)
     if isinstance(value, bool):

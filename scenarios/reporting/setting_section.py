@@ -14,12 +14,11 @@ from scenarios.reporting.section import Section
 def setting_section(results: CampaignResults) -> Section:
     """Return tables of what is set for all runs; the scenario's defaults hold for the rest."""
     told = results.told
-    units: Mapping[str, Any] = told.get("units", {})
     parts = [
         _part("Fixed parameters", {n: _value(results, n, v) for n, v in told["fixed"].items()}),
         _part("Master", _flat(told.get("master", {}))),
         _part("Versions", {n: str(v) for n, v in told.get("versions", {}).items()}),
-        _part("FMUs", {n: f"{u['fmu']} {u['sha256'][:12]}" for n, u in units.items()}),
+        _fmus(told.get("units", {})),
     ]
     defaults = "Parameters that are neither varied nor fixed have the scenario's defaults; each run's run.json has all."
     html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)
@@ -32,6 +31,13 @@ def _part(title: str, rows: Mapping[str, str]) -> Markup:
     return Markup("<div><h3>{}</h3>{}</div>").format(
         title, rows_table(("name", "value"), list(rows.items()), numbers=(1,))
     )
+
+
+def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
+    if not units:
+        return Markup()
+    rows = [(name, u["fmu"], Markup("<code>{}</code>").format(u["sha256"][:12])) for name, u in units.items()]
+    return Markup("<div><h3>FMUs</h3>{}</div>").format(rows_table(("unit", "file", "sha256"), rows))
 
 
 def _value(results: CampaignResults, name: str, text: str) -> str:

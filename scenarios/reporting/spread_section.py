@@ -123,7 +123,7 @@ def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Se
     words = name.replace("_", " ")
     return {
         "name": words,
-        "axis": unit.axis(words),
+        "axis": unit.axis(f"{words}<br>" if layout.listed else words),
         "told": results.table.description(name),
         "traces": [*boxes, *({across: _plain(values[rows])} for _, _, rows, _ in strips)],
     }

@@ -1,0 +1,86 @@
+"""Campaigns to make pages of: real ones, and tables that a test chooses."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from scenarios.campaign.campaign import carry_out_campaign
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_results import CampaignResults
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.ordered_run import carry_out_order
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+
+
+@dataclass
+class PlainCrew:
+    """Carries runs out one after another in this process, and loses those that are named."""
+
+    lost: Sequence[str] = ()
+    workers: int = 1
+
+    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+        for order in orders:
+            if order.name in self.lost:
+                yield RunAnswer(name=order.name, lost="its worker went away", worker="here")
+                continue
+            carry_out_order(order, Path(order.runs, order.name))
+            yield RunAnswer(name=order.name, worker="here")
+
+
+def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:
+    """Carry a campaign out and return its folder."""
+    folder = CampaignFolder(path)
+    carry_out_campaign(plan, folder, PlainCrew(lost), lambda _tally: None)
+    return folder
+
+
+def told(scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Any) -> dict[str, Any]:
+    """Return what a campaign's file says."""
+    plan = {"scenario": scenario, "points": list(points), "fixed": {}, "repetitions": repetitions, "seed": 0}
+    return {**plan, "paired": False, **more}
+
+
+def table_of(points: Sequence[Mapping[str, Any]], repetitions: int = 2, **more: Sequence[Any]) -> CampaignTable:
+    """Return runs that took 1 s; every second repetition failed. `more` are further columns of metrics, in m."""
+    runs = [(k, r) for k in range(len(points)) for r in range(repetitions)]
+    columns: dict[str, Sequence[Any]] = {
+        "run": [f"{k:03d}_r{r:04d}" for k, r in runs],
+        "point": [k for k, _ in runs],
+        "repetition": [r for _, r in runs],
+        "seed": [100 + r for _, r in runs],
+        "status": ["done"] * len(runs),
+        "success": [r % 2 == 0 for _, r in runs],
+        "reason": ["held" if r % 2 == 0 else f"slipped at {k}.{r} s" for k, r in runs],
+        **{name: [points[k].get(name) for k, _ in runs] for name in dict.fromkeys(n for p in points for n in p)},
+        **{name: [1.0] * len(runs) for name in ("simulated_seconds", "wall_seconds", "cpu_seconds")},
+        **more,
+    }
+    table = pa.table({name: list(values) for name, values in columns.items()})
+    roles = {n: "parameter" for p in points for n in p} | dict.fromkeys(more, "metric")
+    fields = [
+        pa.field(f.name, f.type, metadata={"role": roles.get(f.name, "run"), "unit": "m" if f.name in more else "1"})
+        for f in table.schema
+    ]
+    return CampaignTable(table.cast(pa.schema(fields)))
+
+
+def results_of(
+    scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Sequence[Any]
+) -> CampaignResults:
+    """Return what came out at points; columns of parameters are texts."""
+    return CampaignResults(told(scenario, points, repetitions), table_of(points, repetitions, **more))
+
+
+def folder_of(path: Path, plan: Mapping[str, Any], table: CampaignTable) -> CampaignFolder:
+    """Write a campaign's file and table into a folder."""
+    path.mkdir(parents=True, exist_ok=True)
+    (path / "campaign.json").write_text(json.dumps(plan), encoding="utf-8")
+    pq.write_table(table.table, path / "runs.parquet")
+    return CampaignFolder(path)

@@ -1,0 +1,52 @@
+"""Figures of a campaign: PNG and SVG of success and metrics, for few points and many."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from campaigns import results_of
+from matplotlib.figure import Figure as Canvas
+from matplotlib.transforms import Bbox
+
+from scenarios.campaign.campaign_figures import draw_campaign
+
+
+@pytest.mark.parametrize("n", [2, 30])
+def test_success_and_the_metrics_that_matter_are_drawn(n: int, tmp_path: Path):
+    points = [{"forward": f"{0.001 * k:g}"} for k in range(n)]
+    results = results_of("ir_grasp", points, moved=[0.01 * k for k in range(2 * n)], unheard_of=[1.0] * (2 * n))
+    drawn = draw_campaign(results, tmp_path / "figures")
+    assert [f.name for f in drawn] == ["success_by_point", "moved_by_point"]
+    assert all((tmp_path / "figures" / f"{f.name}.{kind}").stat().st_size for f in drawn for kind in ("png", "svg"))
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [{"forward": f} for f in ("0.02", "0.055")],
+        [{"thing": t} for t in ("cylinder", "baby_cup_a", "baby_cup_b", "paper_box_a", "paper_box_b", "none")],
+        [{"forward": f"{0.001 * k:g}"} for k in range(30)],
+        [{"thing": f"thing_{k}", "strategy": s, "perturbed": f"{k == 0}"} for k in range(15) for s in ("blind", "all")],
+    ],
+    ids=["two", "six names", "thirty numbers", "a list of thirty"],
+)
+def test_names_of_points_do_not_overlap(points: list[dict[str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    boxes: list[list[Bbox]] = []
+
+    def look(canvas: Canvas, _path: Path) -> None:
+        canvas.draw_without_rendering()
+        labels = (axis.get_ticklabels() for axis in (canvas.axes[0].xaxis, canvas.axes[0].yaxis))
+        boxes.extend([each.get_window_extent() for each in along if each.get_text()] for along in labels)
+
+    monkeypatch.setattr("scenarios.plotting._save", look)
+    draw_campaign(results_of("ir_grasp", points), tmp_path)
+    assert len(boxes) == 2
+    assert max(map(len, boxes)) >= min(len(points), 6)
+    for along in boxes:
+        assert not any(a.overlaps(b) for a, b in pairwise(along))
+
+
+def test_of_more_points_than_a_figure_has_room_for_there_is_none(tmp_path: Path):
+    points = [{"thing": f"thing_{k}", "strategy": f"s{k}", "perturbed": str(k)} for k in range(81)]
+    assert draw_campaign(results_of("ir_grasp", points), tmp_path / "figures") == []
+    assert not (tmp_path / "figures").exists()

@@ -1,0 +1,108 @@
+"""What a campaign's page says, also of one that is not complete, or damaged."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+from campaigns import folder_of, table_of, told
+
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.published.claim import Claim, Verdict
+from scenarios.reporting.campaign_page import write_campaign_page
+from scenarios.run_folder import BadRunFolder
+
+POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
+
+
+def page_of(path: Path, plan: dict[str, Any], table: CampaignTable) -> str:
+    folder = folder_of(path, plan, table)
+    write_campaign_page(folder)
+    return folder.report.read_text(encoding="utf-8")
+
+
+def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTable:
+    index = table.table.column_names.index(column)
+    field = table.table.schema.field(index)
+    return CampaignTable(table.table.set_column(index, field, pa.array(values, field.type)))
+
+
+def test_a_campaign_that_is_not_complete_says_how_far_it_is(tmp_path: Path):
+    html = page_of(tmp_path, told("ir_grasp", POINTS, repetitions=30), table_of(POINTS, repetitions=2))
+    assert "<b>4 of 60 runs so far</b>; the same call goes on." in html
+    assert "In 2 of 4 runs done the task succeeded." in html
+
+
+def test_a_campaign_without_a_run_has_a_page(tmp_path: Path):
+    html = page_of(tmp_path, told("ir_grasp", POINTS), CampaignTable(table_of(POINTS).table.slice(0, 0)))
+    assert "<b>0 of 4 runs so far</b>" in html
+    assert 'id="success"' not in html
+    assert 'id="runs"' not in html
+
+
+def test_failures_are_one_if_but_their_numbers_differ(tmp_path: Path):
+    html = page_of(tmp_path, told("ir_grasp", POINTS), table_of(POINTS))
+    part = html[html.index('id="failures"') : html.index('id="runs"')]
+    assert part.count("slipped at") == part.count("slipped at 0.1 s") == 1
+    assert "000_r0001, 001_r0001" in part
+
+
+def test_what_runs_tell_is_no_html(tmp_path: Path):
+    table = replaced(table_of(POINTS), "reason", ["</script><script>alert(1)</script>"] * 4)
+    assert "<script>alert" not in page_of(tmp_path, told("ir_grasp", POINTS), table)
+
+
+def test_metrics_that_are_not_numbers_leave_gaps(tmp_path: Path):
+    table = table_of(POINTS, moved=[math.nan, 0.1, math.inf, None])
+    assert "NaN" not in page_of(tmp_path, told("ir_grasp", POINTS), table).split("</nav>")[1].split("</main>")[0]
+
+
+def test_a_parameter_that_some_points_leave_alone_is_told_as_a_gap(tmp_path: Path):
+    points = [
+        {"strategy": "reflex"},
+        {"strategy": "forward", "forward": "0.03"},
+        {"strategy": "forward", "forward": "0.04"},
+    ]
+    html = page_of(tmp_path, told("ir_grasp", points), table_of(points))
+    assert "<td>reflex</td><td>cylinder</td><td>–</td>" in html
+    assert "<td>forward</td><td>cylinder</td><td data-key='0.04'>40 mm</td>" in html
+    assert "<td>reflex</td><td>cylinder</td><td>baby cup a</td>" in html
+
+
+def test_points_of_a_paired_campaign_are_compared(tmp_path: Path):
+    table = replaced(table_of(POINTS, repetitions=6), "success", [True] * 6 + [False] * 6)
+    html = page_of(tmp_path, told("ir_grasp", POINTS, repetitions=6, paired=True), table)
+    part = html[html.index('id="pairs"') : html.index('id="failures"')]
+    assert "<td class=\"number\" data-key='0.03125'>0.031</td>" in part
+
+
+def test_claims_stand_with_their_verdicts(tmp_path: Path):
+    folder = folder_of(tmp_path, told("ir_grasp", POINTS), table_of(POINTS))
+    claim = Claim(
+        claim="it holds <more>", published="2", measured="3", verdict=Verdict.NOT_REPRODUCED, reason="3 is not 2"
+    )
+    (tmp_path / "claims.json").write_text(json.dumps([claim.as_data()]), encoding="utf-8")
+    write_campaign_page(folder)
+    html = folder.report.read_text(encoding="utf-8")
+    assert "it holds &lt;more&gt;" in html
+    assert "<b class='bad'>not reproduced</b>" in html
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "fault"),
+    [
+        ("campaign.json", "", "its campaign.json is damaged"),
+        ("campaign.json", "[]", "holds no JSON object"),
+        ("campaign.json", '{"scenario": "ir_grasp", "points": 3}', "'points' is 3"),
+        ("runs.parquet", "nothing", "its runs.parquet is damaged"),
+        ("claims.json", '[{"claim": "x"}]', "its claims.json is damaged"),
+    ],
+)
+def test_of_a_damaged_folder_nothing_is_written(tmp_path: Path, file: str, content: str, fault: str):
+    folder = folder_of(tmp_path, told("ir_grasp", POINTS), table_of(POINTS))
+    (tmp_path / file).write_text(content, encoding="utf-8")
+    with pytest.raises(BadRunFolder, match=fault):
+        write_campaign_page(folder)
+    assert not folder.report.exists()

@@ -1,0 +1,77 @@
+"""A campaign's page in a browser: its metric can be chosen, its tables sorted and filtered, also on a phone."""
+
+from pathlib import Path
+
+import pytest
+from campaigns import carried_out
+from opened_page import opened, overflow, wait_until
+from playwright.sync_api import Browser
+
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.reporting.campaign_page import write_campaign_page
+
+PLAN = CampaignPlan(
+    scenario="ir_grasp", points=[{"strategy": "reflex"}, {"strategy": "blind"}], repetitions=2, seed=1, paired=True
+)
+LOST = "001_strategy=blind_r0001"
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> CampaignFolder:
+    folder = carried_out(PLAN, tmp_path_factory.mktemp("campaigns") / "grasps", lost=[LOST])
+    write_campaign_page(folder)
+    return folder
+
+
+def test_a_metric_is_chosen_and_runs_are_sorted_and_filtered(browser: Browser, campaign: CampaignFolder):
+    with opened(browser, campaign.report) as page:
+        assert page.inner_text("h1") == "ir_grasp"
+        assert page.locator(".plot").count() == page.locator(".plot:has(.main-svg)").count() == 2
+        plot = "document.querySelector('.chooser .plot')"
+        before = page.evaluate(f"JSON.stringify({plot}.data.map(t => t.y ?? t.median))")
+        page.select_option(".chooser select", label="refinement time")
+        wait_until(page, f"{plot}.layout.yaxis.title.text === 'refinement time (s)'")
+        assert page.evaluate(f"JSON.stringify({plot}.data.map(t => t.y ?? t.median))") != before
+        assert "until the hand closes" in page.inner_text(".chooser .told")
+
+        rows = page.locator("#all-runs tbody tr")
+        seeds = "[...document.querySelectorAll('#all-runs tbody tr')].map(r => Number(r.cells[2].textContent))"
+        page.click("#all-runs th:nth-child(3) button")
+        up = page.evaluate(seeds)
+        page.click("#all-runs th:nth-child(3) button")
+        assert page.evaluate(seeds) == up[::-1] == sorted(up, reverse=True)
+        page.fill("input[data-filters]", "went away blind")
+        assert page.locator("#all-runs tbody tr:visible").count() == 0
+        page.fill("input[data-filters]", "LOST blind")
+        assert page.locator("#all-runs tbody tr:visible").count() == 1
+        assert rows.count() == 4
+
+        page.set_viewport_size({"width": 400, "height": 800})
+        wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")
+        assert overflow(page) <= 0
+
+
+@pytest.mark.slow
+def test_a_campaigns_page_is_no_wider_than_a_phone(browser: Browser, campaign: CampaignFolder):
+    with opened(browser, campaign.report, width=400, scheme="dark") as page:
+        assert overflow(page) <= 0
+
+
+def test_a_page_tells_what_became_of_every_run(campaign: CampaignFolder):
+    html = campaign.report.read_text(encoding="utf-8")
+    assert "in 2 of 3 runs done the task succeeded; 1 was lost." in html
+    assert "its worker went away" in html
+    assert "2 of 2" in html
+    assert "0 of 1" in html
+    assert {p.name for p in campaign.figures.iterdir()} >= {"success_by_point.png", "success_by_point.svg"}
+
+
+def test_pages_of_runs_are_linked_where_they_are(campaign: CampaignFolder, tmp_path: Path):
+    page = tmp_path / "page.html"
+    name = "000_strategy=reflex_r0000"
+    write_campaign_page(campaign, page)
+    assert "<a href='runs/" not in page.read_text(encoding="utf-8")
+    (campaign.runs / name / "report.html").touch()
+    write_campaign_page(campaign, page)
+    assert f"<a href='runs/{name.replace('=', '%3D')}/report.html'>" in page.read_text(encoding="utf-8")
