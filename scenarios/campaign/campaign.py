@@ -5,7 +5,7 @@ import errno
 import os
 import shutil
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from cosim.exceptions import RecordNotWritten
@@ -44,7 +44,7 @@ def carry_out_campaign(
         try:
             work.give_to(crew, fmus)
         finally:
-            work.table.write()
+            work.end()
     return CampaignTable.read(folder.table)
 
 
@@ -55,8 +55,8 @@ class _Work:
         self.plan, self.folder, self.progress = plan, folder, progress
         self.table = TableWriter(plan, folder.table)
         self.runs = {run.name: run for run in plan.runs()}
-        self._count: Counter[str] = Counter()
-        self._kept = self._keep_done()
+        self._count = Counter[str]()
+        self._kept = self._keep(self.runs.values())
         progress(self.tally)
 
     def give_to(self, crew: Crew, fmus: Mapping[str, Path]) -> None:
@@ -72,6 +72,13 @@ class _Work:
             for answer in answers:
                 self._take(answer)
 
+    def end(self) -> None:
+        """Write the table, also of runs that have ended but whose answers have not come, as after an interruption."""
+        known = {row.run.name for row in self.table.rows if row.status != "lost"}
+        self._keep([run for run in self.runs.values() if run.name not in known])
+        self.progress(self.tally)
+        self.table.write()
+
     @property
     def tally(self) -> Tally:
         """How far it has come."""
@@ -79,10 +86,10 @@ class _Work:
         ended = n["done"] + n["failed"]
         return Tally(total=len(self.runs), kept=self._kept, ended=ended, failed=n["failed"], lost=n["lost"])
 
-    def _keep_done(self) -> int:
-        """Take the rows of all runs that are done, and remove what cannot be read of a run."""
+    def _keep(self, runs: Iterable[PlannedRun]) -> int:
+        """Take the rows of those runs that are done, and remove what cannot be read of a run; return how many."""
         kept: list[RunRow] = []
-        for run in self.runs.values():
+        for run in runs:
             if not self.folder.is_done(run):
                 continue
             row = row_of(run, self.folder.runs / run.name)
@@ -92,7 +99,7 @@ class _Work:
             else:
                 kept.append(row)
         self.table.keep(kept)
-        self._count.update(row.status for row in kept)
+        self._count = Counter(row.status for row in self.table.rows)
         return len(kept)
 
     def _to_do(self) -> Sequence[PlannedRun]:

@@ -1,0 +1,72 @@
+"""Ctrl-C and SIGTERM end a campaign in order; nothing that it started stays."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from sweeping import Going, ended, runs_in, sweeping, wait_for
+
+from scenarios.campaign.campaign_interruption import CampaignInterruption
+from scenarios.campaign.campaign_table import CampaignTable
+
+pytestmark = pytest.mark.slow
+
+CALL = ["ir_grasp", "--repeat", "200", "-p", "strategy=forward", "--workers", "2", "--no-report"]
+
+
+def family_of(going: Going) -> list[psutil.Process]:
+    return psutil.Process(going.pid).children(recursive=True)
+
+
+def wait_for_end_of(processes: list[psutil.Process]) -> None:
+    _, alive = psutil.wait_procs(processes, timeout=60)
+    assert alive == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_signal_ends_it_in_order(number: signal.Signals, tmp_path: Path):
+    out = tmp_path / "c"
+    with sweeping(*CALL, "--out", out) as going:
+        wait_for(lambda: len(runs_in(out)) >= 3, going)
+        family = family_of(going)
+        going.send_signal(number)
+        status, told, errors = ended(going)
+        wait_for_end_of(family)
+    done = len(runs_in(out))
+    assert (status, told) == (1, "")
+    assert errors.splitlines()[-1] == f"{done} of 200 runs done in {out}; the same call goes on"
+    assert 3 <= len(CampaignTable.read(out)) == done < 200
+    assert list((out / "runs").glob(".*")) == []
+    assert list(out.glob("*.part")) == []
+
+
+def test_ctrl_c_before_the_first_run_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """As units are built, which takes long enough to be met."""
+    cache, out = tmp_path / "cache", tmp_path / "c"
+    monkeypatch.setenv("HANDOVER_CACHE", str(cache))
+    with sweeping(*CALL, "--out", out) as going:
+        wait_for(cache.exists, going)
+        going.send_signal(signal.SIGINT)
+        status, told, errors = ended(going)
+    assert (status, told, errors) == (130, "", "Aborted!\n")
+    assert not out.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows")
+def test_a_second_signal_ends_it_at_once(capfd: pytest.CaptureFixture[str]):
+    pid = os.fork()
+    if pid == 0:
+        with CampaignInterruption():
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(5)
+            except KeyboardInterrupt:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(5)
+        os._exit(0)
+    _, status = os.waitpid(pid, 0)
+    assert os.waitstatus_to_exitcode(status) == 130
+    assert capfd.readouterr().err == "Aborted!\n"
