@@ -40,7 +40,10 @@ def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
     """
     with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
         try:
-            with _told_nothing_of_semaphores(), _deaf_to_ctrl_c():  # so are the threads that are started here, and what these start
+            with (
+                _told_nothing_of_semaphores(),
+                _deaf_to_ctrl_c(),
+            ):  # so are the threads that are started here, and what these start
                 cluster = LocalCluster(
                     n_workers=workers or cores(),
                     threads_per_worker=1,

@@ -59,7 +59,12 @@ def test_the_signals_are_those_of_the_same_run_by_itself(
     CliRunner().invoke(main, ["run", scenario, *chosen, "--seed", "3", "--out", str(alone)])
     assert server.carry_out(order(runs, "run", *parameters, scenario=scenario), yes) == ""
     assert (runs / "run" / "signals.parquet").read_bytes() == (alone / "signals.parquet").read_bytes()
-    assert sorted(p.name for p in (runs / "run").iterdir()) == ["figures", "run.json", "signals.parquet", "summary.json"]
+    assert sorted(p.name for p in (runs / "run").iterdir()) == [
+        "figures",
+        "run.json",
+        "signals.parquet",
+        "summary.json",
+    ]
     assert list((runs / "run" / "figures").iterdir()) == []
 
 
@@ -84,7 +89,10 @@ def test_a_unit_that_does_not_come_back_ends_its_run_only(
 
 @pytest.mark.parametrize(
     ("reflex", "told"),
-    [("IsKilled", "the run was killed at t = 0.105 s, in "), pytest.param("FillsTheDisk", "cannot be written: File too large", marks=slow)],
+    [
+        ("IsKilled", "the run was killed at t = 0.105 s, in "),
+        pytest.param("FillsTheDisk", "cannot be written: File too large", marks=slow),
+    ],
 )
 def test_a_run_without_a_summary_leaves_nothing(
     reflex: str, told: str, server: ServerProcess, built: Path, tmp_path: Path
@@ -147,4 +155,3 @@ def test_a_run_that_is_not_wanted_any_more_is_ended(built: Path, tmp_path: Path)
         server.carry_out(bad_order(tmp_path / "runs", "Hangs", built), wanted)
     assert [lives(process) for process in (server.pid, *seen)] == [False, False]
     assert list((tmp_path / "runs").iterdir()) == []
-
