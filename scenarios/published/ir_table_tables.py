@@ -22,7 +22,7 @@ from scenarios.published.ir_table_runs import (
     IrTableRuns,
 )
 from scenarios.published.statistics import LEVEL, paired_test, success_interval, time_interval, two_proportions
-from scenarios.published.verdict_rules import told_interval, told_p, told_share
+from scenarios.published.telling import told_interval, told_p, told_share
 
 _TITLES = {
     Thing.CYLINDER: "cylinder",
