@@ -75,8 +75,8 @@ class _Work:
     def end(self) -> None:
         """Write the table, also of runs that have ended but whose answers have not come, as after an interruption."""
         known = {row.run.name for row in self.table.rows if row.status != "lost"}
-        self._keep([run for run in self.runs.values() if run.name not in known])
-        self.progress(self.tally)
+        if self._keep([run for run in self.runs.values() if run.name not in known]):
+            self.progress(self.tally)
         self.table.write()
 
     @property

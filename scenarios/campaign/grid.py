@@ -84,7 +84,7 @@ def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
             return [], [fault]
     else:
         values = text.split(";" if variable.shape else ",")
-    texts: list[str] = []
+    texts: dict[str, None] = {}
     faults: list[str] = []
     for value in values:
         parsed, fault = parse_value(variable, value)
@@ -95,8 +95,8 @@ def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
         elif (canonical := text_of(variable, parsed)) in texts:
             faults.append(f"{value} is given twice")
         else:
-            texts.append(canonical)
-    return texts, list(dict.fromkeys(faults))
+            texts[canonical] = None
+    return list(texts), list(dict.fromkeys(faults))
 
 
 def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:

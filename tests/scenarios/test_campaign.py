@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from scenarios.campaign.campaign import carry_out_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.run_order import RunOrder
+from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.tally import Tally
 
 PLAN = CampaignPlan(
@@ -82,6 +83,20 @@ def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path
     assert begun == [NAMES[1], NAMES[3]]
     assert told[0] == Tally(total=4, kept=2, ended=2)
     assert without_times(folder.table) == without_times(finished)
+
+
+def test_a_run_whose_answer_did_not_come_is_in_the_table_all_the_same(tmp_path: Path):
+    class Mute(OwnCrew):
+        def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+            for _ in super().carry_out(orders[:1]):
+                raise KeyboardInterrupt
+            yield from ()
+
+    folder, told = CampaignFolder(tmp_path / "c"), list[Tally]()
+    with pytest.raises(KeyboardInterrupt):
+        carry_out_campaign(PLAN, folder, Mute(), told.append)
+    assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0]]
+    assert told[-1] == Tally(total=4, ended=1)
 
 
 def test_a_lost_run_is_a_row_with_its_reason_and_tried_again(tmp_path: Path):

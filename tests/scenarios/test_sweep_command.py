@@ -78,6 +78,7 @@ def test_a_campaign_ends_with_a_row_for_each_point(monkeypatch: pytest.MonkeyPat
     assert "table: c/runs.parquet" in result.output
 
 
+@pytest.mark.slow
 def test_an_interrupted_call_goes_on(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(KeyboardInterrupt(), at=1))
     assert (result.exit_code, result.output) == (1, "1 of 2 runs done in c; the same call goes on\n")
@@ -86,6 +87,7 @@ def test_an_interrupted_call_goes_on(monkeypatch: pytest.MonkeyPatch):
     assert (result.exit_code, begun) == (0, [ALL[1]])
 
 
+@pytest.mark.slow
 def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyPatch):
     call = [*CALL[:-3], "--no-report"]
     result, _ = sweep(monkeypatch, *call, before=raising(KeyboardInterrupt(), at=1))
@@ -96,6 +98,7 @@ def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyP
     assert list(Path("campaigns").iterdir()) == [folder]
 
 
+@pytest.mark.slow
 def test_a_lost_run_is_told_by_the_status(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=lambda order: "its machine burnt" if order.name == ALL[0] else "")
     assert result.exit_code == 3
@@ -138,6 +141,7 @@ def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
     assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]
 
 
+@pytest.mark.slow
 def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(CrewLost("the scheduler is gone"), at=1))
     assert (result.exit_code, result.output) == (

@@ -1,0 +1,57 @@
+"""What the end of a campaign prints: at most a screen."""
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_summary import print_campaign
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.run_row import RunRow
+from scenarios.campaign.table_writer import table_of
+from scenarios.campaign.tally import Tally
+from scenarios.experiment import Metric
+
+
+def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> str:
+    table = CampaignTable(table_of(plan, rows))
+    print_campaign(plan, table, Tally(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
+    return capsys.readouterr().out
+
+
+def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest.CaptureFixture[str]):
+    plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": "0.03"}], repetitions=10)
+    rows = [
+        RunRow(
+            run=run,
+            status="done",
+            success=run.repetition < 9,
+            reason="closed",
+            metrics={"final_distance_thumb": Metric(0.001 * run.repetition, "m")},
+        )
+        for run in plan.runs()
+    ]
+    told = printed(plan, rows, capsys)
+    (row,) = [line.split() for line in told.splitlines() if " of 10 " in line and "runs" not in line]
+    # Clopper and Pearson of 9 of 10, as in tables: 0.555 to 0.997
+    assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
+
+
+def test_of_many_points_and_reasons_the_first_are_told(capsys: pytest.CaptureFixture[str]):
+    plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": f"0.{n}"} for n in range(100, 200)])
+    rows = [
+        RunRow(run=run, status="failed", success=None, reason=f"the hand broke {run.point % 10} times")
+        for run in plan.runs()
+    ]
+    told = printed(plan, rows, capsys)
+    assert "and 88 points more" in told
+    assert "10 failed: the hand broke 3 times" in told
+    assert "and 5 reasons more, in the table" in told
+    assert len(told.splitlines()) <= 24
+
+
+def test_a_campaign_that_varies_nothing_has_one_row(capsys: pytest.CaptureFixture[str]):
+    plan = CampaignPlan(scenario="ir_grasp", points=[{}])
+    rows = [RunRow(run=run, status="done", success=True, reason="closed") for run in plan.runs()]
+    assert "1 of 1" in printed(plan, rows, capsys)
