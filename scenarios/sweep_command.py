@@ -10,7 +10,6 @@ import click
 from cosim.master_options import MasterOptions
 from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_summary import print_campaign
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.grid import parse_grid, set_parameters
 from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
@@ -102,6 +101,9 @@ def sweep(
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
     call = call_campaign(plan, out, crew, (lambda _folder, _table: None) if no_report else _write_report)
+
+    from scenarios.campaign.campaign_summary import print_campaign  # its statistics take long to load
+
     print_campaign(call.plan, call.table, call.tally, call.folder)
     sys.exit(call.status)
 

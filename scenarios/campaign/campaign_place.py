@@ -20,7 +20,7 @@ def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
     """
     wanted = identity_of(plan, fmus)
     runs = plan.runs()
-    for path in sorted(PLACE.glob(f"*_{plan.scenario}*/"), reverse=True):
+    for path in sorted(PLACE.glob(f"*_{_stem(plan)}*/"), reverse=True):
         folder = CampaignFolder(path)
         try:
             there = folder.read()
@@ -31,8 +31,12 @@ def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
     return _new(plan)
 
 
+def _stem(plan: CampaignPlan) -> str:
+    return plan.experiment or plan.scenario
+
+
 def _new(plan: CampaignPlan) -> CampaignFolder:
-    name = time.strftime(f"%Y-%m-%d_%H%M%S_{plan.scenario}")
+    name = time.strftime(f"%Y-%m-%d_%H%M%S_{_stem(plan)}")
     path, number = PLACE / name, 1
     while path.exists():
         number += 1

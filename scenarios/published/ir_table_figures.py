@@ -7,8 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from scenarios.experiment import Figure
+from scenarios.ir_grasp.figures import FINGER_COLOURS
+from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.plotting import COLOURS, figure
-from scenarios.published.ir_table_runs import ARMS, FINGERS, OBJECTS, POSES, REFLEX, Count, IrTableRuns
+from scenarios.published.ir_table_runs import ARMS, OBJECTS, POSES, REFLEX, Count, IrTableRuns
 from scenarios.published.statistics import success_interval
 
 _OURS, _THEIRS = COLOURS[0], COLOURS[1]
@@ -61,18 +63,18 @@ def _distances(runs: IrTableRuns, folder: Path) -> Figure:
         for axes, (perturbed, pose) in zip(panels, POSES.items(), strict=True):
             for n, (name, things) in enumerate(OBJECTS.items()):
                 published = runs.published_distances(name, perturbed)
-                for i, finger in enumerate(FINGERS):
+                for i, finger in enumerate(FINGER_NAMES):
                     x = n + 0.27 * (i - 1)
                     ours = 1000 * runs.metric(f"final_distance_{finger}", REFLEX, perturbed, things)
                     across = x + _SPREAD * (np.linspace(0.0, 1.0, len(ours)) - 0.5)
-                    axes.plot(across, ours, ".", ms=3, color=_of(i), alpha=0.5)
-                    axes.plot([x], [1000 * published[finger]], "s", ms=7, mfc="none", mec=_of(i), mew=1.6)
+                    axes.plot(across, ours, ".", ms=3, color=FINGER_COLOURS[i], alpha=0.5)
+                    axes.plot([x], [1000 * published[finger]], "s", ms=7, mfc="none", mec=FINGER_COLOURS[i], mew=1.6)
             axes.set(title=f"{pose} poses", ylim=(0, 68), xlim=(-0.5, len(OBJECTS) - 0.5))
             axes.set_xticks(range(len(OBJECTS)), [name.replace("_", " ") for name in OBJECTS])
             axes.grid(visible=False, axis="x")
         panels[0].set(ylabel="distance at the last step (mm)")
-        for i, finger in enumerate(FINGERS):
-            panels[0].plot([], [], ".", ms=8, color=_of(i), label=finger)
+        for i, finger in enumerate(FINGER_NAMES):
+            panels[0].plot([], [], ".", ms=8, color=FINGER_COLOURS[i], label=finger)
         panels[0].plot([], [], "s", ms=7, mfc="none", mec="#4d5866", mew=1.6, label="published")
         _legend(panels[0])
     caption = (
@@ -88,8 +90,3 @@ def _legend(axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
     canvas: Any = axes.get_figure(root=True)
     canvas.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-
-
-def _of(finger: int) -> str:
-    """Return a finger's colour, as in the figures of a run."""
-    return (COLOURS[1], COLOURS[2], COLOURS[0])[finger]

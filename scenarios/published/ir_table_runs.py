@@ -17,8 +17,6 @@ from scenarios.paper import paper_values
 POSES: Mapping[bool, str] = {False: "nominal", True: "perturbed"}
 """By whether the object is moved after vision saw it."""
 
-FINGERS: tuple[str, ...] = ("thumb", "index", "ring")
-
 OBJECTS: Mapping[str, tuple[Thing, ...]] = {
     "cylinder": (Thing.CYLINDER,),
     "baby_cup": (Thing.BABY_CUP_A, Thing.BABY_CUP_B),

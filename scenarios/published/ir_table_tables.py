@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from controllers.ir_reflex import Stop
 from plants.grasp_objects import Thing
+from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.ir_table_runs import (
     ARMS,
     BLIND,
-    FINGERS,
     FORWARD_35,
     FORWARD_55,
     OBJECTS,
@@ -22,7 +22,7 @@ from scenarios.published.ir_table_runs import (
     IrTableRuns,
 )
 from scenarios.published.statistics import LEVEL, paired_test, success_interval, time_interval, two_proportions
-from scenarios.published.verdict_rules import told_interval, told_p, told_share
+from scenarios.published.telling import told_interval, told_p, told_share
 
 _TITLES = {
     Thing.CYLINDER: "cylinder",
@@ -127,11 +127,11 @@ def _closing(runs: IrTableRuns) -> ComparisonTable:
 
 
 def _distances(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
-    header = ["object", *(f"{finger}, {whose}" for finger in FINGERS for whose in ("published", "ours"))]
+    header = ["object", *(f"{finger}, {whose}" for finger in FINGER_NAMES for whose in ("published", "ours"))]
     rows: list[list[str]] = []
     for name, things in OBJECTS.items():
         row, published = [name.replace("_", " ")], runs.published_distances(name, perturbed)
-        for finger in FINGERS:
+        for finger in FINGER_NAMES:
             ours = 1000 * runs.metric(f"final_distance_{finger}", REFLEX, perturbed, things)
             row += [f"{1000 * published[finger]:.0f}", _median(ours, 1)]
         rows.append(row)

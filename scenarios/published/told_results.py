@@ -45,9 +45,9 @@ def _print_table(console: Console, compared: ComparisonTable) -> None:
     for row in compared.rows:
         rows.add_row(*map(Text, row))
     console.print(f"\n{compared.title}", style="bold", markup=False)
-    console.print(Padding(rows, (0, 0, 0, 2)))
+    console.print(Padding(rows, (0, 0, 0, 2), expand=False))
     if compared.note:
-        console.print(Padding(Text(compared.note, style="dim"), (0, 0, 0, 2)))
+        console.print(Padding(Text(compared.note, style="dim"), (0, 0, 0, 2), expand=False))
 
 
 def _print_claim(console: Console, claim: Claim) -> None:
@@ -60,5 +60,5 @@ def _print_claim(console: Console, claim: Claim) -> None:
     where = f" ({claim.where})" if claim.where else ""
     console.print(Text.assemble((claim.verdict.value, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
     if figures:
-        console.print(Padding(Text("; ".join(figures)), (0, 0, 0, 4)))
-    console.print(Padding(Text(claim.reason, style="dim"), (0, 0, 0, 4)))
+        console.print(Padding(Text("; ".join(figures)), (0, 0, 0, 4), expand=False))
+    console.print(Padding(Text(claim.reason, style="dim"), (0, 0, 0, 4), expand=False))

@@ -16,6 +16,7 @@ from scenarios.published.statistics import (
     success_interval,
     two_proportions,
 )
+from scenarios.published.telling import told_interval, told_p, told_rate, told_share
 
 FEW = 0.10
 """Share of runs below which something counts as not happening."""
@@ -152,26 +153,6 @@ def without_verdict(claim: Claim, reason: str) -> Claim:
     """Return a claim that a rule has judged, without its verdict, for a reason that stands before the rule's."""
     told = f"{reason} For what it is worth: {claim.reason}"
     return replace(claim, verdict=Verdict.NOT_COMPARABLE, reason=told)
-
-
-def told_rate(successes: int, n: int) -> str:
-    """Return such as `11/15 (73 %)`."""
-    return f"{successes}/{n} ({told_share(successes / n)})"
-
-
-def told_share(share: float) -> str:
-    """Return such as `73 %`."""
-    return f"{100 * share:.0f} %"
-
-
-def told_interval(low: float, high: float) -> str:
-    """Return the interval of a rate such as `45 to 92 %`."""
-    return f"{100 * low:.0f} to {told_share(high)}"
-
-
-def told_p(p: float) -> str:
-    """Return a p-value, such as `0.031` or `2e-12`."""
-    return f"{p:.2g}"
 
 
 def _of_rate(

@@ -144,7 +144,7 @@ def test_as_printed_the_refinement_runs_to_its_end():
 
 
 @pytest.mark.slow
-def test_a_blind_hand_that_closes_55_mm_nearer_does_as_well_as_the_reflex():
+def test_a_blind_hand_that_closes_55_mm_nearer_does_nearly_as_well_as_the_reflex():
     """The control that the class tells of: with a standoff so large, coming nearer is what counts."""
     seeds = range(1000, 1010)
     near = [grasp(seed, strategy=Strategy.FORWARD, forward=0.055).success for seed in seeds]

@@ -1,0 +1,80 @@
+"""The command `handover paper`."""
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from scenarios.command import main
+from scenarios.published.catalog import EXPERIMENTS
+
+
+def paper(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["paper", *map(str, arguments)])
+
+
+def test_without_a_name_it_lists_the_experiments():
+    shown = paper().output
+    for name, experiment in EXPERIMENTS.items():
+        assert name in shown
+        assert experiment.title in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["ir-tabel"], "no experiment 'ir-tabel': did you mean ir-table?"),
+        (["ir-table", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "one of both is right"),
+        (["ir-table", "--workers", "0"], "0 is not in the range x>=1"),
+        (["ir-table", "--seed", "-1"], "-1 is not in the range x>=0"),
+    ],
+)
+def test_a_call_that_cannot_be_carried_out_is_refused_and_leaves_nothing(
+    arguments: list[str], told: str, tmp_path: Path
+):
+    result = paper(*arguments, "--out", tmp_path / "c")
+    assert result.exit_code == 2
+    assert told in result.output
+    assert not (tmp_path / "c").exists()
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path: Path):
+    (tmp_path / "letter.txt").write_text("Dear reader")
+    result = paper("ir-table", "--quick", "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "it is not empty and has no campaign.json" in result.output
+    assert [p.name for p in tmp_path.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.slow
+def test_a_quick_one_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(tmp_path: Path):
+    folder = tmp_path / "c"
+    first = paper("ir-table", "--quick", "--out", folder)
+    assert first.exit_code == 0, first.output
+    claims = json.loads((folder / "claims.json").read_text(encoding="utf-8"))
+    assert {claim["verdict"] for claim in claims} <= {"reproduced", "not reproduced", "not comparable"}
+    for claim in claims:
+        assert claim["claim"] in " ".join(first.output.split())
+    assert {p.name for p in folder.iterdir()} >= {
+        "campaign.json",
+        "claims.json",
+        "figures",
+        "report.html",
+        "runs.parquet",
+    }
+    made = {p: p.stat().st_mtime_ns for p in (folder / "runs").glob("*/summary.json")}
+    assert len(made) == 120
+    second = paper("ir-table", "--quick", "--out", folder, "--no-report")
+    assert second.exit_code == 0, second.output
+    assert {p: p.stat().st_mtime_ns for p in made} == made
+    assert json.loads((folder / "claims.json").read_text(encoding="utf-8")) == claims
+
+
+@pytest.mark.paper
+def test_table_1_of_luberto_at_full_size(tmp_path: Path):
+    result = paper("ir-table", "--out", tmp_path / "c")
+    assert result.exit_code == 0, result.output
+    told = {c["claim"]: c["verdict"] for c in json.loads((tmp_path / "c/claims.json").read_text(encoding="utf-8"))}
+    for pose in ("nominal", "perturbed"):
+        assert told[f"In {pose} poses the IR-guided hand succeeds more often than the blind one."] == "reproduced"
