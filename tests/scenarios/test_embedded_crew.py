@@ -104,9 +104,10 @@ def test_a_command_that_is_ended_leaves_no_process_and_says_nothing(
             until(lambda: going(runs))
             below = family(process.pid)
             assert len(below) >= 6  # two workers, two servers, two runs
-            os.killpg(
-                process.pid, number
-            ) if number == signal.SIGINT else process.kill()  # as Ctrl-C in a terminal does
+            if number == signal.SIGINT:
+                os.killpg(process.pid, number)  # as Ctrl-C in a terminal does
+            else:
+                process.kill()
             assert process.communicate(timeout=60) == (b"", b"")
             assert process.returncode == status
         finally:
