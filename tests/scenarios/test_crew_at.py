@@ -52,10 +52,12 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp
     program = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders"), address]
     with worker(tmp_path, address, threads=2) as process:
         with subprocess.Popen(program) as command:
-            until(lambda: len(list(runs.glob(".*/signals.tail"))) == 2)
-            below = servers(process)
-            assert len(below) == 2
-            command.kill()
+            try:
+                until(lambda: len(list(runs.glob(".*/signals.tail"))) == 2)
+                below = servers(process)
+                assert len(below) == 2
+            finally:
+                command.kill()
         until(lambda: not any(map(lives, below)))
         until(lambda: list(runs.iterdir()) == [])
 

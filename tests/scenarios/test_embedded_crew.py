@@ -99,12 +99,18 @@ def test_a_command_that_is_ended_leaves_no_process_and_says_nothing(
     hanging = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
     (tmp_path / "orders").write_bytes(pickle.dumps(hanging))
     command = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
-    until(lambda: going(runs))
-    below = family(process.pid)
-    assert len(below) >= 6  # two workers, two servers, two runs
-    os.killpg(process.pid, number) if number == signal.SIGINT else process.kill()  # as Ctrl-C in a terminal does
-    assert process.communicate(timeout=60) == (b"", b"")
-    assert process.returncode == status
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as process:
+        try:
+            until(lambda: going(runs))
+            below = family(process.pid)
+            assert len(below) >= 6  # two workers, two servers, two runs
+            if number == signal.SIGINT:
+                os.killpg(process.pid, number)  # as Ctrl-C in a terminal does
+            else:
+                process.kill()
+            assert process.communicate(timeout=60) == (b"", b"")
+            assert process.returncode == status
+        finally:
+            process.kill()
     until(lambda: not any(map(lives, below)))
     until(lambda: list(runs.iterdir()) == [])
