@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # A test file stays in one process: what its tests share is made once.
 PARALLEL := --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-slow lint bench install clean
+.PHONY: demo test test-slow paper lint bench install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -17,6 +17,9 @@ test: lint $(VENV)/.installed-test
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
+
+paper: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -m paper
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .
