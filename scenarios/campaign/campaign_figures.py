@@ -10,9 +10,9 @@ from cosim.ports import Floats
 from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.point_layout import PointLayout, layout_of
 from scenarios.campaign.shown_unit import ShownUnit, shown_unit
+from scenarios.campaign.statistics import time_interval
 from scenarios.experiment import Figure
 from scenarios.plotting import COLOURS, figure
-from scenarios.published.statistics import time_interval
 
 _MOST_METRICS = 4
 _MOST_INTERVALS = 60

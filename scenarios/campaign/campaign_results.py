@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from cosim.variable import Kind, Variable
 from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.statistics import Interval, success_interval
 from scenarios.catalog import SCENARIOS
-from scenarios.published.statistics import Interval, success_interval
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,10 +13,10 @@ from scenarios.campaign.campaign_progress import told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
 from scenarios.campaign.shown_unit import shown_unit
+from scenarios.campaign.statistics import success_interval
 from scenarios.campaign.tally import Tally
 from scenarios.chosen import scenario_named
 from scenarios.console import open_console
-from scenarios.published.statistics import success_interval
 
 _MOST_POINTS = 12
 _MOST_REASONS = 5

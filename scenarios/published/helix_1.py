@@ -1,11 +1,10 @@
 """Table 1 of [Vervloet2025]: how long the Helix takes to a ball by step size, and whether it gets it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
 from scenarios.experiment import Figure
 from scenarios.helix_handover.parameters import Place, Tuning
@@ -17,9 +16,6 @@ from scenarios.published.helix_1_claims import own_claims, thesis_claims
 from scenarios.published.helix_1_figures import draw_errors, draw_times
 from scenarios.published.helix_1_tables import by_place, fig_9, steps, table_1
 from scenarios.published.published_experiment import PublishedExperiment
-
-if TYPE_CHECKING:
-    from scenarios.campaign.campaign_table import CampaignTable
 
 _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s: as long as the scenario allows; the longest published is 214.9."""

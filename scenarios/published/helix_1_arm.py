@@ -1,21 +1,15 @@
 """The runs of `helix-1` with one of the controller's settings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cosim.ports import Floats
+from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.helix_handover.parameters import Tuning
 from scenarios.paper import paper_values
-
-if TYPE_CHECKING:
-    from scenarios.campaign.campaign_table import CampaignTable
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,7 +27,7 @@ class Helix1Arm:
     broken: int
 
     @classmethod
-    def of(cls, table: CampaignTable, tuning: Tuning) -> Helix1Arm:
+    def of(cls, table: CampaignTable, tuning: Tuning) -> "Helix1Arm":
         """Pick the rows of a tuning."""
         mine = [row for row in table.rows if row["tuning"] == tuning.name.lower()]
         done = [row for row in mine if row["status"] == "done"]

@@ -10,13 +10,12 @@ from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from controllers.visual_servo import Phase
+from cosim.ports import Floats
 from scenarios.experiment import Figure
 from scenarios.plotting import COLOURS, figure
 from scenarios.published.helix_1_arm import Helix1Arm
 from scenarios.published.helix_1_telling import published
 from scenarios.record import Record
-
-Floats = NDArray[np.float64]
 
 _TICKS = (10, 20, 50, 100, 200, 500)
 _PUBLISHED = COLOURS[5]

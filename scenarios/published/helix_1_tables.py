@@ -3,15 +3,13 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cosim.ports import Floats
+from scenarios.campaign.statistics import Statistic, time_interval
 from scenarios.helix_handover.parameters import Place, Tuning
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.helix_1_arm import Helix1Arm
 from scenarios.published.helix_1_telling import published
-from scenarios.published.statistics import Statistic, time_interval
-
-Floats = NDArray[np.float64]
 
 _ON_EQUAL_BOUNDS = (
     " The thesis's ε_pose,bound and ε_control are both 5 mm. One iteration of the Jacobian loop leaves about "

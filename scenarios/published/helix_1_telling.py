@@ -6,9 +6,6 @@ from scenarios.paper import paper_values
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.helix_1_arm import Helix1Arm
 
-FEWEST = 3
-"""Runs below which no interval is told."""
-
 
 def published() -> dict[str, Any]:
     """Return the published values by name."""

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
+from scenarios.campaign.statistics import FEWEST, LEVEL, time_interval
 from scenarios.paper import paper_values
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import FEWEST, missing, published, too_few
+from scenarios.published.helix_1_telling import missing, published, too_few
 from scenarios.published.ratio_interval import ratio_interval
-from scenarios.published.statistics import LEVEL, time_interval
-from scenarios.published.verdict_rules import told_p
+from scenarios.published.telling import told_p
 
 
 def time_claims(arm: Helix1Arm) -> list[Claim]:
@@ -66,8 +66,8 @@ def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
         measured=f"{np.median(x) / np.median(y):.2f} times (medians)",
         interval=interval,
         verdict=Verdict.NOT_COMPARABLE if halves and stays else verdict,
-        reason="Reproduced if the bootstrap's interval of the ratio of medians holds 2 and not 1; not comparable if it "
-        f"holds both, as the runs are then too few to tell.{missing(arm, small, large)}",
+        reason=f"Reproduced if the bootstrap's interval of the ratio of medians holds {half:g} and not 1; not "
+        f"comparable if it holds both, as the runs are then too few to tell.{missing(arm, small, large)}",
     )
 
 

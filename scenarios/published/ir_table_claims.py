@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from scenarios.campaign.statistics import two_proportions
 from scenarios.published.claim import Claim
 from scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_35, FORWARD_55, POSES, REFLEX, Arm, IrTableRuns
-from scenarios.published.statistics import two_proportions
 from scenarios.published.telling import told_p, told_rate
 from scenarios.published.verdict_rules import (
     majority_claim,

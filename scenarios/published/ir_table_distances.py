@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from scenarios.campaign.statistics import success_interval, time_interval
 from scenarios.published.claim import Claim, Verdict
 from scenarios.published.ir_table_runs import OBJECTS, POSES, REFLEX, IrTableRuns
-from scenarios.published.statistics import success_interval, time_interval
 from scenarios.published.telling import told_rate
 from scenarios.published.verdict_rules import nothing_measured
 

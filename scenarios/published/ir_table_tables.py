@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from controllers.ir_reflex import Stop
 from plants.grasp_objects import Thing
+from scenarios.campaign.statistics import LEVEL, paired_test, success_interval, time_interval, two_proportions
 from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.ir_table_runs import (
@@ -21,7 +22,6 @@ from scenarios.published.ir_table_runs import (
     Count,
     IrTableRuns,
 )
-from scenarios.published.statistics import LEVEL, paired_test, success_interval, time_interval, two_proportions
 from scenarios.published.telling import told_interval, told_p, told_share
 
 _TITLES = {

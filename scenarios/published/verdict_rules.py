@@ -7,8 +7,7 @@ claim is not comparable.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scenarios.published.claim import Claim, Verdict
-from scenarios.published.statistics import (
+from scenarios.campaign.statistics import (
     LEVEL,
     Interval,
     compatible_counts,
@@ -16,6 +15,7 @@ from scenarios.published.statistics import (
     success_interval,
     two_proportions,
 )
+from scenarios.published.claim import Claim, Verdict
 from scenarios.published.telling import told_interval, told_p, told_rate, told_share
 
 FEW = 0.10

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults, PointResults
-from scenarios.published.statistics import paired_test
+from scenarios.campaign.statistics import paired_test
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenarios.published.statistics import (
+from scenarios.campaign.statistics import (
     compatible_counts,
     paired_test,
     success_interval,

@@ -12,10 +12,11 @@ from scipy.stats import binomtest, bootstrap, fisher_exact
 LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
 
-_FEWEST = 3
+FEWEST = 3
 """Values below which a bootstrap says nothing: of two there are but three different resamples."""
 
-_RESAMPLES = 9999
+RESAMPLES = 9999
+"""Of a bootstrap."""
 
 _METHODS: tuple[tuple[Literal["BCa", "percentile"], str], ...] = (
     ("BCa", "BCa bootstrap"),
@@ -77,7 +78,7 @@ def time_interval(
     """
     x = np.asarray(values, dtype=np.float64)
     x = x[~np.isnan(x)]
-    if len(x) < _FEWEST:
+    if len(x) < FEWEST:
         return None
     for method, told in _METHODS:
         with warnings.catch_warnings():
@@ -85,7 +86,7 @@ def time_interval(
             ci = bootstrap(
                 (x,),
                 statistic,
-                n_resamples=_RESAMPLES,
+                n_resamples=RESAMPLES,
                 confidence_level=confidence,
                 method=method,
                 rng=np.random.default_rng(seed),
