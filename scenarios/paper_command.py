@@ -87,7 +87,7 @@ def _finish(experiment: PublishedExperiment, folder: CampaignFolder, table: Camp
 
     write_results(experiment, table, folder)
     if report:
-        write_campaign_page(folder.path)
+        write_campaign_page(folder)
 
 
 def _list(experiments: Iterable[type[PublishedExperiment]]) -> None:

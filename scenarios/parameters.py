@@ -28,23 +28,41 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
         BadParameter: with every fault of the given texts.
     """
     known = {v.name: v for v in experiment.parameters()}
+    texts, faults = texts_by_name(experiment, given)
     values: dict[str, Any] = {}
+    for name, text in texts.items():
+        values[name], fault = parse_value(known[name], text)
+        if fault:
+            faults.append(f"{name}: {fault}")
+    if faults:
+        raise BadParameter(faults)
+    return experiment.parameters_type(**values)
+
+
+def texts_by_name(
+    experiment: type[Experiment[Any]], given: Sequence[str], form: str = "name=value"
+) -> tuple[dict[str, str], list[str]]:
+    """Return what stands behind `name=` by the parameters' names, and what is wrong with these.
+
+    Args:
+        experiment: whose parameters they are.
+        given: texts.
+        form: of each, as a fault tells it.
+    """
+    known = [v.name for v in experiment.parameters()]
+    texts: dict[str, str] = {}
     faults: list[str] = []
     for text in given:
         name, equals, value = text.partition("=")
         if not equals:
-            faults.append(f"{text!r} is not of the form name=value")
+            faults.append(f"{text!r} is not of the form {form}")
         elif name not in known:
             faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
-        elif name in values:
+        elif name in texts:
             faults.append(f"{name} is given twice")
         else:
-            values[name], fault = parse_value(known[name], value)
-            if fault:
-                faults.append(f"{name}: {fault}")
-    if faults:
-        raise BadParameter(faults)
-    return experiment.parameters_type(**values)
+            texts[name] = value
+    return texts, faults
 
 
 def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) -> Any:

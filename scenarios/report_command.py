@@ -37,8 +37,9 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
         check_place(page.parent)
         if figures:
             check_place(folder)
-        if CampaignFolder(folder).is_there:
-            write_campaign_page(folder, page)
+        campaign = CampaignFolder(folder)
+        if campaign.is_there:
+            write_campaign_page(campaign, page)
         else:
             _write_of_run(RunFolder.left_at(folder), page, figures)
     click.echo(f"report: {page}")

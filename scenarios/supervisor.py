@@ -125,7 +125,7 @@ def _end_as(end: ChildEnd, wall: float) -> NoReturn:
         os.kill(os.getpid(), end.signal)
     if heartbeat.status is not None:
         sys.exit(heartbeat.status if end.signal is not None else end.status)
-    from scenarios.tell_death import tell_death
+    from scenarios.tell_death import tell_death  # what it loads is loaded by no other run
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(tell_death(heartbeat, end, wall))

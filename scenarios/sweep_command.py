@@ -111,4 +111,4 @@ def sweep(
 def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
     from scenarios.reporting.campaign_page import write_campaign_page  # what draws takes long to load
 
-    write_campaign_page(folder.path)
+    write_campaign_page(folder)

@@ -17,13 +17,11 @@ from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.run_row import RunRow, row_of
 from scenarios.campaign.table_writer import TableWriter
-from scenarios.campaign.tally import CampaignProgress, Tally
+from scenarios.campaign.tally import OnTally, Tally
 from scenarios.run_folder import told_if_not_written
 
 
-def carry_out_campaign(
-    plan: CampaignPlan, folder: CampaignFolder, crew: Crew, progress: CampaignProgress
-) -> CampaignTable:
+def carry_out_campaign(plan: CampaignPlan, folder: CampaignFolder, crew: Crew, progress: OnTally) -> CampaignTable:
     """Carry out the runs of a campaign that are not done yet, and return the table of all.
 
     Whatever ends it, what was done stays, and the same call goes on: a run is done when it has left its folder,
@@ -51,7 +49,7 @@ def carry_out_campaign(
 class _Work:
     """A campaign under way."""
 
-    def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: CampaignProgress) -> None:
+    def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: OnTally) -> None:
         self.plan, self.folder, self.progress = plan, folder, progress
         self.table = TableWriter(plan, folder.table)
         self.runs = {run.name: run for run in plan.runs()}

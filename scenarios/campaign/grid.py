@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.exceptions import nearest
 from cosim.variable import Kind, Variable
 from scenarios.campaign.plan import MOST_RUNS
 from scenarios.experiment import Experiment
-from scenarios.parameters import BadParameter, parse_value, text_of
+from scenarios.parameters import BadParameter, parse_value, text_of, texts_by_name
 
 
 def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[dict[str, str]]:
@@ -24,19 +23,11 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
         BadParameter: with every fault of the given texts.
     """
     known = {v.name: v for v in experiment.parameters()}
+    texts, faults = texts_by_name(experiment, given, "name=v1,v2,... or name=START:STOP:N")
     axes: dict[str, list[str]] = {}
-    faults: list[str] = []
-    for text in given:
-        name, equals, values = text.partition("=")
-        if not equals:
-            faults.append(f"{text!r} is not of the form name=v1,v2,... or name=START:STOP:N")
-        elif name not in known:
-            faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
-        elif name in axes:
-            faults.append(f"{name} is given twice")
-        else:
-            axes[name], found = _axis(known[name], values)
-            faults += [f"{name}: {fault}" for fault in found]
+    for name, values in texts.items():
+        axes[name], found = _axis(known[name], values)
+        faults += [f"{name}: {fault}" for fault in found]
     points = math.prod(map(len, axes.values()))
     if points > MOST_RUNS:
         faults.append(f"the grid has {points:,} points; at most {MOST_RUNS:,} runs can be planned")
@@ -53,21 +44,9 @@ def set_parameters(
     Raises:
         BadParameter: one is unknown, given twice, or varied.
     """
-    known = {v.name: v for v in experiment.parameters()}
-    fixed: dict[str, str] = {}
-    faults: list[str] = []
-    for text in given:
-        name, equals, value = text.partition("=")
-        if not equals:
-            faults.append(f"{text!r} is not of the form name=value")
-        elif name not in known:
-            faults.append(f"{experiment.name} has no parameter {name!r}; {nearest(name, known)}")
-        elif name in fixed:
-            faults.append(f"{name} is given twice")
-        elif any(name in point for point in varied):
-            faults.append(f"{name} is varied and set by -p; one of both is right")
-        else:
-            fixed[name] = value
+    fixed, faults = texts_by_name(experiment, given)
+    both = [name for name in fixed if any(name in point for point in varied)]
+    faults += [f"{name} is varied and set by -p; one of both is right" for name in both]
     if faults:
         raise BadParameter(faults)
     return fixed

@@ -28,5 +28,5 @@ class Tally:
         return self.total - self.ended - self.lost
 
 
-CampaignProgress = Callable[[Tally], None]
+OnTally = Callable[[Tally], None]
 """Told how far a campaign has come, at its start and after each run."""

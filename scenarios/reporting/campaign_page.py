@@ -22,7 +22,7 @@ from scenarios.reporting.success_section import success_section
 from scenarios.run_folder import told_if_not_written
 
 
-def write_campaign_page(folder: CampaignFolder | Path, file: Path | None = None) -> None:
+def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:
     """Write a campaign's, or a paper's, page and its `figures/`; the campaign need not be complete.
 
     Args:
@@ -33,26 +33,25 @@ def write_campaign_page(folder: CampaignFolder | Path, file: Path | None = None)
         BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
         RecordNotWritten: there is no room.
     """
-    there = CampaignFolder(folder) if isinstance(folder, Path) else folder
-    results, claims = read_results(there), read_claims(there)
+    results, claims = read_results(folder), read_claims(folder)
     named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
     experiment = None if named is None else named()
     sections: list[Section | None] = [claims_section(claims)]
-    with told_if_not_written(there.figures):
-        draw_campaign(results, there.figures)
+    with told_if_not_written(folder.figures):
+        draw_campaign(results, folder.figures)
         if experiment is not None and results.points:
             sections.append(comparison_section(experiment.tables(results.table)))
-            there.figures.mkdir(exist_ok=True)
-            sections.append(figures_section(experiment.draw(results.table, there.figures), there.figures))
+            folder.figures.mkdir(exist_ok=True)
+            sections.append(figures_section(experiment.draw(results.table, folder.figures), folder.figures))
     if results.points:
         layout = layout_of(results)
         sections += [success_section(results, layout), spread_section(results, layout)]
     sections += [
         points_section(results),
         pairs_section(results),
-        failures_section(results, there.path),
-        runs_section(results, there.path),
+        failures_section(results, folder.path),
+        runs_section(results, folder.path),
         setting_section(results),
     ]
     title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
-    write_page(file or there.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
+    write_page(file or folder.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])

@@ -10,14 +10,13 @@ from cosim.linear import Linear
 from cosim.ports import Floats
 from scenarios.reporting.graph_layout import bent, places
 from scenarios.reporting.page import template
-from scenarios.reporting.plot_html import plot_html
+from scenarios.reporting.plot_html import COLOURS, plot_html
 from scenarios.reporting.section import Section
 
 _MOST_UNITS = 40
 _MOST_ROWS = 1000
 _MOST_TOLD = 14
 """Signals of a line that are told where one points at it."""
-_COLOURS = 8  # of page.css
 _FEW = 8
 """Units beyond which a box has room for the name alone."""
 
@@ -81,7 +80,7 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
     names = [u["name"] for u in units]
     between = {pair: cs for pair, cs in bundles.items() if pair[0] != pair[1]}
     at = places(names, between)
-    colour = {name: f"var(--c{k % _COLOURS})" for k, name in enumerate(names)}
+    colour = {name: f"var(--c{k % COLOURS})" for k, name in enumerate(names)}
     lines = [bent(at[a], at[b]) for a, b in between]
     drawn = [_line(points, colour[a]) for points, (a, _) in zip(lines, between, strict=True)]
     heads = [

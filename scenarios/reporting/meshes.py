@@ -1,4 +1,4 @@
-"""Triangle meshes of simple bodies, in their own frames: boxes, balls, prisms, rods with rounded ends."""
+"""Triangle meshes of simple bodies, in their own frames: hulls, balls, prisms, rods with rounded ends."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -30,11 +30,6 @@ def hull(points: Floats) -> Mesh:
     triangles[inwards] = triangles[inwards][:, ::-1]
     kept = np.unique(triangles)
     return Mesh(points[kept], np.searchsorted(kept, triangles))
-
-
-def box(sides: Sequence[float]) -> Mesh:
-    """Return a box about the origin. Each side has corners of its own, so that its edges look sharp."""
-    return faceted(hull(np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * sides))
 
 
 def prism(outline: Floats, low: float, high: float) -> Mesh:

@@ -7,10 +7,13 @@ import plotly.graph_objects as go
 import plotly.io.json
 from markupsafe import Markup, escape
 
+COLOURS = 8
+"""Colours of curves in page.css, `var(--c0)` and on."""
+
 _packed = cast(Callable[[Any], str], plotly.io.json.to_json_plotly)
 
 
-def plot_html(figure: Any, height: int = 320, label: str = "") -> Markup:
+def plot_html(figure: go.Figure, height: int = 320, label: str = "") -> Markup:
     """Return the HTML of a figure, which has neither colours of its own for text and grid nor a width.
 
     A colour may be one of the page's, such as "var(--bad)"; figures whose `layout.meta` is {"time": True} show the
@@ -21,7 +24,6 @@ def plot_html(figure: Any, height: int = 320, label: str = "") -> Markup:
         height: in pixels; the legend comes below.
         label: what one hears who cannot see it.
     """
-    assert isinstance(figure, go.Figure)
     told = cast(dict[str, Any], figure.to_dict())
     told["layout"].pop("template", None)  # of paper-white figures
     return Markup(

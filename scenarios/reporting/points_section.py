@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
+from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults, PointResults
 from scenarios.campaign.shown_unit import ShownUnit, shown_unit
-from scenarios.published.statistics import time_interval
+from scenarios.campaign.statistics import time_interval
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
 
@@ -43,7 +44,7 @@ def points_section(results: CampaignResults) -> Section | None:
     told = "Of the runs done. Intervals of success rates: Clopper and Pearson"
     told += "; of medians: bootstrap, from three values on." if with_intervals and metrics else "."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
-    note = type(table)("<p class='soft'>{}</p>").format(told)
+    note = Markup("<p class='soft'>{}</p>").format(told)
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
 
 

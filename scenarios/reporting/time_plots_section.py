@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from cosim.ports import Floats
 from scenarios.record import Record
-from scenarios.reporting.plot_html import plot_html
+from scenarios.reporting.plot_html import COLOURS, plot_html
 from scenarios.reporting.section import Section
 from scenarios.reporting.thinned import changes_of, rows_of_curve, rows_of_steps
 from scenarios.reporting.time_plot import Curve, TimePlot
@@ -19,7 +19,6 @@ TIME_AXIS = "time (s)"
 _MOST = 900
 """Points of a curve: more than a plot has pixels for."""
 _MOST_PHASES = 200
-_COLOURS = 8  # of page.css
 
 
 def time_plots_section(plots: Sequence[TimePlot], record: Record) -> Section | None:
@@ -64,7 +63,7 @@ def _with_unit(plot: TimePlot) -> str:
 
 def _colours(curves: Sequence[Curve]) -> list[str]:
     groups = list(dict.fromkeys(c.group or c.label for c in curves))
-    return [f"var(--c{groups.index(c.group or c.label) % _COLOURS})" for c in curves]
+    return [f"var(--c{groups.index(c.group or c.label) % COLOURS})" for c in curves]
 
 
 def _trace(curve: Curve, time: Floats, unit: str, colour: str) -> Any:

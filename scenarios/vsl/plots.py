@@ -76,19 +76,18 @@ def _position(record: Record, axis: int) -> TimePlot:
 
 def _joints(record: Record) -> TimePlot:
     cmd, meas = (np.degrees(record[signal]) for signal in ("kinematics.q_cmd", "arm.q_meas"))
-    curves: list[Curve] = []
-    for k in range(3):
-        joint = f"J{k + 1}"
-        curves.append(Curve(label=f"{joint}, measured", values=meas[:, k], group=joint))
-        curves.append(Curve(label=f"{joint}, commanded", values=cmd[:, k], held=True, faint=True, group=joint))
+    curves = [c for k in range(3) for c in _both(f"J{k + 1}", cmd[:, k], meas[:, k])]
     return TimePlot(title="Joints", quantity="angle", unit="°", curves=curves)
 
 
 def _pressures(record: Record) -> TimePlot:
     cmd, meas = (record[signal] / _BAR for signal in ("planner.p_cmd", "arm.p_meas"))
-    curves: list[Curve] = []
-    for k in range(2):
-        link = f"link {k + 2}"
-        curves.append(Curve(label=f"{link}, measured", values=meas[:, k], group=link))
-        curves.append(Curve(label=f"{link}, commanded", values=cmd[:, k], held=True, faint=True, group=link))
+    curves = [c for k in range(2) for c in _both(f"link {k + 2}", cmd[:, k], meas[:, k])]
     return TimePlot(title="Pressures inside the links", quantity="pressure", unit="bar", curves=curves)
+
+
+def _both(name: str, commanded: Floats, measured: Floats) -> list[Curve]:
+    return [
+        Curve(label=f"{name}, measured", values=measured, group=name),
+        Curve(label=f"{name}, commanded", values=commanded, held=True, faint=True, group=name),
+    ]

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from scenarios.reporting.meshes import Mesh, ball, box, merged, prism, rod
+from scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 ROUND_VOLUME = np.pi * 0.1**2 * 1.0 + 4.0 / 3.0 * np.pi * 0.1**3
@@ -20,12 +20,11 @@ def volume(mesh: Mesh) -> float:
 @pytest.mark.parametrize(
     ("mesh", "wanted", "short"),
     [
-        (box((1.0, 2.0, 3.0)), 6.0, 0.0),
         (prism(SQUARE, 0.5, 1.0), 1.0, 0.0),
         (ball(0.5), 4.0 / 3.0 * np.pi * 0.125, 0.05),
         (rod(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.array([0.1, 0.1])), ROUND_VOLUME, 0.1),
     ],
-    ids=["box", "prism", "ball", "rod"],
+    ids=["prism", "ball", "rod"],
 )
 def test_a_mesh_encloses_its_volume(mesh: Mesh, wanted: float, short: float):
     assert (1.0 - short) * wanted - 1e-9 <= volume(mesh) <= wanted + 1e-9
@@ -37,12 +36,12 @@ def test_every_edge_of_a_mesh_is_between_two_triangles():
     assert Counter(edges) == Counter((b, a) for a, b in edges)
 
 
-def test_sides_of_a_box_share_no_vertices_so_that_its_edges_look_sharp():
-    mesh = box((1.0, 1.0, 1.0))
+def test_sides_of_a_prism_share_no_vertices_so_that_its_edges_look_sharp():
+    mesh = prism(SQUARE, 0.0, 1.0)
     assert len(mesh.vertices) == 24
 
 
 def test_merged_meshes_keep_their_triangles_apart():
-    both = merged([box((1.0, 1.0, 1.0)), box((1.0, 1.0, 1.0)).moved(np.array([5.0, 0.0, 0.0]))])
-    assert volume(both) == pytest.approx(2.0)
-    assert np.ptp(both.vertices[both.triangles][:, :, 0], axis=1).max() == pytest.approx(1.0)
+    both = merged([prism(SQUARE, 0.0, 1.0), prism(SQUARE, 0.0, 1.0).moved(np.array([5.0, 0.0, 0.0]))])
+    assert volume(both) == pytest.approx(4.0)
+    assert np.ptp(both.vertices[both.triangles][:, :, 0], axis=1).max() == pytest.approx(2.0)

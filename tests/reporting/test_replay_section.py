@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from cosim.ports import Floats
 from scenarios.record import Record
-from scenarios.reporting.meshes import box
+from scenarios.reporting.meshes import prism
 from scenarios.reporting.replay import Body, Line, Replay
 from scenarios.reporting.replay_section import replay_section
 
 ROWS = 1000
 MOVING: Floats = np.column_stack([np.linspace(0.0, 2.0, ROWS), np.zeros(ROWS), np.zeros(ROWS)])
-CUBE = Body(label="<cube>", colour="#123456", mesh=box((0.2, 0.2, 0.2)), p_WB=MOVING)
+SQUARE = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
+CUBE = Body(label="<cube>", colour="#123456", mesh=prism(SQUARE, -0.1, 0.1), p_WB=MOVING)
 
 
 @pytest.fixture
