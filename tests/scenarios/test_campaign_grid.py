@@ -103,8 +103,8 @@ def test_a_parameter_cannot_be_varied_and_set():
     with pytest.raises(BadParameter) as caught:
         set_parameters(HelixHandover, ["alpha=0.3", "patience=1", "patience=2", "alhpa=1", "x"], points)
     assert list(caught.value.faults) == [
-        "alpha is varied and set by -p; one of both is right",
         "patience is given twice",
         "helix_handover has no parameter 'alhpa'; did you mean alpha?",
         "'x' is not of the form name=value",
+        "alpha is varied and set by -p; one of both is right",
     ]
