@@ -16,6 +16,7 @@ from scenarios.reporting.section import Section
 from scenarios.reporting.success_section import place_axis, plot_height
 
 _SUCCESS, _OTHER = "circle", "x-thin"
+_ENDED = {True: "succeeded", False: "failed", None: "not done"}
 
 
 def spread_section(results: CampaignResults, layout: PointLayout) -> Section | None:
@@ -68,46 +69,48 @@ def _strips(results: CampaignResults, layout: PointLayout) -> list[Strip]:
 
 def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Strip]) -> list[dict[str, Any]]:
     """Return boxes by group, then strips, without their values."""
-    along = "y" if layout.listed else "x"
-    traces: list[dict[str, Any]] = []
-    for group in range(len(layout.group_names)):
-        places = [float(layout.places[k]) for k, g in enumerate(layout.groups) if g == group]
-        traces.append(
-            {
-                "type": "box",
-                along: places,
-                "orientation": "h" if layout.listed else "v",
-                "width": 0.75 * layout.room,
-                "line": {"color": "var(--soft)", "width": 1.2},
-                "fillcolor": "rgba(128,128,128,0.10)",
-                "hoverinfo": "skip",
-                "showlegend": False,
-            }
-        )
-    names, seeds, success = (results.table.column(n) for n in ("run", "seed", "success"))
-    ended = {True: "succeeded", False: "failed", None: "not done"}
+    along, across = ("y", "x") if layout.listed else ("x", "y")
+    boxes = [_box_trace(layout, group) for group in range(len(layout.group_names))]
     mixed = len({succeeded for _, succeeded, _, _ in strips}) > 1
+    columns = [results.table.column(n) for n in ("run", "seed", "success")]
+    traces: list[dict[str, Any]] = []
     for group, succeeded, rows, places in strips:
         name, outcome = layout.group_names[group], "succeeded" if succeeded else "not succeeded"
-        told = [[names[row], int(seeds[row]), ended[success[row]]] for row in rows]
-        symbol = _SUCCESS if succeeded else _OTHER
-        colour = f"var(--c{group})"
-        marker = {"symbol": symbol, "size": 7, "color": colour, "opacity": 0.8, "line": {"color": colour, "width": 2}}
-        if succeeded:
-            marker["line"] = {"width": 0}
+        told = [
+            [name_of, int(seed), _ENDED[success]]
+            for name_of, seed, success in zip(*(c[rows] for c in columns), strict=True)
+        ]
         traces.append(
             {
                 "type": "scatter",
                 "mode": "markers",
                 along: places,
                 "name": ", ".join(filter(None, (name, outcome if mixed or not name else ""))),
-                "marker": marker,
+                "marker": _marker(f"var(--c{group})", _SUCCESS if succeeded else _OTHER),
                 "customdata": told,
-                "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{'x' if layout.listed else 'y'}"
-                ":.4g}<br>%{customdata[2]}<extra></extra>",
+                "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{across}:.4g}}"
+                "<br>%{customdata[2]}<extra></extra>",
             }
         )
-    return traces
+    return [*boxes, *traces]
+
+
+def _marker(colour: str, symbol: str) -> dict[str, Any]:
+    line = {"width": 0} if symbol == _SUCCESS else {"color": colour, "width": 2}
+    return {"symbol": symbol, "size": 7, "color": colour, "opacity": 0.8, "line": line}
+
+
+def _box_trace(layout: PointLayout, group: int) -> dict[str, Any]:
+    return {
+        "type": "box",
+        "y" if layout.listed else "x": [float(layout.places[k]) for k, g in enumerate(layout.groups) if g == group],
+        "orientation": "h" if layout.listed else "v",
+        "width": 0.75 * layout.room,
+        "line": {"color": "var(--soft)", "width": 1.2},
+        "fillcolor": "rgba(128,128,128,0.10)",
+        "hoverinfo": "skip",
+        "showlegend": False,
+    }
 
 
 def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Sequence[Strip]) -> dict[str, Any]:
