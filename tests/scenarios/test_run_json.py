@@ -43,6 +43,7 @@ def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):
     assert 0.0 < reflex["cpu_seconds"] < scene["cpu_seconds"] < ended.summary["cpu_seconds"]
 
 
+@pytest.mark.slow
 def test_an_ssp_tells_the_same_and_a_unit_without_period_has_none(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), "--adaptive", "1e-3"])
