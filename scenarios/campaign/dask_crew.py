@@ -7,6 +7,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Generator
+from multiprocessing import resource_tracker
 
 from dask import config
 from distributed import Client, LocalCluster
@@ -136,6 +137,7 @@ def _deaf_to_ctrl_c() -> Generator[None, None, None]:
     if sys.platform == "win32":
         yield
         return
+    resource_tracker.ensure_running()  # the thread that starts it hears of Ctrl-C from then on
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
