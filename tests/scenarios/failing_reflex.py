@@ -71,9 +71,10 @@ class Prints(BadReflex):
 
 class RefusesToStart(IrReflex):
     def __init__(self, params: Params) -> None:
-        raise ValueError("no sensor is there")
+        raise ValueError(f"no sensor is there for a {params.strategy.name.lower()}")
 
 
 class CrashesAtStart(IrReflex):
     def __init__(self, params: Params) -> None:
         ctypes.string_at(0)
+        super().__init__(params)
