@@ -19,6 +19,7 @@ from scenarios.campaign.campaign_place import place_of
 from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
+from scenarios.campaign.idle_crew import IdleCrew
 from scenarios.campaign.plan import CampaignPlan
 from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from scenarios.campaign.tally import Tally
@@ -86,6 +87,8 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
         _end_interrupted(folder, progress)
     tally = progress.tally
     assert tally is not None
+    if tally.kept == tally.total:
+        click.echo(f"{folder.path} has all of its runs; none was carried out", err=True)
     return CampaignCall(plan, folder, table, tally)
 
 
@@ -93,7 +96,7 @@ def _carry_out(
     plan: CampaignPlan, folder: CampaignFolder, workers: Workforce, progress: CampaignProgress
 ) -> CampaignTable:
     try:
-        with workers() as crew, progress:
+        with contextlib.nullcontext(IdleCrew(workers)) if folder.has_all(plan) else workers() as crew, progress:
             return carry_out_campaign(plan, folder, crew, progress)
     except (RecordNotWritten, CrewLost) as e:
         if progress.tally is None:

@@ -86,7 +86,7 @@ def _finish(experiment: PublishedExperiment, folder: CampaignFolder, table: Camp
     from scenarios.reporting.campaign_page import write_campaign_page
 
     write_results(experiment, table, folder)
-    if report:
+    if report and not folder.is_reported:
         write_campaign_page(folder)
 
 

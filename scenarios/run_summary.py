@@ -33,12 +33,19 @@ def files_and_forms(task: Task) -> dict[str, Any]:
     return {"source": task.source, "files": files, "formats": list(task.formats), "checkpoint": every}
 
 
-def presentation(task: Task, master: Master) -> dict[str, Any]:
-    """Return what is needed to present a run by its folder alone, as JSON can hold it."""
+def told_task(task: Task) -> dict[str, Any]:
+    """Return what is told of a run that is known before its system is, as JSON can hold it."""
     return {
         "title": task.experiment.title,
         "headline": list(task.experiment.headline),
         "told_parameters": [list(row) for row in parameter_rows(task)],
+    }
+
+
+def presentation(task: Task, master: Master) -> dict[str, Any]:
+    """Return what is needed to present a run by its folder alone, as JSON can hold it."""
+    return {
+        **told_task(task),
         "system": told_system(master.system, adaptive=master.steps is not None),
         "conversions": conversions_of(master.system),
     }

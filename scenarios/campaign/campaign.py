@@ -75,7 +75,7 @@ class _Work:
         known = {row.run.name for row in self.table.rows if row.status != "lost"}
         if self._keep([run for run in self.runs.values() if run.name not in known]):
             self.progress(self.tally)
-        self.table.write()
+        self.table.complete()
 
     @property
     def tally(self) -> Tally:

@@ -122,6 +122,18 @@ class CampaignFolder:
         """Return whether a run has left its folder; it has its name only when it is complete."""
         return (self.runs / run.name).is_dir()
 
+    def has_all(self, plan: CampaignPlan) -> bool:
+        """Return whether all runs of a campaign are done."""
+        return all(self.is_done(run) for run in plan.runs())
+
+    @property
+    def is_reported(self) -> bool:
+        """Whether the report page is there, and of the table as it is."""
+        try:
+            return self.report.stat().st_mtime_ns >= self.table.stat().st_mtime_ns
+        except OSError:
+            return False
+
     @contextlib.contextmanager
     def _made(self) -> Generator[None, None, None]:
         """Make the folder; if what follows fails, remove what was made and is empty."""

@@ -67,12 +67,11 @@ def _of_points(there: Any, called: Sequence[Mapping[str, str]]) -> list[str]:
 
 def _values(points: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
     """Return the values that each parameter takes."""
-    values: dict[str, list[str]] = {}
+    values: dict[str, dict[str, None]] = {}
     for point in points:
         for name, value in point.items():
-            if value not in values.setdefault(name, []):
-                values[name].append(value)
-    return values
+            values.setdefault(name, {})[value] = None
+    return {name: list(taken) for name, taken in values.items()}
 
 
 def _both(what: str, there: Any, called: Any) -> str:

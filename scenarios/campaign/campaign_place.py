@@ -19,7 +19,6 @@ def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
     checked one.
     """
     wanted = identity_of(plan, fmus)
-    runs = plan.runs()
     for path in sorted(PLACE.glob(f"*_{_stem(plan)}*/"), reverse=True):
         folder = CampaignFolder(path)
         try:
@@ -27,7 +26,7 @@ def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
         except BadRunFolder:
             continue
         if all(there.get(key) == value for key, value in wanted.items()):
-            return _new(plan) if all(folder.is_done(run) for run in runs) else folder
+            return _new(plan) if folder.has_all(plan) else folder
     return _new(plan)
 
 

@@ -7,6 +7,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Generator
+from multiprocessing import resource_tracker
 
 from dask import config
 from distributed import Client, LocalCluster
@@ -28,6 +29,17 @@ _SETTINGS = {
     "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": str(_SILENT),
 }
 
+_STILL = {
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.system-monitor.disk": False,
+    "distributed.admin.system-monitor.gil.enabled": False,
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.active-memory-manager.start": False,
+    "distributed.client.scheduler-info-interval": "10s",
+}
+"""Keeps workers from watching themselves many times a second, for a dashboard that is not there."""
+
 
 @contextlib.contextmanager
 def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
@@ -38,7 +50,7 @@ def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
     Raises:
         BadCrew: they cannot be started.
     """
-    with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
+    with _quiet(), config.set({**_SETTINGS, **_STILL}), contextlib.ExitStack() as opened:
         try:
             with (
                 _told_nothing_of_semaphores(),
@@ -125,6 +137,7 @@ def _deaf_to_ctrl_c() -> Generator[None, None, None]:
     if sys.platform == "win32":
         yield
         return
+    resource_tracker.ensure_running()  # the thread that starts it hears of Ctrl-C from then on
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield

@@ -11,25 +11,40 @@ from typing import BinaryIO
 
 import click
 
-from cosim.exceptions import one_line
+from cosim.exceptions import UnitFailure, one_line
 from scenarios.bad_call import told_in_one_line
+from scenarios.campaign.refused_run import REFUSALS, write_refused_run
 from scenarios.campaign.run_order import RunOrder
 from scenarios.chosen import scenario_named
 from scenarios.interruption import Interruption
 from scenarios.parameters import parse_parameters
+from scenarios.resumption import Spent
 from scenarios.run_folder import RunFolder
 from scenarios.runner import carry_out
 from scenarios.task import Task
 
 
 def carry_out_order(order: RunOrder, folder: Path) -> None:
-    """Run an order into a folder, without figures or a report.
+    """Run an order into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `carry_out` and `parse_parameters`. BadCall: there is no such scenario.
+        As `carry_out` and `parse_parameters`, but for `REFUSALS`. BadCall: there is no such scenario.
     """
+    task, clock = _task(order, folder), Spent().clock()
+    try:
+        carry_out(task, lambda _t, _end: None, Interruption())
+    except REFUSALS as e:
+        write_refused_run(task, e, clock())
+
+
+def refuse_order(order: RunOrder, folder: Path, failure: UnitFailure, spent: Spent) -> None:
+    """Write the folder of a run whose process ended as a unit was loaded or initialised."""
+    write_refused_run(_task(order, folder), failure, spent)
+
+
+def _task(order: RunOrder, folder: Path) -> Task:
     experiment = scenario_named(order.scenario)
-    task = Task(
+    return Task(
         experiment=experiment(),
         parameters=parse_parameters(experiment, order.parameters),
         seed=order.seed,
@@ -38,7 +53,6 @@ def carry_out_order(order: RunOrder, folder: Path) -> None:
         options=order.options,
         presented=False,
     )
-    carry_out(task, lambda _t, _end: None, Interruption())
 
 
 def fault_of(work: Callable[[], object]) -> str:

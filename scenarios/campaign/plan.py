@@ -77,26 +77,30 @@ class CampaignPlan:
         Names are those of a campaign's folder if `checked_plan` has returned the plan. A run's name and seed follow
         from its point and its repetition alone: they stay the same if there are more repetitions.
         """
+        seeded = self._seeded_as()
         return tuple(
             PlannedRun(
                 name=self._name(point, repetition),
                 point=point,
                 repetition=repetition,
                 parameters={**self.fixed, **self.points[point]},
-                seed=run_seed(self.seed, self._seeded_as(point), repetition),
+                seed=run_seed(self.seed, seeded[point], repetition),
             )
             for point in range(len(self.points))
             for repetition in range(self.repetitions)
         )
 
-    def _seeded_as(self, point: int) -> int | None:
-        """Return the first point that shares its seeds with a point, None if all do."""
+    def _seeded_as(self) -> Sequence[int | None]:
+        """Return, for each point, the first point that shares its seeds, None if all do."""
         if not self.paired:
-            return point
+            return range(len(self.points))
         if not self.scenes:
-            return None
-        scenes = [tuple(p.get(name) for name in self.scenes) for p in self.points]
-        return scenes.index(scenes[point])
+            return [None] * len(self.points)
+        first: dict[tuple[str | None, ...], int] = {}
+        return [
+            first.setdefault(tuple(point.get(name) for name in self.scenes), number)
+            for number, point in enumerate(self.points)
+        ]
 
     def _name(self, point: int, repetition: int) -> str:
         """Return such as `007_alpha=0.2_r0003`: point, what is varied as far as there is room, repetition."""

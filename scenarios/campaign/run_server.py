@@ -24,11 +24,12 @@ from fmus.build import import_block
 from fmus.catalog import UNITS
 from scenarios import supervisor
 from scenarios.campaign.messages import receive, send
-from scenarios.campaign.ordered_run import carry_out_order, fault_of, finish, printing_to
+from scenarios.campaign.ordered_run import carry_out_order, fault_of, finish, printing_to, refuse_order
 from scenarios.campaign.run_order import RunOrder
 from scenarios.catalog import SCENARIOS
 from scenarios.death import Death
 from scenarios.forked_child import ChildEnd, ForkedChild
+from scenarios.resumption import Spent
 
 IDLE = 60.0
 """Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""
@@ -85,16 +86,25 @@ class RunServer:
         return lost
 
     def _fork(self, order: RunOrder, folder: Path, log: BinaryIO) -> str:
-        """Carry out a run in a child; if that dies of a unit, complete what it left in another child."""
+        """Carry out a run in a child; if that dies of a unit, another child tells of it in the folder."""
         began = time.monotonic()
         end, heartbeat = self._in_child(lambda: fault_of(lambda: carry_out_order(order, folder)), folder, log)
         if heartbeat.status is not None:
             return heartbeat.facts.get("lost", "")
         death = Death(heartbeat, end, time.monotonic() - began)
-        left = death.folder
-        if left is None or death.was_killed or end.signal in supervisor.ORDERS:
+        if death.was_killed or end.signal in supervisor.ORDERS:
             return death.told
-        end, heartbeat = self._in_child(lambda: fault_of(lambda: death.complete(left)), folder, log)
+        left, failure, spent = death.folder, death.failure, Spent(time.monotonic() - began, end.cpu)
+        if left is None and failure is None:
+            return death.told
+
+        def tell() -> None:
+            if left is not None:
+                death.complete(left)
+            elif failure is not None:
+                refuse_order(order, folder, failure, spent)
+
+        end, heartbeat = self._in_child(lambda: fault_of(tell), folder, log)
         return "" if heartbeat.status == 0 else heartbeat.facts.get("lost", death.told)
 
     def _in_child(self, work: Callable[[], str], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:

@@ -81,6 +81,17 @@ class TableWriter:
         """The rows."""
         return sorted(self._rows.values(), key=lambda row: self._order[row.run.name])
 
+    def complete(self) -> None:
+        """Write the table, unless it is there as it is to be: what was made of it stays younger than it.
+
+        Raises:
+            RecordNotWritten: it cannot be written.
+        """
+        with contextlib.suppress(OSError, pa.ArrowException):
+            if pq.read_table(self._path).equals(table_of(self._plan, self.rows), check_metadata=True):
+                return
+        self.write()
+
     def write(self) -> None:
         """Write the table, whole or not at all.
 

@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from controllers.ir_reflex import Inputs, IrReflex, Outputs
+from controllers.ir_reflex import Inputs, IrReflex, Outputs, Params
 
 T_BAD = 0.1
 """From when on they misbehave, s."""
@@ -67,3 +67,14 @@ class Prints(BadReflex):
             os.write(2, b"from native code\n")
             print("input:", repr(sys.stdin.read()), flush=True)
         self.printed = True
+
+
+class RefusesToStart(IrReflex):
+    def __init__(self, params: Params) -> None:
+        raise ValueError(f"no sensor is there for a {params.strategy.name.lower()}")
+
+
+class CrashesAtStart(IrReflex):
+    def __init__(self, params: Params) -> None:
+        ctypes.string_at(0)
+        super().__init__(params)

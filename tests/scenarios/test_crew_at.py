@@ -102,7 +102,7 @@ def test_a_worker_that_does_not_see_the_folder_is_refused(
         (tmp_path / "here").mkdir()
         monkeypatch.chdir(tmp_path / "here")
         with pytest.raises(
-            BadCrew, match=r"worker tcp://[\d.:]+: .* does not see what is written there \(No such file"
+            BadCrew, match=r"worker tcp://[\d.:]+ cannot use .* does not see what is written there \(No such file"
         ):
             crew.check(Path("/proc/self/cwd"))  # another folder in each process
         assert list((tmp_path / "here").iterdir()) == []

@@ -17,9 +17,13 @@ from click.testing import CliRunner
 from crew_orders import bad_order, order
 from living import children, lives, until
 
+from scenarios.campaign.plan import PlannedRun
+from scenarios.campaign.run_row import row_of
 from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
 from scenarios.command import main
 from scenarios.record import Record
+from scenarios.reporting.run_page import write_run_page
+from scenarios.run_folder import RunFolder
 
 slow = pytest.mark.slow
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
@@ -56,15 +60,11 @@ def test_the_signals_are_those_of_the_same_run_by_itself(
 ):
     alone, runs = tmp_path / "alone", tmp_path / "runs"
     chosen = [text for parameter in parameters for text in ("-p", parameter)]
-    CliRunner().invoke(main, ["run", scenario, *chosen, "--seed", "3", "--out", str(alone)])
+    CliRunner().invoke(main, ["run", scenario, *chosen, "--seed", "3", "--no-report", "--out", str(alone)])
     assert server.carry_out(order(runs, "run", *parameters, scenario=scenario), yes) == ""
     assert (runs / "run" / "signals.parquet").read_bytes() == (alone / "signals.parquet").read_bytes()
-    assert sorted(p.name for p in (runs / "run").iterdir()) == [
-        "figures",
-        "run.json",
-        "signals.parquet",
-        "summary.json",
-    ]
+    assert {p.name for p in (runs / "run").iterdir()} == {p.name for p in alone.iterdir()}
+    assert {"run.json", "signals.parquet", "summary.json"} <= {p.name for p in (runs / "run").iterdir()}
     assert list((runs / "run" / "figures").iterdir()) == []
 
 
@@ -73,6 +73,29 @@ def test_a_unit_that_fails_is_in_the_summary(server: ServerProcess, built: Path,
     summary = summary_in(tmp_path / "runs")
     assert (summary["success"], summary["failure"]["kind"]) == (False, "error")
     assert "a sensor broke" in summary["reason"]
+
+
+@pytest.mark.parametrize(
+    ("reflex", "kind", "told"),
+    [("RefusesToStart", "error", "reflex does not start: "), ("CrashesAtStart", "crash", "a unit failed: ")],
+)
+def test_a_unit_that_does_not_start_is_in_the_summary(
+    reflex: str, kind: str, told: str, server: ServerProcess, built: Path, tmp_path: Path
+):
+    """It would not start another time either: there is nothing to try again."""
+    order = bad_order(tmp_path / "runs", reflex, built)
+    assert server.carry_out(order, yes) == ""
+    summary = summary_in(tmp_path / "runs")
+    assert (summary["success"], summary["complete"], summary["simulated_seconds"]) == (False, False, 0.0)
+    assert (summary["failure"]["kind"], summary["failure"]["instance"]) == (kind, "reflex")
+    assert summary["reason"].startswith(told)
+    assert "\n" not in summary["reason"]
+    run = PlannedRun(name="bad", point=0, repetition=0, parameters={}, seed=order.seed)
+    row = row_of(run, tmp_path / "runs" / "bad")
+    assert row is not None
+    assert (row.status, row.success) == ("failed", None)
+    write_run_page(RunFolder.left_at(tmp_path / "runs" / "bad"))
+    assert summary["reason"] in (tmp_path / "runs" / "bad" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("reflex", "kind"), [("Crashes", "crash"), pytest.param("Hangs", "hang", marks=slow)])

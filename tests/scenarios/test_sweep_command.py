@@ -52,6 +52,17 @@ def sweep(
     return CliRunner().invoke(main, call), crew.begun
 
 
+def refuse_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no workers be had."""
+
+    @contextlib.contextmanager
+    def refuse(_workers: int | None) -> Generator[OwnCrew, None, None]:
+        raise BadCrew("there are none")
+        yield OwnCrew()
+
+    monkeypatch.setattr(dask_crew, "embedded_crew", refuse)
+
+
 def raising(error: BaseException, at: int) -> Callable[[RunOrder], str]:
     """Return what raises an error before the run of a number, from 0."""
     counted: list[str] = []
@@ -88,6 +99,28 @@ def test_an_interrupted_call_goes_on(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.slow
+def test_a_complete_campaign_starts_no_workers(here: Path, monkeypatch: pytest.MonkeyPatch):
+    call = [text for text in CALL if text != "--no-report"]
+    sweep(monkeypatch, *call)
+    written = [(here / "c" / name).stat().st_mtime_ns for name in ("runs.parquet", "report.html")]
+    refuse_workers(monkeypatch)
+    result = CliRunner().invoke(main, call)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == "c has all of its runs; none was carried out\n"
+    assert "2 of 2 runs done" in result.stdout
+    assert [(here / "c" / name).stat().st_mtime_ns for name in ("runs.parquet", "report.html")] == written
+    (here / "c" / "report.html").unlink()
+    assert CliRunner().invoke(main, call).exit_code == 0
+    assert (here / "c" / "report.html").is_file()
+
+
+def test_a_run_that_cannot_be_read_is_carried_out_again(here: Path, monkeypatch: pytest.MonkeyPatch):
+    sweep(monkeypatch, *CALL)
+    (here / "c" / "runs" / ALL[1] / "summary.json").write_text("{")
+    result, begun = sweep(monkeypatch, *CALL)
+    assert (result.exit_code, begun) == (0, [ALL[1]])
+
+
 def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyPatch):
     call = [*CALL[:-3], "--no-report"]
     result, _ = sweep(monkeypatch, *call, before=raising(KeyboardInterrupt(), at=1))
@@ -151,12 +184,7 @@ def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytest.MonkeyPatch):
-    @contextlib.contextmanager
-    def refuse(_workers: int | None) -> Generator[OwnCrew, None, None]:
-        raise BadCrew("there are none")
-        yield OwnCrew()
-
-    monkeypatch.setattr(dask_crew, "embedded_crew", refuse)
+    refuse_workers(monkeypatch)
     result = CliRunner().invoke(main, CALL)
     assert (result.exit_code, result.output) == (2, "Error: there are none\n")
     assert list(here.iterdir()) == []
