@@ -123,8 +123,6 @@ def test_a_folder_that_may_not_be_written_to(copy: Path, monkeypatch: pytest.Mon
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
 
     monkeypatch.setattr(Path, "write_text", refuse)
-    monkeypatch.setattr(Path, "write_bytes", refuse)
-    monkeypatch.setattr(Path, "open", refuse)
     monkeypatch.setattr(Path, "mkdir", refuse)
     assert report(copy) == (3, f"Error: {copy / 'report.html'} cannot be written: Permission denied\n")
     status, told = report(copy, "--figures")
