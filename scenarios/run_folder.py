@@ -6,6 +6,7 @@ import importlib.metadata
 import json
 import os
 import platform
+import shutil
 from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -97,6 +98,17 @@ class RunFolder:
             self.figures.mkdir(parents=True)
         except OSError as e:
             raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+
+    def remove_presentation(self) -> None:
+        """Remove page and figures, which tell of less than the run that goes on.
+
+        Raises:
+            RecordNotWritten: they cannot be removed.
+        """
+        with told_if_not_written(self.report):
+            self.report.unlink(missing_ok=True)
+            shutil.rmtree(self.figures, ignore_errors=True)
+            self.figures.mkdir(exist_ok=True)
 
     @contextlib.contextmanager
     def held(self) -> Generator[None, None, None]:

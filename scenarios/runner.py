@@ -76,6 +76,8 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     """Make the run's folder, and tell what has to be known of the run if this process dies."""
     if resumption is None:
         task.folder.make()
+    else:
+        task.folder.remove_presentation()
     fmus = {n: u.description.path for n, u in master.system.units.items()}
     told = {**configuration(task), **files_and_forms(task), **presentation(task, master)}
     task.folder.write_run(told, fmus)

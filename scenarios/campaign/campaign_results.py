@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cosim.variable import Kind, Variable
 from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.shown_unit import shown_unit
 from scenarios.campaign.statistics import Interval, success_interval
 from scenarios.catalog import SCENARIOS
 
@@ -146,7 +147,9 @@ class CampaignResults:
         """Return a parameter's value as one reads it in a label."""
         if self.is_boolean(parameter):
             return parameter.replace("_", " ") if text.lower() == "true" else f"not {parameter.replace('_', ' ')}"
-        return text if self.is_number(parameter) else text.replace("_", " ")
+        if self.is_number(parameter):
+            return shown_unit(self.unit(parameter), float(text)).text(float(text))
+        return text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:
         """Return what tells a point from the others."""

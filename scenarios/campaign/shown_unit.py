@@ -41,4 +41,9 @@ def shown_unit(unit: str, values: ArrayLike) -> ShownUnit:
         return ShownUnit(1e-6, "MB")
     if unit == "Pa" and most >= 1e3:
         return ShownUnit(1e-3, "kPa")
-    return ShownUnit(1.0, "" if unit == "1" else unit.replace(".", "·").replace("m2", "m²").replace("s2", "s²"))
+    return ShownUnit(1.0, unit_symbol(unit))
+
+
+def unit_symbol(unit: str) -> str:
+    """Return an SI unit as one writes it, such as "m²"; "" for pure numbers."""
+    return "" if unit == "1" else unit.replace(".", "·").replace("m2", "m²").replace("s2", "s²")

@@ -17,7 +17,7 @@ def plot_handover(parameters: Parameters, record: Record) -> list[TimePlot]:
     return [
         _distance(parameters, record),
         *(_position(record, axis) for axis in range(3)),
-        _tendons("Commanded tendon lengths", "change since calibration", "mm", 1000 * record["servo.dl_t"], held=True),
+        _tendons("Commanded tendon lengths, since calibration", "change", "mm", 1000 * record["servo.dl_t"], held=True),
         _tendons("Tendon forces", "force", "N", record["arm.tension"], held=False),
         TimePlot(
             title="Gripper",

@@ -39,7 +39,6 @@ def replay_handover(record: Record) -> Replay:
         lines=[arm, *_fingers(record), *_forearm(record), *_estimates(record)],
         fixed=cameras,
         eye=(-0.35, -1.25, 0.35),
-        middle=(-0.25, 0.0, -0.4),
         phases="servo.phase",
         notes=("Where things were; orange: where the controller took ball and gripper to be.",),
         window=_window(record, cameras),

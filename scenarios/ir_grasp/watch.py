@@ -23,7 +23,7 @@ _LEFT_BEHIND = 0.04
 """How far an object that is held may have stayed behind the hand since the pull began, m (assumed): less than the
 object's and the fingers' width, so that it is still where they closed."""
 
-_COST = "cost f of thumb and ring, [Luberto] eq. (4), as the hand began to close (1e-06 m2: 1 mm²)"
+_COST = "cost f of thumb and ring, [Luberto] eq. (4), as the hand began to close"
 
 _AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
 _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")

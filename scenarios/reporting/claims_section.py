@@ -22,7 +22,7 @@ def claims_section(claims: Sequence[Claim]) -> Section | None:
         if rows:
             heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in _HEADER)
             heading = Markup("<h3>{}</h3>").format(title) if title else Markup()
-            table = Markup("<table class='claims'><thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table>")
+            table = Markup("<table class='cards claims'><thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table>")
             parts.append(heading + table.format(heads, Markup("\n").join(rows)))
     return Section(anchor="claims", title="Claims", html=Markup("\n").join(parts)) if parts else None
 

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from cosim.ports import Floats
+from scenarios.campaign.shown_unit import unit_symbol
 from scenarios.record import Record
 from scenarios.reporting.page import template
 from scenarios.reporting.plot_html import json_html
@@ -48,7 +49,7 @@ def _signal(record: Record, name: str, time: NDArray[np.float32], most: int) -> 
     flat = values.reshape(len(values), -1).astype(np.float64)
     return {
         "name": name,
-        "unit": "" if record.unit(name) == "1" else record.unit(name),
+        "unit": unit_symbol(record.unit(name)),
         "about": record.description(name),
         "items": record.items(name) or ({0: "false", 1: "true"} if values.dtype == np.bool_ else {}),
         "columns": [

@@ -44,7 +44,7 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
     ]
     left = len(groups) - _MOST_REASONS
     more = Markup("<p class='soft'>{} reasons more, of fewer runs each.</p>").format(left) if left > 0 else Markup()
-    table = rows_table(("runs", "how", "reason, such as", "examples"), rows, numbers=(0,))
+    table = rows_table(("runs", "how", "reason, such as", "examples"), rows, numbers=(0,), cards=True)
     return Section(anchor="failures", title="Failures", html=table + more)
 
 

@@ -4,6 +4,7 @@ import base64
 import functools
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from scenarios.reporting.section import Section
+from scenarios.reporting.tied_text import tied
 from scenarios.run_folder import write_whole
 
 _SCRIPT = "page.js"
@@ -38,8 +40,8 @@ def write_page(path: Path, title: str, lead: Markup, sections: Sequence[Section]
         path,
         template("page.html").render(
             title=title,
-            lead=lead,
-            sections=sections,
+            lead=Markup(tied(lead)),
+            sections=[replace(s, html=Markup(tied(s.html))) for s in sections],
             style=Markup(asset("page.css")),
             scripts=[Markup(s) for s in scripts],
             policy=_policy(scripts),

@@ -25,7 +25,7 @@ def published_section(summary: Mapping[str, Any], run: Mapping[str, Any]) -> Sec
         return None
     rows = [_row(v, summary["metrics"][v.metric]) for v in values]
     note = "One run is no trial of what was published: it does not tell how its figures vary."
-    html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2))
+    html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
     return Section(
         anchor="published", title="Published values", html=html + Markup("<p class='soft'>{}</p>").format(note)
     )

@@ -59,8 +59,7 @@ class Replay:
     Attributes:
         lines, bodies: what moves; each has as many rows as the record, or one.
         fixed: lines that stay, of shape (1, n, 3), such as a path to follow or a table's edge.
-        eye: from where one looks at first, seen from the middle, in units of the scene's size.
-        middle: where one looks at first, in W, m; None: at the middle of what is shown.
+        eye: the side from which one looks at first, a direction in W; from as far as all that is shown is seen.
         phases: an enumeration's signal whose value is told beside the time; "" for none.
         notes: sentences below the scene.
         window: least and greatest corner of what is shown, shape (2, 3), m; None: everything that is drawn.
@@ -70,7 +69,6 @@ class Replay:
     bodies: Sequence[Body] = ()
     fixed: Sequence[Line] = ()
     eye: tuple[float, float, float] = (1.3, 1.3, 0.6)
-    middle: tuple[float, float, float] | None = None
     phases: str = ""
     notes: Sequence[str] = field(default_factory=tuple[str, ...])
     window: Floats | None = None

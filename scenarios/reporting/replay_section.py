@@ -40,7 +40,6 @@ def replay_section(replay: Replay, record: Record) -> Section:
         "time": _packed(record.time[rows]),
         "phases": phase_changes(record, replay.phases),
         "eye": list(replay.eye),
-        "middle": None if replay.middle is None else list(replay.middle),
         "low": np.round(low, 4).tolist(),
         "high": np.round(high, 4).tolist(),
         "traces": [_trace(same) for same in _alike(drawn)],

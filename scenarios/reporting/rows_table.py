@@ -20,6 +20,7 @@ def rows_table(
     numbers: Sequence[int] = (),
     caption: str = "",
     sortable: bool = False,
+    cards: bool = False,
 ) -> Markup:
     """Return a table as HTML, which scrolls within itself where a page is narrow.
 
@@ -29,6 +30,7 @@ def rows_table(
         numbers: columns of numbers, which stand to the right.
         caption: what it is, above it.
         sortable: whether a click on a column's name sorts by it; the page then needs `campaign.js`.
+        cards: whether each row is a block of lines on a phone, each cell with its column's name before it.
     """
     kind = Markup(' class="number"')
     kinds = [kind if k in numbers else Markup() for k in range(len(header))]
@@ -36,21 +38,23 @@ def rows_table(
     heads = Markup().join(
         Markup("<th{} scope='col'>{}</th>").format(c, name.format(h)) for c, h in zip(kinds, header, strict=True)
     )
-    body = Markup("\n").join(Markup("<tr>{}</tr>").format(_cells(row, kinds)) for row in rows)
+    labels = [Markup(" data-label='{}'").format(h) if cards else Markup() for h in header]
+    attributes = [kind + label for kind, label in zip(kinds, labels, strict=True)]
+    body = Markup("\n").join(Markup("<tr>{}</tr>").format(_cells(row, attributes)) for row in rows)
     return Markup(
         "<div class='scroll'><table{}>{}<thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table></div>"
     ).format(
-        Markup(" class='sortable'") if sortable else Markup(),
+        Markup(" class='sortable'") if sortable else Markup(" class='cards'") if cards else Markup(),
         Markup("<caption>{}</caption>").format(caption) if caption else Markup(),
         heads,
         body,
     )
 
 
-def _cells(row: Sequence[str | Markup | Cell], kinds: Sequence[Markup]) -> Markup:
+def _cells(row: Sequence[str | Markup | Cell], attributes: Sequence[Markup]) -> Markup:
     cells: list[Markup] = []
-    for cell, kind in zip(row, kinds, strict=True):
+    for cell, attribute in zip(row, attributes, strict=True):
         text, key = (cell.text, cell.key) if isinstance(cell, Cell) else (cell, None)
         sort = Markup() if key is None else Markup(" data-key='{}'").format(f"{key:.9g}")
-        cells.append(Markup("<td{}{}>{}</td>").format(kind, sort, text))
+        cells.append(Markup("<td{}{}>{}</td>").format(attribute, sort, text))
     return Markup().join(cells)

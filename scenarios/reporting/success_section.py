@@ -11,6 +11,9 @@ from scenarios.campaign.point_layout import PointLayout
 from scenarios.reporting.plot_html import plot_html
 from scenarios.reporting.section import Section
 
+_A_SCREEN = 15
+"""Points of a list; the values of a longer one stand at its top."""
+
 
 def success_section(results: CampaignResults, layout: PointLayout) -> Section | None:
     """Return the plot of success rates with their intervals; None if no run is done."""
@@ -63,6 +66,8 @@ def place_axis(figure: Any, layout: PointLayout) -> None:
             names = [_broken(name) for name in names]
         axis |= {"tickmode": "array", "tickvals": [place for place, _ in layout.ticks], "ticktext": names}
     figure.update_layout({"yaxis" if layout.listed else "xaxis": axis})
+    if layout.listed and len(layout.places) > _A_SCREEN:
+        figure.update_layout({"xaxis": {"side": "top"}})
 
 
 def plot_height(layout: PointLayout) -> int:

@@ -1,7 +1,7 @@
 """Draws what a scenario gives to be drawn over time."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import cycle, pairwise
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,14 @@ from scenarios.record import Record
 from scenarios.reporting.plot_html import COLOURS, plot_html
 from scenarios.reporting.section import Section
 from scenarios.reporting.thinned import changes_of, rows_of_curve, rows_of_steps
-from scenarios.reporting.time_plot import Curve, TimePlot
+from scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 TIME_AXIS = "time (s)"
 _MOST = 900
 """Points of a curve: more than a plot has pixels for."""
 _MOST_PHASES = 200
+_DASHES = ("dash", "longdashdot")
+"""Of a plot's levels."""
 
 
 def time_plots_section(plots: Sequence[TimePlot], record: Record) -> Section | None:
@@ -43,16 +45,18 @@ def time_figure(plot: TimePlot, record: Record) -> go.Figure:
     if plot.phases:
         meta["phases"] = _phases(record, plot.phases)
     return go.Figure(
-        [_trace(c, record.time, plot.unit, colour) for c, colour in zip(plot.curves, colours, strict=True)],
+        [
+            *(_trace(c, record.time, plot.unit, colour) for c, colour in zip(plot.curves, colours, strict=True)),
+            *(_level(level, record.time, plot.unit, dash) for level, dash in zip(plot.levels, cycle(_DASHES))),
+        ],
         {
             "meta": meta,
             "hovermode": "x unified",
-            "showlegend": len(plot.curves) > 1 or bool(plot.curves[:1] and plot.curves[0].label != plot.quantity),
+            "showlegend": len(plot.curves) + len(plot.levels) > 1
+            or bool(plot.curves[:1] and plot.curves[0].label != plot.quantity),
             "xaxis": {"title": {"text": TIME_AXIS}, "unifiedhovertitle": {"text": "%{x:.4~f} s"}},
-            "yaxis": {"title": {"text": _with_unit(plot)}, "type": "log" if plot.logarithmic else "linear",
-                      "exponentformat": "power"},
-            "shapes": [_line(level.value) for level in plot.levels],
-            "annotations": [_name(level.label, level.value, plot.logarithmic) for level in plot.levels],
+            "yaxis": {"title": {"text": _with_unit(plot)}, "exponentformat": "power",
+                      **({"type": "log", "dtick": 1} if plot.logarithmic else {"type": "linear"})},
         },
     )  # fmt: skip
 
@@ -81,20 +85,15 @@ def _trace(curve: Curve, time: Floats, unit: str, colour: str) -> Any:
     )
 
 
-def _line(value: float) -> dict[str, Any]:
-    line = {"color": "var(--soft)", "width": 1.2, "dash": "dash"}
-    return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value, "line": line}
-
-
-def _name(label: str, value: float, logarithmic: bool) -> dict[str, Any]:
-    place = {"xref": "paper", "x": 1, "xanchor": "right", "y": np.log10(value) if logarithmic else value}
-    return {
-        **place,
-        "yanchor": "bottom",
-        "text": label,
-        "showarrow": False,
-        "font": {"color": "var(--soft)", "size": 12},
-    }
+def _level(level: Level, time: Floats, unit: str, dash: str) -> Any:
+    return go.Scatter(
+        x=[float(time[0]), float(time[-1])],
+        y=[level.value, level.value],
+        name=f"{level.label}: {level.value:.4g} {unit}".rstrip(),
+        mode="lines",
+        line={"color": "var(--soft)", "width": 1.2, "dash": dash},
+        hoverinfo="skip",
+    )
 
 
 def _phases(record: Record, signal: str) -> list[dict[str, Any]]:

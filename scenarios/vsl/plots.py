@@ -53,7 +53,7 @@ def _error(parameters: Parameters, record: Record, *, hybrid: bool) -> TimePlot:
     ]
     return TimePlot(
         title="Error of the tip, on the path",
-        quantity="distance to the desired point",
+        quantity="error",
         unit="mm",
         curves=curves,
         levels=(Level(label="tolerance for the mean", value=1000 * parameters.tolerance),),

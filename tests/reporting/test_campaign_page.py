@@ -20,7 +20,7 @@ POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 def page_of(path: Path, plan: dict[str, Any], table: CampaignTable) -> str:
     folder = folder_of(path, plan, table)
     write_campaign_page(folder)
-    return folder.report.read_text(encoding="utf-8")
+    return folder.report.read_text(encoding="utf-8").replace("\u00a0", " ")
 
 
 def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTable:

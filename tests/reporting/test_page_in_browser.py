@@ -18,6 +18,8 @@ def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(browser: Brow
     with opened(browser, grasp / "report.html") as page:
         assert page.inner_text("h1") == "ir_grasp: succeeded"
         assert page.locator(".plot").count() == page.locator(".plot:has(.main-svg)").count() > 0
+        assert page.locator(".modebar-btn").count() > 0
+        assert page.locator(".modebar-btn[data-title*=hare], .modebar-btn[data-title*=loud]").count() == 0
         page.fill(".explorer input", "range")
         page.select_option(".explorer select", ["scene.range"])
         wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")

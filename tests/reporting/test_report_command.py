@@ -116,3 +116,26 @@ def test_a_run_without_report_leaves_neither_page_nor_figures(tmp_path: Path):
     assert f"results: {tmp_path / 'run'}\n" in done.output
     assert not (tmp_path / "run" / "report.html").exists()
     assert not any((tmp_path / "run").glob("figures/*"))
+
+
+def test_a_folder_that_may_not_be_written_to(copy: Path, monkeypatch: pytest.MonkeyPatch):
+    def refuse(file: Path, *_arguments: Any, **_options: Any) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
+
+    monkeypatch.setattr(Path, "write_text", refuse)
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert report(copy) == (3, f"Error: {copy / 'report.html'} cannot be written: Permission denied\n")
+    status, told = report(copy, "--figures")
+    assert (status, told.count("\n")) == (3, 1)
+    assert "cannot be written: Permission denied" in told
+
+
+def test_a_run_of_an_ssp_has_a_page_and_figures(tmp_path: Path):
+    for call in (
+        ["export", "ir_grasp", "--ssp", str(tmp_path / "x.ssp")],
+        ["run", str(tmp_path / "x.ssp"), "--stop", "0.3", "--no-report", "--out", str(tmp_path / "run")],
+    ):
+        done = CliRunner().invoke(main, call)
+        assert done.exit_code == 0, done.output
+    assert report(tmp_path / "run", "--figures") == (0, f"report: {tmp_path / 'run' / 'report.html'}\n")
+    assert {p.suffix for p in (tmp_path / "run" / "figures").iterdir()} == {".png", ".svg"}

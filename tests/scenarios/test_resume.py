@@ -126,6 +126,15 @@ def copy(left: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(left, tmp_path / "run"))
 
 
+def test_page_and_figures_of_the_part_do_not_outlast_going_on_without_a_report(copy: Path):
+    (copy / "report.html").write_text("of the part")
+    (copy / "figures" / "part.png").write_text("of the part")
+    result = call("resume", copy, "--no-report")
+    assert result.exit_code == 0, result.output
+    assert not (copy / "report.html").exists()
+    assert list((copy / "figures").iterdir()) == []
+
+
 def test_a_run_that_can_go_on_is_told_how(copy: Path, capsys: pytest.CaptureFixture[str]):
     summary: dict[str, Any] = {
         "scenario": "ir_grasp",

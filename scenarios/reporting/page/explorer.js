@@ -53,7 +53,7 @@
       const n = k ? k + 1 : "";
       layout[`yaxis${n}`] = axisOf(row, k, rows.length);
       for (const s of row.signals)
-        for (const c of s.columns) data.push(traceOf(s, c, `y${n}`, `var(--c${colour++ % 8})`));
+        for (const c of s.columns) data.push(traceOf(s, c, `y${n}`, `var(--c${colour++ % 9})`));
     });
     return {data, layout};
   }
@@ -68,7 +68,7 @@
 
   function titleOf(row) {
     const name = row.signals.length === 1 ? row.signals[0].name : "";
-    return [name, row.unit && `(${row.unit})`].filter(Boolean).join(" ");
+    return [name, row.unit && `(${row.unit})`].filter(Boolean).join(name.length > 20 ? "<br>" : " ");
   }
 
   const tidy = name => name.toLowerCase().replaceAll("_", " ");

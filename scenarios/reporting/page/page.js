@@ -9,7 +9,7 @@
 "use strict";
 const page = (() => {
   const names = ["ink", "soft", "line", "page", "card", "shade", "good", "bad", "link",
-    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
+    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8"];
   const touch = matchMedia("(pointer: coarse)").matches;
   const figures = new Map();
   let span = null;  // the range of time that was chosen
@@ -28,7 +28,7 @@ const page = (() => {
     };
     const depth = {...axis, backgroundcolor: "rgba(0,0,0,0)", showbackground: false};
     return {layout: {
-      colorway: [c.c0, c.c1, c.c2, c.c3, c.c4, c.c5, c.c6, c.c7],
+      colorway: [c.c0, c.c1, c.c2, c.c3, c.c4, c.c5, c.c6, c.c7, c.c8],
       font: {color: c.ink, family: "system-ui, sans-serif", size: 13},
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       margin: {l: 56, r: 12, t: 30, b: 44},
@@ -55,6 +55,7 @@ const page = (() => {
   const settings = {
     displaylogo: false, displayModeBar: touch ? false : "hover", scrollZoom: false,
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d"],
+    showSendToCloud: false, plotlyServerURL: "",  // a page sends nothing to anyone
   };
 
   function draw(div, figure) {

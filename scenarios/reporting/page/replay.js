@@ -1,5 +1,6 @@
 // Plays a run in space. Traces, their look and their motion come from replay_section.py, colours of the axes from page.js.
 "use strict";
+const VIEW = Math.PI / 4, ROOM = 0.92;  // angle of Plotly's view from top to bottom, and the share of it for the box
 for (const replay of document.querySelectorAll(".replay")) {
   const scene = replay.querySelector(".replay-scene");
   const [play, slider, told, speed, reset, wake] = ["play", "time", "told", "speed", "reset", "wake"]
@@ -49,16 +50,25 @@ for (const replay of document.querySelectorAll(".replay")) {
   const scale = Math.sqrt(3) / Math.hypot(...sides);
   const xyz = values => ({x: values[0], y: values[1], z: values[2]});
 
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const cross = (a, b) => [0, 1, 2].map(i => a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+  const unit = a => a.map(x => x / Math.hypot(...a));
+
+  // Looks from the side of `run.eye`, from where the whole box is just seen, with the names of its axes.
   function camera() {
-    const [x, y, z] = run.eye;
-    const fromAbove = Math.hypot(x, y) < 0.1 * Math.abs(z);
-    const middle = (run.middle ?? []).map((m, i) => (m - (run.low[i] + run.high[i]) / 2) * scale);
-    // Where the scene is narrow, the eye is farther away, so that as much is seen.
-    const away = Math.max(1, 1.4 / Math.max(scene.clientWidth / scene.clientHeight, 0.7));
-    return {
-      eye: xyz(run.eye.map((e, i) => e * away + (middle[i] ?? 0))), center: xyz(run.middle ? middle : [0, 0, 0]),
-      up: fromAbove ? xyz([0, 1, 0]) : xyz([0, 0, 1]),
+    const back = unit(run.eye), up = Math.hypot(back[0], back[1]) < 0.1 ? [0, 1, 0] : [0, 0, 1];
+    const right = unit(cross(up, back)), over = cross(back, right);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(n => sides.map((side, i) => ((n >> i & 1) - 0.5) * side * scale));
+    // Along one side of the picture: where the middle is, and how far the eye has to be.
+    const fit = (along, slope) => {
+      const least = Math.min(...corners.map(c => dot(along, c) - slope * dot(back, c)));
+      const most = Math.max(...corners.map(c => dot(along, c) + slope * dot(back, c)));
+      return [(least + most) / 2, (most - least) / (2 * slope)];
     };
+    const high = ROOM * Math.tan(VIEW / 2);
+    const [x, far] = fit(right, high * scene.clientWidth / scene.clientHeight), [y, farther] = fit(over, high);
+    const center = [0, 1, 2].map(i => x * right[i] + y * over[i]), away = Math.max(far, farther);
+    return {eye: xyz(center.map((c, i) => c + away * back[i])), center: xyz(center), up: xyz(up)};
   }
 
   function layout() {
