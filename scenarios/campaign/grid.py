@@ -42,14 +42,27 @@ def set_parameters(
     """Return the parameters that are the same at all points, in the order in which they are given.
 
     Raises:
-        BadParameter: one is unknown, given twice, or varied.
+        BadParameter: one is unknown, given twice, varied, or given several values.
     """
     fixed, faults = texts_by_name(experiment, given)
     both = [name for name in fixed if any(name in point for point in varied)]
     faults += [f"{name} is varied and set by -p; one of both is right" for name in both]
+    known = {v.name: v for v in experiment.parameters()}
+    for name, text in fixed.items():
+        if name not in both and _is_list(known[name], text):
+            faults.append(f"-p {name} takes one value; to vary it, give it without -p: {name}={text}")
     if faults:
         raise BadParameter(faults)
     return fixed
+
+
+def _is_list(variable: Variable, text: str) -> bool:
+    """Return whether a text is no value of a parameter, but several."""
+    _, fault = parse_value(variable, text)
+    if not fault:
+        return False
+    values, faults = _axis(variable, text)
+    return len(values) > 1 and not faults
 
 
 def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
@@ -92,10 +105,11 @@ def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:
         start = stop = math.nan
     if not math.isfinite(start) or not math.isfinite(stop):
         return [], f"{right}: START and STOP are finite numbers"
-    if not (parts[2].isascii() and parts[2].isdigit() and len(parts[2]) < 10 and int(parts[2]) >= 2):
-        return [], f"{right}: N is a whole number of values from 2 on"
-    if int(parts[2]) > MOST_RUNS:
-        return [], f"{text!r} has {int(parts[2]):,} values; at most {MOST_RUNS:,} runs can be planned"
+    digits = parts[2].lstrip("0") if parts[2].isascii() and parts[2].isdigit() else ""
+    if digits in ("", "1"):
+        return [], f"{right}: N is a whole number of values from 2 to {MOST_RUNS:,}"
+    if len(digits) > len(str(MOST_RUNS)) or int(digits) > MOST_RUNS:
+        return [], f"{text!r} has too many values: at most {MOST_RUNS:,} runs can be planned"
     if start == stop:
         return [], f"{text!r} begins where it ends, at {start:g}"
     between = [f"{x:.12g}" for x in np.linspace(start, stop, int(parts[2])).tolist()]

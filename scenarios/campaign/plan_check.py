@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+from cosim.master import Master
 from fmus.build import cached
 from scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
 from scenarios.chosen import fmus_of, replacements, scenario_named
@@ -59,12 +60,15 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     """Check that the FMUs make up the scenario's system, as those that take the place of others need not.
 
+    The system is that of the first point: parameters change what units do, not how they are wired.
+
     Raises:
         InvalidFmu, WiringError, ScheduleError: they do not.
     """
     experiment = scenario_named(plan.scenario)
     given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
-    experiment().build(parse_parameters(experiment, given), plan.seed, lambda unit: fmus[unit])
+    system = experiment().build(parse_parameters(experiment, given), plan.seed, lambda unit: fmus[unit])
+    Master(system, plan.options)
 
 
 def _check_size(plan: CampaignPlan) -> None:

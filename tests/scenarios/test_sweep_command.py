@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 from own_crew import OwnCrew
 
 from cosim.exceptions import RecordNotWritten
+from fmus.build import cached
 from scenarios.campaign import dask_crew
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.campaign.campaign_table import CampaignTable
@@ -200,6 +201,7 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
         (["ir_grasp", "shift_least=0.01,0.06"], "at shift_least=0.06: shift_least 0.06 m must be at most"),
         (["ir_grasp", "--unit", "sceen=x.fmu"], "ir_grasp has no unit 'sceen': did you mean scene?"),
         (["ir_grasp", "--unit", "scene=absent.fmu"], "absent.fmu"),
+        (["ir_grasp", "-p", "strategy=reflex,blind"], "give it without -p: strategy=reflex,blind"),
         (["ir_grasp", "forward=0:0.3:20000", "--repeat", "9"], "are 180,000 runs; at most 100,000 can be planned"),
         (["ir_grasp", "--workers", "2", "--scheduler", "tcp://h:1"], "a scheduler has workers of its own"),
         (["ir_grasp", "--first-step", "0.1"], "with --adaptive only"),
@@ -212,6 +214,14 @@ def test_bad_calls_are_told_in_a_line_and_leave_nothing(
     assert result.exit_code == 2
     assert told in result.output
     assert len(result.output.splitlines()) == 1
+    assert begun == []
+    assert list(here.iterdir()) == []
+
+
+def test_a_unit_in_a_place_that_it_does_not_fit_is_told_at_once(here: Path, monkeypatch: pytest.MonkeyPatch):
+    result, begun = sweep(monkeypatch, *CALL, "--unit", f"reflex={cached('GraspScene', 3)}")
+    assert result.exit_code == 2, result.output
+    assert "reflex.sigma_cmd is an input, not an output" in result.output
     assert begun == []
     assert list(here.iterdir()) == []
 
