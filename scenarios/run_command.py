@@ -51,6 +51,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
 )
+@click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @click.help_option("-h", "--help")
 @ssp_options
 @_record_option(
@@ -67,7 +68,6 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     metavar="SECONDS",
     help="Write a checkpoint every so many simulated seconds, for `handover resume`.",
 )
-@click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @master_options
 @limit_options
 def run(

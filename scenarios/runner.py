@@ -81,6 +81,8 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     fmus = {n: u.description.path for n, u in master.system.units.items()}
     told = {**configuration(task), **files_and_forms(task), **presentation(task, master)}
     task.folder.write_run(told, fmus)
+    if not task.presented:
+        task.folder.figures.rmdir()
     master.heartbeat.tell(
         folder=str(task.folder.path),
         configuration=configuration(task),
