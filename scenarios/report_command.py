@@ -40,6 +40,8 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
         campaign = CampaignFolder(folder)
         if campaign.is_there:
             write_campaign_page(campaign, page)
+        elif not RunFolder.left_at(folder).is_there:
+            raise BadCall(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
         else:
             _write_of_run(RunFolder.left_at(folder), page, figures)
     click.echo(f"report: {page}")

@@ -88,6 +88,11 @@ class RunFolder:
         """The report page."""
         return self.path / "report.html"
 
+    @property
+    def is_there(self) -> bool:
+        """Whether a run has begun in it."""
+        return (self.path / "run.json").is_file()
+
     def make(self) -> None:
         """Make the folder.
 

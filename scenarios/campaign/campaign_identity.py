@@ -39,7 +39,9 @@ def differences(there: Mapping[str, Any], called: Mapping[str, Any]) -> list[str
         known = there.get(key)
         if known == value or (key == "repetitions" and isinstance(known, int) and known < value):
             continue
-        if key == "points":
+        if key == "repetitions" and isinstance(known, int):
+            told.append(f"{_both(key, known, value)} (a larger number adds runs, a smaller one takes none away)")
+        elif key == "points":
             told += _of_points(known, value)
         elif isinstance(value, dict) and isinstance(known, dict):
             told += _of_entries(key, cast(dict[str, Any], known), cast(dict[str, Any], value))

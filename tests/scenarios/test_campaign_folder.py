@@ -85,7 +85,10 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
         ({"fixed": {}}, "thing is cylinder there, not given in this call"),
         ({"seed": 5}, "seed is 0 there, 5 in this call"),
         ({"paired": True}, "paired is False there, True in this call"),
-        ({"repetitions": 1}, "repetitions is 2 there, 1 in this call"),
+        (
+            {"repetitions": 1},
+            "repetitions is 2 there, 1 in this call (a larger number adds runs, a smaller one takes none away)",
+        ),
         ({"experiment": "ir-table"}, "experiment is not given there, ir-table in this call"),
         (
             {"options": MasterOptions(algorithm=Algorithm.JACOBI)},
