@@ -1,5 +1,6 @@
 """Tells how far a campaign has come: a bar on a terminal, a line now and then elsewhere, as in a batch system's log."""
 
+import threading
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -12,6 +13,8 @@ from scenarios.campaign.tally import Tally
 
 _PAUSE = 30.0
 """Seconds from line to line where there is no terminal."""
+
+_STARTING = "starting workers"
 
 
 class CampaignProgress:
@@ -31,30 +34,53 @@ class CampaignProgress:
         console = Console(file=stream)
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.fields[left]}"))
         self._bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-        self._task = self._bar.add_task("", total=None, left="")
+        self._task = self._bar.add_task(_STARTING, total=None, left="")
+        self._telling, self._ended = threading.Lock(), threading.Event()
+        self._teller = threading.Thread(target=self._tell_while_nothing_ends, daemon=True)
 
     def __call__(self, tally: Tally) -> None:
         """Take how far it has come."""
         if self.tally is None:
-            self._began = self._told = self._clock()
+            self._began = self._clock()
         self.tally = tally
-        elapsed = self._clock() - self._began
-        done, left = told_done(tally), told_left(tally, elapsed)
         ended = tally.ended + tally.lost
-        self._bar.update(self._task, description=done, total=tally.total, completed=ended, left=left)
-        if self._bar.disable and self._clock() - self._told >= _PAUSE:
+        left = told_left(tally, self._clock() - self._began)
+        self._bar.update(self._task, description=told_done(tally), total=tally.total, completed=ended, left=left)
+        self.tell()
+
+    def tell(self) -> None:
+        """Write a line if one is due."""
+        with self._telling:
+            if not self._bar.disable or self._due() > 0:
+                return
             self._told = self._clock()
-            self._stream.write(f"{done}{', ' if left else ''}{left}\n")
+            tally = self.tally
+            left = told_left(tally, self._told - self._began) if tally else ""
+            self._stream.write(f"{told_done(tally) if tally else _STARTING}{', ' if left else ''}{left}\n")
             self._stream.flush()
 
     def __enter__(self) -> "CampaignProgress":
+        self._told = self._clock()
         self._bar.start()
+        if self._bar.disable:
+            self._teller.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._bar.stop()
+        self._ended.set()
+        if self._bar.disable:
+            self._teller.join()
+
+    def _due(self) -> float:
+        """Return in how many seconds the next line is due."""
+        return self._told + _PAUSE - self._clock()
+
+    def _tell_while_nothing_ends(self) -> None:
+        while not self._ended.wait(max(self._due(), 0.0)):
+            self.tell()
 
 
 def told_done(tally: Tally) -> str:

@@ -1,6 +1,8 @@
 """How far a campaign has come, as it is told."""
 
 import io
+import itertools
+import threading
 
 import pytest
 
@@ -39,6 +41,31 @@ def test_a_log_gets_a_line_every_half_minute():
         "8 of 10 runs done, 16 s left",
     ]
     assert progress.tally == Tally(total=10, ended=10)
+
+
+def test_a_log_gets_lines_also_before_the_first_run_has_ended():
+    now, stream = [0.0], io.StringIO()
+    with CampaignProgress(stream, lambda: now[0]) as progress:
+        now[0] = 30.0
+        progress.tell()
+        progress(Tally(total=10))
+        now[0] = 59.0
+        progress.tell()
+        now[0] = 60.0
+        progress.tell()
+    assert stream.getvalue().splitlines() == ["starting workers", "0 of 10 runs done"]
+
+
+def test_nobody_has_to_ask_for_a_line():
+    told = threading.Event()
+
+    class Stream(io.StringIO):
+        def flush(self) -> None:
+            told.set()
+
+    ticks = itertools.count(0.0, 31.0)
+    with CampaignProgress(Stream(), lambda: next(ticks)):
+        assert told.wait(60)
 
 
 class Terminal(io.StringIO):
