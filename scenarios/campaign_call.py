@@ -18,15 +18,13 @@ from scenarios.campaign.campaign_interruption import CampaignInterruption
 from scenarios.campaign.campaign_place import place_of
 from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.crew import Crew
 from scenarios.campaign.idle_crew import IdleCrew
+from scenarios.campaign.late_crew import LateCrew
 from scenarios.campaign.plan import CampaignPlan
 from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from scenarios.campaign.tally import Tally
+from scenarios.campaign.workforce import Workforce
 from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
-
-Workforce = Callable[[], contextlib.AbstractContextManager[Crew]]
-"""Gives those who carry out runs, when all else has been checked."""
 
 Finish = Callable[[CampaignFolder, CampaignTable], None]
 """Writes what is made of a campaign that has come to its end."""
@@ -47,7 +45,7 @@ class CampaignCall:
         return UNIT_FAILED if self.tally.failed or self.tally.lost else 0
 
 
-def workforce(workers: int | None, scheduler: str | None) -> Workforce:
+def workforce_of(workers: int | None, scheduler: str | None) -> Workforce:
     """Return workers of this machine, or those of a scheduler.
 
     Raises:
@@ -55,13 +53,7 @@ def workforce(workers: int | None, scheduler: str | None) -> Workforce:
     """
     if workers is not None and scheduler is not None:
         raise BadCall("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
-
-    def open_crew() -> contextlib.AbstractContextManager[Crew]:
-        from scenarios.campaign.dask_crew import crew_at, embedded_crew  # loading Dask takes half a second
-
-        return embedded_crew(workers) if scheduler is None else crew_at(scheduler)
-
-    return open_crew
+    return Workforce(workers, scheduler)
 
 
 def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, finish: Finish) -> CampaignCall:
@@ -75,12 +67,15 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
     progress = CampaignProgress(sys.stderr)
     folder = None
     try:
-        with CampaignInterruption(), told_in_one_line():
+        with CampaignInterruption() as interruption, told_in_one_line():
             plan = checked_plan(plan)
+            called = CampaignFolder(out) if out else None
+            _check_cheaply(plan, called, workers, interruption)
             fmus = unit_fmus(plan)
             check_units(plan, fmus)
-            folder = CampaignFolder(out) if out else place_of(plan, fmus)
-            folder.check(plan, fmus)  # before workers are started
+            folder = called or place_of(plan, fmus)
+            folder.check_free()
+            folder.check(plan, fmus)
             table = _carry_out(plan, folder, workers, progress)
             finish(folder, table)
     except KeyboardInterrupt:
@@ -92,11 +87,28 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
     return CampaignCall(plan, folder, table, tally)
 
 
+def _check_cheaply(
+    plan: CampaignPlan, folder: CampaignFolder | None, workers: Workforce, interruption: CampaignInterruption
+) -> None:
+    """Check what takes no units, which may have to be built."""
+    if folder is not None:
+        folder.check_free()
+    if folder is None or not folder.has_all(plan):
+        with interruption.at_once():  # a server that does not answer holds up asyncio's end
+            workers.check()
+
+
 def _carry_out(
     plan: CampaignPlan, folder: CampaignFolder, workers: Workforce, progress: CampaignProgress
 ) -> CampaignTable:
+    begins = not folder.has_all(plan)
+    if begins:
+        done = sum(map(folder.is_done, plan.runs()))
+        told = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
+        click.echo(f"{told}{f'; {done} are done' if done else ''}", err=True)
     try:
-        with contextlib.nullcontext(IdleCrew(workers)) if folder.has_all(plan) else workers() as crew, progress:
+        with contextlib.ExitStack() as opened, progress:
+            crew = LateCrew(workers.start, opened) if begins else IdleCrew(workers.start)
             return carry_out_campaign(plan, folder, crew, progress)
     except (RecordNotWritten, CrewLost) as e:
         if progress.tally is None:
@@ -107,7 +119,8 @@ def _carry_out(
 
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:
     if folder is None or progress.tally is None:
-        click.echo("Aborted!", err=True)
+        kept = folder is not None and folder.is_there
+        click.echo(f"Aborted! The same call goes on with {folder.path}" if folder and kept else "Aborted!", err=True)
         sys.exit(ABORTED)
     click.echo(f"{told_done(progress.tally)} in {folder.path}; the same call goes on", err=True)
     sys.exit(INTERRUPTED)

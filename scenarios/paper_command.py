@@ -16,7 +16,7 @@ from rich.text import Text
 from cosim.exceptions import nearest
 from scenarios.bad_call import BadCall
 from scenarios.campaign_arguments import campaign_options
-from scenarios.campaign_call import call_campaign, workforce
+from scenarios.campaign_call import call_campaign, workforce_of
 from scenarios.console import open_console
 from scenarios.headed_options import HeadedCommand
 
@@ -72,7 +72,7 @@ def paper(
     plan = carried_out.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
     finish = partial(_finish, carried_out, report=not no_report)
-    call = call_campaign(replace(plan, experiment=experiment), out, workforce(workers, scheduler), finish)
+    call = call_campaign(replace(plan, experiment=experiment), out, workforce_of(workers, scheduler), finish)
 
     from scenarios.published.told_results import print_results
 

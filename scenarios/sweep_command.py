@@ -14,7 +14,7 @@ from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.grid import parse_grid, set_parameters
 from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
 from scenarios.campaign_arguments import campaign_options
-from scenarios.campaign_call import call_campaign, workforce
+from scenarios.campaign_call import call_campaign, workforce_of
 from scenarios.chosen import replacements, scenario_named
 from scenarios.headed_options import HeadedCommand
 from scenarios.limit_arguments import limit_options, limits
@@ -84,7 +84,7 @@ def sweep(
     **coupling: Any,
 ) -> None:
     """Run a SCENARIO many times."""
-    crew = workforce(workers, scheduler)
+    crew = workforce_of(workers, scheduler)
     if is_ssp(scenario):
         raise BadCall(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
     experiment = scenario_named(scenario)

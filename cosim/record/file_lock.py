@@ -36,6 +36,22 @@ def unlock_file(file: IO[bytes]) -> None:
         fcntl.flock(file, fcntl.LOCK_UN)
 
 
+def holder_of(path: Path) -> int | None:
+    """Return the process that holds a folder by `folder_locked`, as Linux lists it; None where that is not known."""
+    try:
+        there = path.stat()
+        locks = Path("/proc/locks").read_text(encoding="ascii")
+    except (OSError, ValueError):
+        return None
+    place = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"
+    for line in locks.splitlines():
+        words = line.split()  # 1: FLOCK ADVISORY WRITE 4711 fe:01:123456 0 EOF
+        if "FLOCK" in words[:2] and place in words:
+            process = int(words[words.index(place) - 1])
+            return process if process > 0 else None
+    return None
+
+
 @contextlib.contextmanager
 def folder_locked(path: Path) -> Generator[None, None, None]:
     """Lock a folder, for those who would change what is in it, without a file of its own that could be left behind.

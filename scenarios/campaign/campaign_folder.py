@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from cosim.exceptions import one_line
-from cosim.record.file_lock import FileLocked, folder_locked
+from cosim.record.file_lock import FileLocked, folder_locked, holder_of
 from scenarios.campaign.campaign_identity import differences, identity_of
 from scenarios.campaign.plan import CampaignPlan, PlannedRun
 from scenarios.catalog import SCENARIOS
@@ -88,14 +88,24 @@ class CampaignFolder:
         if differ:
             raise BadRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
 
+    def check_free(self) -> None:
+        """Check that no other command is at work on it, if it is there.
+
+        Raises:
+            BadRunFolder: one is.
+        """
+        if self.path.is_dir():
+            with self._held():
+                pass
+
     @contextlib.contextmanager
     def opened(
         self, plan: CampaignPlan, fmus: Mapping[str, Path], check: Callable[[Path], None]
     ) -> Generator[dict[str, Path], None, None]:
         """Make the folder, or go on with it, and keep others from it; give the copies of the FMUs in it.
 
-        `check` is called with the folder before anything is written to it; if it raises, a folder that was not there
-        is removed.
+        `check` is called with the folder when it holds no more than `campaign.json`, by which another call finds it;
+        if it raises, all is as it was.
 
         Left-overs of runs that were killed are removed. A file's copy has its name, or, where two units have different
         files of one name, that of the unit before it.
@@ -109,8 +119,8 @@ class CampaignFolder:
             with self._made():
                 held.enter_context(self._held())
                 self.check(plan, fmus)  # another command may have made it meanwhile
-                check(self.path)
-                self._write(plan, fmus)
+                with self._written(plan, fmus):
+                    check(self.path)
             with told_if_not_written(self.path):
                 self.runs.mkdir(exist_ok=True)
                 self.fmus.mkdir(exist_ok=True)
@@ -156,7 +166,9 @@ class CampaignFolder:
             try:
                 held.enter_context(folder_locked(self.path))
             except FileLocked as e:
-                raise BadRunFolder(self.path, "another command is at work on this campaign") from e
+                by = holder_of(self.path)
+                process = f" (process {by})" if by else ""
+                raise BadRunFolder(self.path, f"another command carries this campaign out{process}") from e
             except OSError as e:
                 raise BadRunFolder(self.path, f"it cannot be opened: {e.strerror}") from e
             yield
@@ -164,6 +176,21 @@ class CampaignFolder:
     def _counts(self, entry: Path) -> bool:
         """Return whether something is more than what a call leaves that was killed before it wrote `campaign.json`."""
         return entry.name != f"{_FILE}.part" and not entry.name.startswith(".")
+
+    @contextlib.contextmanager
+    def _written(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> Generator[None, None, None]:
+        """Write `campaign.json`; where one is there, after what follows, and else remove it if that fails."""
+        was_there = self.is_there
+        if not was_there:
+            self._write(plan, fmus)
+        try:
+            yield
+        except BaseException:
+            if not was_there:
+                (self.path / _FILE).unlink(missing_ok=True)
+            raise
+        if was_there:
+            self._write(plan, fmus)
 
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Write `campaign.json`, before anything else is there: without it, nobody could go on."""

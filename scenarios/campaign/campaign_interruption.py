@@ -1,8 +1,9 @@
 """Ctrl-C during a campaign: the first ends it in order, the second at once."""
 
+import contextlib
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from functools import partial
 from types import FrameType, TracebackType
 
@@ -37,6 +38,15 @@ class CampaignInterruption:
     ) -> None:
         for undo in self._undo:
             undo()
+
+    @contextlib.contextmanager
+    def at_once(self) -> Generator[None, None, None]:
+        """Let the first signal end this process like the second, while there is nothing to put in order."""
+        before, self._asked = self._asked, True
+        try:
+            yield
+        finally:
+            self._asked = before
 
     def _take(self, _number: int, _frame: FrameType | None) -> None:
         if self._asked:

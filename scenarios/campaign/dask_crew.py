@@ -17,6 +17,7 @@ from scenarios.campaign.bad_crew import BadCrew
 from scenarios.campaign.cluster_crew import ClusterCrew
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.scheduler_address import scheduler_address
+from scenarios.campaign.workforce import cores
 
 _SILENT = logging.CRITICAL + 1
 _LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
@@ -93,11 +94,6 @@ def crew_at(address: str) -> Generator[Crew, None, None]:
         crew = ClusterCrew(client, whole)
         opened.callback(crew.end)
         yield crew
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager

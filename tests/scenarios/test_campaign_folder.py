@@ -1,6 +1,7 @@
 """A folder is of one campaign: another one, or something else, is refused and left as it was."""
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -139,7 +140,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path, fmus: dict[str, P
 
 def test_a_second_command_is_refused(folder: CampaignFolder, fmus: dict[str, Path]):
     with folder_locked(folder.path):
-        assert refusal(folder, PLAN, fmus) == "another command is at work on this campaign"
+        assert refusal(folder, PLAN, fmus) == f"another command carries this campaign out (process {os.getpid()})"
 
 
 def test_a_call_killed_before_it_told_its_campaign_is_no_obstacle(tmp_path: Path, fmus: dict[str, Path]):

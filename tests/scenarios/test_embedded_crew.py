@@ -16,8 +16,9 @@ from crew_orders import bad_order, order
 from living import family, lives, parent, servers, until
 
 from scenarios.campaign.crew import Crew
-from scenarios.campaign.dask_crew import cores, embedded_crew
+from scenarios.campaign.dask_crew import embedded_crew
 from scenarios.campaign.run_order import RunAnswer, RunOrder
+from scenarios.campaign.workforce import cores
 
 pytestmark = [
     pytest.mark.slow,

@@ -8,13 +8,17 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from clusters import closed_port
 from own_crew import OwnCrew
 
 from cosim.exceptions import RecordNotWritten
+from cosim.record.file_lock import folder_locked
 from fmus.build import cached
+from scenarios import campaign_call
 from scenarios.campaign import dask_crew
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.plan import CampaignPlan
 from scenarios.campaign.run_order import RunOrder
 from scenarios.command import main
 
@@ -29,7 +33,10 @@ CALL = [
     "--out",
     "c",
     "--no-report",
+    "--workers",
+    "2",
 ]
+BEGINNING = "2 runs of ir_grasp on 2 workers into c\n"
 ALL = ("000_forward=0.03_r0000", "001_forward=0.1_r0000")
 
 
@@ -93,7 +100,7 @@ def test_a_campaign_ends_with_a_row_for_each_point(monkeypatch: pytest.MonkeyPat
 @pytest.mark.slow
 def test_an_interrupted_call_goes_on(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(KeyboardInterrupt(), at=1))
-    assert (result.exit_code, result.output) == (1, "1 of 2 runs done in c; the same call goes on\n")
+    assert (result.exit_code, result.output) == (1, f"{BEGINNING}1 of 2 runs done in c; the same call goes on\n")
     assert len(CampaignTable.read(Path("c"))) == 1
     result, begun = sweep(monkeypatch, *CALL)
     assert (result.exit_code, begun) == (0, [ALL[1]])
@@ -123,12 +130,16 @@ def test_a_run_that_cannot_be_read_is_carried_out_again(here: Path, monkeypatch:
 
 
 def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyPatch):
-    call = [*CALL[:-3], "--no-report"]
+    call = [text for text in CALL if text not in ("--out", "c")]
     result, _ = sweep(monkeypatch, *call, before=raising(KeyboardInterrupt(), at=1))
     (folder,) = Path("campaigns").iterdir()
-    assert result.output == f"1 of 2 runs done in {folder}; the same call goes on\n"
+    assert result.output.splitlines() == [
+        f"2 runs of ir_grasp on 2 workers into {folder}",
+        f"1 of 2 runs done in {folder}; the same call goes on",
+    ]
     result, begun = sweep(monkeypatch, *call)
     assert (result.exit_code, begun) == (0, [ALL[1]])
+    assert result.stderr == f"2 runs of ir_grasp on 2 workers into {folder}; 1 are done\n"
     assert list(Path("campaigns").iterdir()) == [folder]
 
 
@@ -152,6 +163,7 @@ def test_a_full_disk_stops_and_what_is_done_stays(monkeypatch: pytest.MonkeyPatc
     assert result.exit_code == 3
     assert len(begun) == 2
     assert result.output == (
+        "6 runs of ir_grasp on 2 workers into c\n"
         "Error: c/runs/001_forward=0.1_r0000 cannot be written: No space left on device; "
         "1 of 6 runs done; the same call goes on\n"
     )
@@ -170,7 +182,8 @@ def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL)
     assert (result.exit_code, result.output) == (
         3,
-        "Error: c/runs.parquet cannot be written: No space left on device; 1 of 2 runs done; the same call goes on\n",
+        f"{BEGINNING}Error: c/runs.parquet cannot be written: No space left on device; "
+        "1 of 2 runs done; the same call goes on\n",
     )
     assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]
 
@@ -180,14 +193,14 @@ def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(CrewLost("the scheduler is gone"), at=1))
     assert (result.exit_code, result.output) == (
         3,
-        "Error: the scheduler is gone; 1 of 2 runs done; the same call goes on\n",
+        f"{BEGINNING}Error: the scheduler is gone; 1 of 2 runs done; the same call goes on\n",
     )
 
 
 def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytest.MonkeyPatch):
     refuse_workers(monkeypatch)
     result = CliRunner().invoke(main, CALL)
-    assert (result.exit_code, result.output) == (2, "Error: there are none\n")
+    assert (result.exit_code, result.output) == (2, f"{BEGINNING}Error: there are none\n")
     assert list(here.iterdir()) == []
 
 
@@ -215,6 +228,30 @@ def test_bad_calls_are_told_in_a_line_and_leave_nothing(
     assert told in result.output
     assert len(result.output.splitlines()) == 1
     assert begun == []
+    assert list(here.iterdir()) == []
+
+
+def test_a_campaign_under_way_is_refused_before_anything_else(here: Path, monkeypatch: pytest.MonkeyPatch):
+    def build(_plan: CampaignPlan) -> dict[str, Path]:
+        raise AssertionError("units are not to be built")
+
+    monkeypatch.setattr(campaign_call, "unit_fmus", build)
+    (here / "c").mkdir()
+    with folder_locked(here / "c"):
+        result, begun = sweep(monkeypatch, *CALL)
+    assert (result.exit_code, begun) == (2, [])
+    assert result.output.startswith("Error: output folder c: another command carries this campaign out")
+
+
+def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: pytest.MonkeyPatch):
+    def build(_plan: CampaignPlan) -> dict[str, Path]:
+        raise AssertionError("units are not to be built")
+
+    monkeypatch.setattr(campaign_call, "unit_fmus", build)
+    address = f"127.0.0.1:{closed_port()}"
+    result = CliRunner().invoke(main, [*CALL[:-2], "--scheduler", address])
+    assert result.exit_code == 2
+    assert result.output.startswith(f"Error: no scheduler can be reached at tcp://{address}: ")
     assert list(here.iterdir()) == []
 
 
