@@ -2,8 +2,9 @@
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -18,6 +19,7 @@ from scenarios.campaign.campaign_interruption import CampaignInterruption
 from scenarios.campaign.campaign_place import place_of
 from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.crew import Crew
 from scenarios.campaign.idle_crew import IdleCrew
 from scenarios.campaign.late_crew import LateCrew
 from scenarios.campaign.plan import CampaignPlan
@@ -76,7 +78,7 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
             folder = called or place_of(plan, fmus)
             folder.check_free()
             folder.check(plan, fmus)
-            table = _carry_out(plan, folder, workers, progress)
+            table = _carry_out(plan, folder, workers, interruption, progress)
             finish(folder, table)
     except KeyboardInterrupt:
         _end_interrupted(folder, progress)
@@ -99,7 +101,11 @@ def _check_cheaply(
 
 
 def _carry_out(
-    plan: CampaignPlan, folder: CampaignFolder, workers: Workforce, progress: CampaignProgress
+    plan: CampaignPlan,
+    folder: CampaignFolder,
+    workers: Workforce,
+    interruption: CampaignInterruption,
+    progress: CampaignProgress,
 ) -> CampaignTable:
     begins = not folder.has_all(plan)
     if begins:
@@ -108,13 +114,22 @@ def _carry_out(
         click.echo(f"{told}{f'; {done} are done' if done else ''}", err=True)
     try:
         with contextlib.ExitStack() as opened, progress:
-            crew = LateCrew(workers.start, opened) if begins else IdleCrew(workers.start)
+            start = partial(_started, workers, interruption)
+            crew = LateCrew(start, opened) if begins else IdleCrew(start)
             return carry_out_campaign(plan, folder, crew, progress)
     except (RecordNotWritten, CrewLost) as e:
         if progress.tally is None:
             raise
         stopped = WorkersLost if isinstance(e, CrewLost) else RunNotWritten
         raise stopped(f"{e}; {told_done(progress.tally)}; the same call goes on") from e
+
+
+@contextlib.contextmanager
+def _started(workers: Workforce, interruption: CampaignInterruption) -> Generator[Crew, None, None]:
+    with contextlib.ExitStack() as opened:
+        with interruption.held_back():
+            crew = opened.enter_context(workers.start())
+        yield crew
 
 
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:

@@ -22,7 +22,7 @@ class CampaignInterruption:
     """
 
     def __init__(self) -> None:
-        self._asked = False
+        self._asked = self._holds_back = False
         self._undo: list[Callable[[], object]] = []
 
     def __enter__(self) -> "CampaignInterruption":
@@ -48,9 +48,25 @@ class CampaignInterruption:
         finally:
             self._asked = before
 
+    @contextlib.contextmanager
+    def held_back(self) -> Generator[None, None, None]:
+        """Let the first signal count at the end of the block, as what is half started cannot be put in order.
+
+        Raises:
+            KeyboardInterrupt: at the end, if there was one.
+        """
+        self._holds_back = True
+        try:
+            yield
+        finally:
+            self._holds_back = False
+        if self._asked:
+            raise KeyboardInterrupt
+
     def _take(self, _number: int, _frame: FrameType | None) -> None:
         if self._asked:
             os.write(2, b"\nAborted!\n" if os.isatty(2) else b"Aborted!\n")
             leave(ABORTED)
         self._asked = True
-        raise KeyboardInterrupt
+        if not self._holds_back:
+            raise KeyboardInterrupt

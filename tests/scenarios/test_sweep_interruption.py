@@ -55,6 +55,18 @@ def test_ctrl_c_before_the_first_run_leaves_nothing(tmp_path: Path, monkeypatch:
     assert not out.exists()
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_as_workers_start_leaves_nothing_of_a_campaign_that_begins(number: signal.Signals, tmp_path: Path):
+    out = tmp_path / "c"
+    with sweeping(*CALL, "--out", out) as going:
+        wait_for(lambda: (out / "campaign.json").exists(), going)
+        going.send_signal(number)
+        status, told, errors = ended(going)
+    assert (status, told) == (130, "")
+    assert errors == f"200 runs of ir_grasp on 2 workers into {out}\nAborted!\n"
+    assert not out.exists()
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows")
 def test_a_second_signal_ends_it_at_once(capfd: pytest.CaptureFixture[str]):
     pid = os.fork()
