@@ -12,7 +12,7 @@ from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.runs_section import run_html
 from scenarios.reporting.section import Section
 
-_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 _EXAMPLES = 3
 _MOST_REASONS = 40
 
