@@ -9,6 +9,7 @@ import numpy as np
 
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
+from scenarios.campaign.shown_unit import unit_symbol
 from scenarios.conversions import conversions_of
 from scenarios.experiment import Metric, Outcome
 from scenarios.resumption import Spent
@@ -87,8 +88,8 @@ def parameter_rows(task: Task) -> list[tuple[str, str, str]]:
     rows: list[tuple[str, str, str]] = []
     for v in task.experiment.parameters():
         value = _plain(getattr(task.parameters, v.name))
-        unit = "" if v.unit.symbol == "1" else f" {v.unit.symbol}"
-        rows.append((v.name, _told(value) + unit, v.description))
+        unit = unit_symbol(v.unit.symbol)
+        rows.append((v.name, f"{_told(value)} {unit}".rstrip(), v.description))
     return rows
 
 

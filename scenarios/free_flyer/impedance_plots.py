@@ -43,7 +43,7 @@ def _to_the_end(values: Floats) -> Floats:
 
 def _push(parameters: Parameters, record: Record) -> TimePlot:
     signal, quantity, unit = (
-        ("push.f_G", "force", "N") if parameters.kind is Wrench.FORCE else ("push.tau_G", "torque", "N m")
+        ("push.f_G", "force", "N") if parameters.kind is Wrench.FORCE else ("push.tau_G", "torque", "N·m")
     )
     values = record[signal]
     curves = [Curve(label=axis, values=values[:, i], held=True) for i, axis in enumerate("xyz")]

@@ -11,7 +11,7 @@ from scenarios.reporting.time_plot import Curve, TimePlot
 BEYOND = 2.0
 """How far plots reach beyond what the thrusters give at most: a command may be twenty times as much."""
 
-QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N m"))
+QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N·m"))
 
 
 def commanded_wrench(record: Record, controllers: Sequence[str], what: str) -> Floats:

@@ -18,7 +18,8 @@ from scenarios.ir_grasp.plots import FINGER_NAMES, closing_cost, cost, in_sight
 from scenarios.plotting import COLOURS, figure, shade_phases
 from scenarios.record import Record
 
-FINGER_COLOURS = (COLOURS[1], COLOURS[2], COLOURS[0])
+FINGER_COLOURS = COLOURS[:3]
+"""Of thumb, index and ring, as the page gives them to the curves of the distances."""
 PALM_COLOUR, THING_COLOUR = "#c9d1db", "#ecd9b8"
 _GROUPS = {0: "reach", 1: "look", 2: "look", 3: "look", 4: "probe", 5: "step", 6: "close", 7: "pull", 8: "shake", 9: ""}
 """What is written over a phase: a look may include approaching and recovering motions."""

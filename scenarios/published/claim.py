@@ -1,7 +1,7 @@
 """What a paper claims, and how the campaign's runs bear on it."""
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,14 @@ class Verdict(str, enum.Enum):
     REPRODUCED = "reproduced"
     NOT_REPRODUCED = "not reproduced"
     NOT_COMPARABLE = "not comparable"
+
+
+_BEYOND = {
+    Verdict.REPRODUCED: "holds",
+    Verdict.NOT_REPRODUCED: "does not hold",
+    Verdict.NOT_COMPARABLE: "too few runs",
+}
+"""Verdicts in words on claims that nobody has published."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +48,11 @@ class Claim:
     where: str = ""
     beyond: bool = False
 
+    @property
+    def told_verdict(self) -> str:
+        """The verdict in words: that of a claim which nobody has published says whether it holds."""
+        return _BEYOND[self.verdict] if self.beyond else self.verdict.value
+
     def as_data(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
         return {
@@ -65,3 +78,9 @@ class Claim:
         rest: dict[str, Any] = {k: v for k, v in data.items() if k not in ("interval", "verdict")}
         low_high = None if interval is None else (float(interval[0]), float(interval[1]))
         return cls(interval=low_high, verdict=Verdict(data["verdict"]), **rest)
+
+
+def verdict_counts(claims: Sequence[Claim], beyond: bool) -> Sequence[tuple[int, Verdict, str]]:
+    """Return how many of a paper's claims, or of those beyond it, have each verdict that occurs, with its words."""
+    told = [(c.verdict, c.told_verdict) for c in claims if c.beyond is beyond]
+    return [(told.count(t), *t) for t in sorted(set(told), key=lambda t: list(Verdict).index(t[0]))]

@@ -98,7 +98,7 @@ def _own_success(own: Helix1Arm) -> Claim:
         measured=f"{own.succeeded} of {own.tried}",
         interval=(interval.low, interval.high),
         verdict=Verdict.REPRODUCED if own.succeeded == own.tried else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if every run does; the interval is Clopper and Pearson's.{_broken(own)}",
+        reason=f"Holds if every run does; the interval is Clopper and Pearson's.{_broken(own)}",
         beyond=True,
     )
 
@@ -120,7 +120,7 @@ def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
         measured=f"{np.median(ours):.4f} m against {np.median(theirs):.4f} m (medians)",
         interval=interval,
         verdict=Verdict.REPRODUCED if interval and interval[1] < 1.0 else Verdict.NOT_REPRODUCED,
-        reason="Reproduced if the bootstrap's interval of the ratio of medians, ours to the thesis's, lies below 1.",
+        reason="Holds if the bootstrap's interval of the ratio of medians, ours to the thesis's, lies below 1.",
     )
 
 

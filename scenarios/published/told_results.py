@@ -1,7 +1,5 @@
 """What the end of a published experiment prints: ours beside the published, and the verdicts with their reasons."""
 
-from collections import Counter
-
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
@@ -10,7 +8,7 @@ from rich.text import Text
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.console import open_console
-from scenarios.published.claim import Claim, Verdict
+from scenarios.published.claim import Claim, Verdict, verdict_counts
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.published_experiment import PublishedExperiment
 
@@ -30,8 +28,11 @@ def print_results(experiment: PublishedExperiment, table: CampaignTable, folder:
             console.print(f"\n{heading}", style="bold")
         for claim in told:
             _print_claim(console, claim)
-    counts = Counter(claim.verdict for claim in claims)
-    console.print("\nIn all: " + ", ".join(f"{counts[v]} {v.value}" for v in Verdict if counts[v]))
+    console.print()
+    for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
+        counts = verdict_counts(claims, beyond)
+        if counts:
+            console.print(f"{heading}: " + ", ".join(f"{n} {words}" for n, _, words in counts))
     console.print(f"claims: {folder.path / 'claims.json'}", markup=False, soft_wrap=True)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
     if folder.report.exists():
@@ -58,7 +59,7 @@ def _print_claim(console: Console, claim: Claim) -> None:
         unit = "" if claim.unit == "1" else f" {claim.unit}"
         figures.append(f"95 % interval: {claim.interval[0]:.3g} to {claim.interval[1]:.3g}{unit}")
     where = f" ({claim.where})" if claim.where else ""
-    console.print(Text.assemble((claim.verdict.value, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
+    console.print(Text.assemble((claim.told_verdict, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
     if figures:
         console.print(Padding(Text("; ".join(figures)), (0, 0, 0, 4), expand=False))
     console.print(Padding(Text(claim.reason, style="dim"), (0, 0, 0, 4), expand=False))

@@ -72,9 +72,9 @@ def order_claim(
         return nothing_measured(claim, where, published, beyond)
     test, n = paired_test(first, second), len(first)
     reason = (
-        f"Reproduced if McNemar's exact test of runs in the same scenes rejects at {told_share(LEVEL)}, in this "
-        f"direction: of {n} pairs only the first succeeded in {test.only_first}, only the second in "
-        f"{test.only_second}; p = {told_p(test.p)}. {note}"
+        f"{'Holds' if beyond else 'Reproduced'} if McNemar's exact test of runs in the same scenes rejects at "
+        f"{told_share(LEVEL)}, in this direction: of {n} pairs only the first succeeded in {test.only_first}, only the "
+        f"second in {test.only_second}; p = {told_p(test.p)}. {note}"
     )
     return Claim(
         claim=claim,
@@ -90,7 +90,7 @@ def order_claim(
 def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) -> Claim:
     """Judge, beyond the paper, that a first way does no worse than a second, each tried in the same scenes.
 
-    It is reproduced if the share of scenes in which only the second succeeds has an interval below 10 %. That a test of
+    It holds if the share of scenes in which only the second succeeds has an interval below 10 %. That a test of
     difference does not reject would not do: with few pairs it never does.
     """
     if not first:
@@ -98,7 +98,7 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
     test, n = paired_test(first, second), len(first)
     interval = success_interval(test.only_second, n)
     reason = (
-        "Reproduced if the share of scenes in which only the second succeeds has an interval (Clopper-Pearson) below "
+        "Holds if the share of scenes in which only the second succeeds has an interval (Clopper-Pearson) below "
         f"{told_share(FEW)}: of {n} pairs that is so in {test.only_second}, "
         f"{told_interval(interval.low, interval.high)}; the reverse in {test.only_first}; McNemar's p = "
         f"{told_p(test.p)}."

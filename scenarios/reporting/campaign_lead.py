@@ -8,23 +8,30 @@ from markupsafe import Markup
 from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.shown_unit import shown_unit
 from scenarios.catalog import SCENARIOS
-from scenarios.published.claim import Claim
+from scenarios.published.claim import Claim, verdict_counts
 from scenarios.reporting.claims_section import verdict_html
 
 _MOST_VALUES = 10
 
 
 def campaign_lead(results: CampaignResults, claims: Sequence[Claim]) -> Markup:
-    """Return verdict, claims by verdict, and the plan in sentences."""
-    scenario = SCENARIOS.get(results.scenario)
-    title = str(results.told.get("title", "" if scenario is None else scenario.title))
-    lines = [Markup("<p class='soft'>{}</p>").format(f"{results.scenario}: {title}"), _verdict(results)]
-    if claims:
-        counts = {c.verdict: sum(other.verdict is c.verdict for other in claims) for c in claims}
-        told = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v)) for v, n in counts.items())
-        lines.append(Markup("<p>{}: {}.</p>").format("Claim" if len(claims) == 1 else "Claims", told))
+    """Return what was run, verdict, claims by verdict, and the plan in sentences."""
+    lines = [Markup("<p class='soft'>{}</p>").format(_scenario(results)), _verdict(results)]
+    for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
+        counts = verdict_counts(claims, beyond)
+        if counts:
+            told = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
+            lines.append(Markup("<p>{}: {}.</p>").format(heading, told))
     lines.append(Markup("<p class='soft'>{}</p>").format(f"{_plan(results)} {_cost(results)}".strip()))
     return Markup("\n").join(lines)
+
+
+def _scenario(results: CampaignResults) -> str:
+    """Tell of the scenario what the page's title does not: its name below a paper's, else what it does."""
+    if results.told.get("experiment"):
+        return f"Runs of the scenario {results.scenario}."
+    scenario = SCENARIOS.get(results.scenario)
+    return str(results.told.get("title", "" if scenario is None else scenario.title))
 
 
 def _verdict(results: CampaignResults) -> Markup:

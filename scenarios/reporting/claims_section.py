@@ -11,39 +11,43 @@ from scenarios.reporting.rows_table import rows_table
 from scenarios.reporting.section import Section
 
 _HEADER = ("claim", "published", "ours", "95 % interval", "verdict")
+_HEADER_BEYOND = tuple(name for name in _HEADER if name != "published")
 _COLOURS = {Verdict.REPRODUCED: "good", Verdict.NOT_REPRODUCED: "bad", Verdict.NOT_COMPARABLE: "soft"}
 
 
 def claims_section(claims: Sequence[Claim]) -> Section | None:
     """Return the table of claims with their verdicts, this project's own below; None if there are none."""
     parts: list[Markup] = []
-    for beyond, title in ((False, ""), (True, "Beyond the paper")):
-        rows = [_row(c) for c in claims if c.beyond is beyond]
+    for beyond, title, header in ((False, "", _HEADER), (True, "Beyond the paper", _HEADER_BEYOND)):
+        rows = [_row(c, header) for c in claims if c.beyond is beyond]
         if rows:
-            heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in _HEADER)
+            heads = Markup().join(Markup("<th scope='col'>{}</th>").format(h) for h in header)
             heading = Markup("<h3>{}</h3>").format(title) if title else Markup()
             table = Markup("<table class='cards claims'><thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table>")
             parts.append(heading + table.format(heads, Markup("\n").join(rows)))
     return Section(anchor="claims", title="Claims", html=Markup("\n").join(parts)) if parts else None
 
 
-def verdict_html(verdict: Verdict) -> Markup:
-    """Return a verdict in its colour."""
-    return Markup("<b class='{}'>{}</b>").format(_COLOURS[verdict], verdict.value)
+def verdict_html(verdict: Verdict, words: str) -> Markup:
+    """Return the words of a verdict in its colour."""
+    return Markup("<b class='{}'>{}</b>").format(_COLOURS[verdict], words)
 
 
-def _row(claim: Claim) -> Markup:
+def _row(claim: Claim, header: Sequence[str]) -> Markup:
     where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
-    cells = (
-        Markup("{}{}").format(claim.claim, where),
-        claim.published,
-        claim.measured,
-        _span(claim),
-        Markup("{}<br><span class='soft'>{}</span>").format(verdict_html(claim.verdict), claim.reason),
-    )
+    verdict = verdict_html(claim.verdict, claim.told_verdict)
+    cells = {
+        "claim": Markup("{}{}").format(claim.claim, where),
+        "published": claim.published,
+        "ours": claim.measured,
+        "95 % interval": _span(claim),
+        "verdict": Markup("{}<br><span class='soft'>{}</span>").format(verdict, claim.reason),
+    }
     told = Markup().join(
-        Markup("<td data-label='{}'{}>{}</td>").format(name, Markup() if cell else Markup(" class='empty'"), cell)
-        for name, cell in zip(_HEADER, cells, strict=True)
+        Markup("<td data-label='{}'{}>{}</td>").format(
+            name, Markup() if cells[name] else Markup(" class='empty'"), cells[name]
+        )
+        for name in header
     )
     return Markup("<tr>{}</tr>").format(told)
 

@@ -77,7 +77,7 @@ def _plot(bars: Sequence[_Bar], in_all: float) -> Markup:
         [bar],
         {
             "xaxis": {"title": {"text": "CPU time (s)"}, "rangemode": "tozero"},
-            "yaxis": {"autorange": "reversed", "type": "category", "fixedrange": True, "showgrid": False},
+            "yaxis": {"autorange": "reversed", "type": "category", "dtick": 1, "fixedrange": True, "showgrid": False},
             "bargap": 0.3,
             "showlegend": False,
         },

@@ -12,7 +12,7 @@ from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.runs_section import run_html
 from scenarios.reporting.section import Section
 
-_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 _EXAMPLES = 3
 _MOST_REASONS = 40
 
@@ -38,7 +38,9 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
             Cell(str(len(g.rows)), len(g.rows)),
             Markup("<span class='bad brief'>{}</span>").format(g.kind),
             Markup("<div class='prose'>{}</div>").format(g.told),
-            Markup(", ").join(run_html(str(names[row]), folder) for row in g.rows[:_EXAMPLES]),
+            Markup("<span class='examples'>{}</span>").format(
+                Markup(", ").join(run_html(str(names[row]), folder) for row in g.rows[:_EXAMPLES])
+            ),
         )
         for g in groups[:_MOST_REASONS]
     ]

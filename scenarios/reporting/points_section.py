@@ -79,5 +79,10 @@ def _median(results: CampaignResults, point: PointResults, metric: str, unit: Sh
     told = f"{median * unit.factor:.4g}"
     span = time_interval(values) if with_interval and np.ptp(values) > 0.0 else None
     if span is not None:
-        told += f" ({span.low * unit.factor:.3g} to {span.high * unit.factor:.3g})"
+        told += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
     return Cell(told, median)
+
+
+def _short(x: float) -> str:
+    """Write a number to three digits, as long as they show all that stands before its point."""
+    return f"{x:.3g}" if abs(x) < 999.5 else f"{x:.4g}"

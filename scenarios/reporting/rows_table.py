@@ -24,6 +24,8 @@ def rows_table(
 ) -> Markup:
     """Return a table as HTML, which scrolls within itself where a page is narrow.
 
+    One that is sortable takes as much of the window as it needs, also beside the text.
+
     Args:
         header: names of the columns.
         rows: as many cells each.
@@ -42,8 +44,9 @@ def rows_table(
     attributes = [kind + label for kind, label in zip(kinds, labels, strict=True)]
     body = Markup("\n").join(Markup("<tr>{}</tr>").format(_cells(row, attributes)) for row in rows)
     return Markup(
-        "<div class='scroll'><table{}>{}<thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table></div>"
+        "<div class='scroll{}'><table{}>{}<thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table></div>"
     ).format(
+        " broad" if sortable else "",
         Markup(" class='sortable'") if sortable else Markup(" class='cards'") if cards else Markup(),
         Markup("<caption>{}</caption>").format(caption) if caption else Markup(),
         heads,

@@ -41,10 +41,15 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
         note += f"handover report {folder.name}/runs/NAME writes the page of a run."
     html = Markup(
         "<div class='controls'><label>Show runs with <input type='search' data-filters='all-runs' "
-        "placeholder='words, such as failed'></label></div>\n"
+        "placeholder='words, such as failed'></label>"
+        "<output class='soft' data-counts='all-runs'>{}</output></div>\n"
         "<div id='all-runs' class='tall'>{}</div><p class='soft'>{}</p>"
-    ).format(rows_table(header, rows, numbers=numbers, sortable=True), note)
+    ).format(_number_of(rows), rows_table(header, rows, numbers=numbers, sortable=True), note)
     return Section(anchor="runs", title="Runs", html=html, scripts=("campaign.js",))
+
+
+def _number_of(rows: Sequence[Any]) -> str:
+    return "1 run" if len(rows) == 1 else f"{len(rows)} runs"
 
 
 def run_html(name: str, folder: Path) -> Markup:

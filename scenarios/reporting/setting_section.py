@@ -36,7 +36,14 @@ def _part(title: str, rows: Mapping[str, str]) -> Markup:
 def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
     if not units:
         return Markup()
-    rows = [(name, u["fmu"], Markup("<code>{}</code>").format(u["sha256"][:12])) for name, u in units.items()]
+    rows = [
+        (
+            name,
+            Markup("<span class='name'>{}</span>").format(u["fmu"]),
+            Markup("<code>{}</code>").format(u["sha256"][:12]),
+        )
+        for name, u in units.items()
+    ]
     return Markup("<div><h3>FMUs</h3>{}</div>").format(rows_table(("unit", "file", "sha256"), rows))
 
 

@@ -3,7 +3,7 @@
 import re
 
 _PARTS = re.compile(r"(<script\b.*?</script>|<style\b.*?</style>|<[^>]+>)", re.DOTALL)
-_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|[kmµ]?m|[mµ]?s|m?N|k?g|m?rad|h|A|bar|k?Pa|[MG]B|N m|m/s|rad/s)(?![\w/]))")
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|[kmµ]?m|[mµ]?s|m?N|k?g|m?rad|h|A|bar|k?Pa|[MG]B|N·m|N m|m/s|rad/s)(?![\w/]))")
 _RANGE = re.compile(r"(?<=\d) to (?=-?\d)")
 _EQUAL = re.compile(r"\b(\w) ([=<]) (?=-?\d)")
 _SPACE = "\u00a0"

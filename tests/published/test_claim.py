@@ -1,10 +1,11 @@
-"""Claims go to JSON and back."""
+"""Claims go to JSON and back, and are told in words."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
-from scenarios.published.claim import Claim, Verdict
+from scenarios.published.claim import Claim, Verdict, verdict_counts
 from scenarios.published.comparison_table import ComparisonTable
 
 CLAIM = Claim(
@@ -27,6 +28,17 @@ def test_a_claim_comes_back_from_json_as_it_was(claim: Claim):
 
 def test_verdicts_are_written_in_words():
     assert CLAIM.as_data()["verdict"] == "not reproduced"
+
+
+def test_a_claim_beyond_the_paper_holds_or_not_and_is_counted_apart():
+    claims = [replace(CLAIM, verdict=v, beyond=b) for b in (True, False) for v in (*reversed(Verdict), CLAIM.verdict)]
+    assert claims[0].as_data()["verdict"] == "not comparable"
+    assert [(n, words) for n, _, words in verdict_counts(claims, beyond=True)] == [
+        (1, "holds"),
+        (2, "does not hold"),
+        (1, "too few runs"),
+    ]
+    assert [words for _, _, words in verdict_counts(claims, beyond=False)] == [v.value for v in Verdict]
 
 
 @pytest.mark.parametrize("change", [{"verdict": "perhaps"}, {"interval": [0.5]}, {"colour": "red"}])

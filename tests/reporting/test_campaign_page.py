@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,13 @@ def test_failures_are_one_if_but_their_numbers_differ(tmp_path: Path):
     assert "000_r0001, 001_r0001" in part
 
 
+def test_failures_are_one_if_but_a_numbers_sign_differs(tmp_path: Path):
+    table = replaced(table_of(POINTS), "reason", ["held", "-35 mm beside it", "held", "+22 mm beside it"])
+    html = page_of(tmp_path, told("ir_grasp", POINTS), table)
+    part = html[html.index('id="failures"') : html.index('id="runs"')]
+    assert part.count("mm beside it") == part.count("-35 mm beside it") == 1
+
+
 def test_what_runs_tell_is_no_html(tmp_path: Path):
     table = replaced(table_of(POINTS), "reason", ["</script><script>alert(1)</script>"] * 4)
     assert "<script>alert" not in page_of(tmp_path, told("ir_grasp", POINTS), table)
@@ -85,11 +93,13 @@ def test_claims_stand_with_their_verdicts(tmp_path: Path):
     claim = Claim(
         claim="it holds <more>", published="2", measured="3", verdict=Verdict.NOT_REPRODUCED, reason="3 is not 2"
     )
-    (tmp_path / "claims.json").write_text(json.dumps([claim.as_data()]), encoding="utf-8")
+    told_claims = [claim.as_data(), replace(claim, beyond=True).as_data()]
+    (tmp_path / "claims.json").write_text(json.dumps(told_claims), encoding="utf-8")
     write_campaign_page(folder)
     html = folder.report.read_text(encoding="utf-8")
     assert "it holds &lt;more&gt;" in html
-    assert "<b class='bad'>not reproduced</b>" in html
+    assert "The paper&#39;s claims: 1 <b class='bad'>not reproduced</b>." in html
+    assert "Beyond the paper: 1 <b class='bad'>does not hold</b>." in html
 
 
 @pytest.mark.parametrize(

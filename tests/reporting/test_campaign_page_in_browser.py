@@ -46,6 +46,7 @@ def test_a_metric_is_chosen_and_runs_are_sorted_and_filtered(browser: Browser, c
         page.fill("input[data-filters]", "LOST blind")
         assert page.locator("#all-runs tbody tr:visible").count() == 1
         assert rows.count() == 4
+        assert page.inner_text("[data-counts]").startswith("1 of 4 runs")
 
         page.set_viewport_size({"width": 400, "height": 800})
         wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")

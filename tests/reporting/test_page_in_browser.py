@@ -24,6 +24,7 @@ def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(browser: Brow
         page.select_option(".explorer select", ["scene.range"])
         wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")
         assert drawn(page) == [f"scene.range[{i}]" for i in (1, 2, 3)]
+        assert page.inner_text(".explorer .about").startswith("scene.range ")
         light = page.evaluate(TEXT_COLOURS)
         page.emulate_media(color_scheme="dark")
         wait_until(page, f"({TEXT_COLOURS}).every((c, k) => c !== {light}[k])")

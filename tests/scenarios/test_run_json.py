@@ -3,7 +3,8 @@
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner
@@ -13,12 +14,21 @@ from flyer_runs import run
 from cosim.system import System
 from fmus.build import cached
 from scenarios.command import main
+from scenarios.free_flyer.flyer_impedance import FlyerImpedance
 from scenarios.ir_grasp.ir_grasp import IrGrasp
+from scenarios.run_summary import parameter_rows
+from scenarios.task import Task
 from scenarios.told_system import told_system
 
 
 def read(out: Path, name: str) -> dict[str, Any]:
     return json.loads((out / name).read_text())
+
+
+def test_units_of_parameters_are_written_as_one_reads_them():
+    task = SimpleNamespace(experiment=FlyerImpedance(), parameters=FlyerImpedance.parameters_type())
+    told = {name: value for name, value, _ in parameter_rows(cast(Task, task))}
+    assert told["torque"].endswith(" N·m")
 
 
 def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):

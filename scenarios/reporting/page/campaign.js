@@ -35,14 +35,27 @@
     }));
   }
 
+  // Says how many rows are shown, and that there are more than one sees at once.
+  function count(box) {
+    const rows = [...box.querySelector("tbody").rows], left = rows.filter(row => !row.hidden).length;
+    const scrolled = box.querySelector(".scroll");
+    const beyond = scrolled.scrollHeight > scrolled.clientHeight + 1 || scrolled.scrollWidth > scrolled.clientWidth + 1;
+    const all = rows.length === 1 ? "1 run" : `${rows.length} runs`;
+    document.querySelector(`[data-counts="${box.id}"]`).textContent =
+      (left < rows.length ? `${left} of ${all}` : all) + (beyond ? "; the table scrolls" : "");
+  }
+
   for (const field of document.querySelectorAll("input[data-filters]")) {
-    const body = document.getElementById(field.dataset.filters).querySelector("tbody");
+    const box = document.getElementById(field.dataset.filters);
+    const body = box.querySelector("tbody");
     field.addEventListener("input", () => {
       const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
       for (const row of body.rows) {
         const text = row.textContent.toLowerCase();
         row.hidden = !words.every(word => text.includes(word));
       }
+      count(box);
     });
+    new ResizeObserver(() => count(box)).observe(box);
   }
 })();

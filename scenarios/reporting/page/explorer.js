@@ -9,6 +9,7 @@
   const byName = new Map(signals.map(s => [s.name, s]));
   const search = root.querySelector("input"), select = root.querySelector("select"), shown = root.querySelector(".shown");
   const chosen = new Set();
+  const about = Object.assign(document.createElement("div"), {className: "about soft"});
   let div = null;
 
   // Lists what is found, and what is shown besides: a click shows another signal instead, with Ctrl in addition.
@@ -94,12 +95,20 @@
     if (!div) {
       div = document.createElement("div");
       div.className = "plot";
-      shown.append(div);
+      shown.append(div, about);
     }
     const figure = figureOf([...chosen]);
+    about.replaceChildren(...[...chosen].map(name => byName.get(name)).filter(s => s.about).map(describe));
     div.dataset.height = HEIGHT * axesOf(figure) + 20;
     div.style.height ||= div.dataset.height + "px";
     return page.draw(div, figure);
+  }
+
+  function describe(s) {
+    const line = document.createElement("p"), name = document.createElement("code");
+    name.textContent = s.name;
+    line.append(name, ` ${s.about}`);
+    return line;
   }
 
   search.addEventListener("input", list);

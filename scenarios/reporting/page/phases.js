@@ -1,7 +1,7 @@
 // Shades the phases of time plots and names them: `layout.meta.phases` is a list of {from, to, name}.
 "use strict";
 (() => {
-  const LETTER = 6.6, UPRIGHT = 15, MARGINS = 70;  // px
+  const LETTER = 6.6, UPRIGHT = 15, MARGINS = 70, BUTTONS = 150, HIGH = 22;  // px
 
   function decorate(div, layout) {
     const phases = layout.meta?.phases;
@@ -10,14 +10,17 @@
     const pixels = Math.max(div.clientWidth - MARGINS, 1) / (high - low);
     const spans = phases.filter(p => p.to > low && p.from < high);
     layout.shapes = [...(layout.shapes ?? []), ...phases.flatMap((p, k) => k % 2 ? [shade(p)] : [])];
-    let up = 0;  // px that the longest upright name takes
+    let up = 0, right = 0;  // px that the longest upright name takes, and from the left how far names reach
     layout.annotations = [...(layout.annotations ?? []), ...spans.flatMap(p => {
       const from = Math.max(p.from, low), to = Math.min(p.to, high), wide = (to - from) * pixels;
-      if (wide > LETTER * p.name.length + 6) return [name(p, (from + to) / 2, 0)];
-      if (wide < UPRIGHT) return [];
+      const middle = ((from + to) / 2 - low) * pixels, level = wide > LETTER * p.name.length + 6;
+      if (!level && wide < UPRIGHT) return [];
+      right = Math.max(right, middle + (level ? LETTER * p.name.length : UPRIGHT) / 2);
+      if (level) return [name(p, (from + to) / 2, 0)];
       up = Math.max(up, LETTER * p.name.length - 14);
       return [name(p, (from + to) / 2, -90)];
     })];
+    if (right > (high - low) * pixels - BUTTONS) up += HIGH;  // Plotly's buttons come over what stands there
     layout.margin = {...layout.margin, t: 30 + up};
     div.dataset.more = up;
   }

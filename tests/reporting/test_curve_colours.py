@@ -1,0 +1,40 @@
+"""Curves have the page's colours, and what is also seen in space has there the colour of its curve."""
+
+import re
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from scenarios.ir_grasp.ir_grasp import IrGrasp
+from scenarios.ir_grasp.parameters import Parameters
+from scenarios.record import Record
+from scenarios.reporting.plot_html import COLOURS
+from scenarios.reporting.time_plots_section import time_figure
+
+PAGE = files("scenarios.reporting") / "page"
+
+
+def page_colours() -> list[dict[str, str]]:
+    """Return the colours of curves by name, by day and by night."""
+    both = (PAGE / "page.css").read_text(encoding="utf-8").split("prefers-color-scheme: dark")
+    return [dict(re.findall(r"--(c\d+): (#\w{6});", part)) for part in both]
+
+
+def test_the_page_has_as_many_colours_as_are_given_to_curves():
+    names = [f"c{k}" for k in range(COLOURS)]
+    assert [list(colours) for colours in page_colours()] == [names, names]
+    script = (PAGE / "page.js").read_text(encoding="utf-8")
+    assert re.findall(r'"(c\d+)"', script) == names
+    assert re.findall(r"c\.(c\d+)", script) == names
+    assert f"colour++ % {COLOURS}" in (PAGE / "explorer.js").read_text(encoding="utf-8")
+
+
+def test_a_finger_is_as_coloured_in_space_as_its_curve(grasp: Path):
+    record, parameters = Record(grasp / "signals.parquet"), Parameters()
+    distances = IrGrasp().plots(parameters, record)[0]
+    traces: tuple[Any, ...] = time_figure(distances, record).data  # pyright: ignore
+    names = {t.name.split(",")[0]: t.line.color for t in traces}
+    lines = {line.label: line.colour for line in IrGrasp().replay(parameters, record).lines}
+    day = page_colours()[0]
+    for finger in ("thumb", "index", "ring"):
+        assert lines[finger] == day[re.sub(r"var\(--(.*)\)", r"\1", names[finger])]
