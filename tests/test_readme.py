@@ -45,6 +45,9 @@ def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " build " in c]) == 2
     assert len([c for c in COMMANDS if " check " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
+    assert len([c for c in COMMANDS if " sweep " in c]) == 2
+    assert len([c for c in COMMANDS if " paper " in c]) == 1
+    assert len([c for c in COMMANDS if " report " in c]) == 1
 
 
 def test_the_make_targets_exist():
@@ -189,3 +192,16 @@ def test_the_runs_succeed(command: str, tmp_path: Path):
     done = handover(command, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "succeeded" in done.stdout
+    again = command_with(" report ")
+    if command.endswith(f" --out {again.split()[-1]}"):
+        assert handover(again, tmp_path).returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [c for c in COMMANDS if " sweep " in c or " paper " in c])
+def test_the_campaigns_end(command: str, tmp_path: Path):
+    done = handover(command, tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    tables = [*tmp_path.glob("*/runs.parquet"), *tmp_path.glob("campaigns/*/runs.parquet")]
+    assert len(tables) == 1
+    assert (tables[0].parent / "report.html").is_file()
