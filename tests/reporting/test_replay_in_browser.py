@@ -95,6 +95,7 @@ def test_a_scene_that_is_turned_while_it_plays_stays_turned(page: Page):
     page.get_by_role("button", name="reset view").click()
     move(page, 0)
     before = page.evaluate(eye)
+    page.locator(".replay-scene").scroll_into_view_if_needed()
     box = page.locator(".replay-scene").bounding_box()
     assert box is not None
     page.get_by_label("speed").select_option("0.5")
