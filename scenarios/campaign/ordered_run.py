@@ -86,7 +86,7 @@ def printing_to(log: BinaryIO):
 def finish(order: RunOrder, folder: Path, log: BinaryIO) -> str:
     """Name the folder of a run that has ended as the order says; return why it cannot be, and "" if it is.
 
-    What the run printed goes into its `log.txt`. A folder without a summary is removed.
+    What the run printed goes into its `log.txt`. A folder without a summary is left as it is.
     """
     named = Path(order.runs, order.name)
     if not (folder / "summary.json").exists():

@@ -5,13 +5,8 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from scenarios.campaign.ordered_run import carry_out_order
 from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.catalog import SCENARIOS
-from scenarios.interruption import Interruption
-from scenarios.parameters import parse_parameters
-from scenarios.run_folder import RunFolder
-from scenarios.runner import carry_out
-from scenarios.task import Task
 
 
 class OwnCrew:
@@ -35,19 +30,9 @@ class OwnCrew:
 
 
 def _run(order: RunOrder) -> None:
-    experiment = SCENARIOS[order.scenario]
     unfinished = Path(order.runs) / f".{order.name}"
-    task = Task(
-        experiment=experiment(),
-        parameters=parse_parameters(experiment, order.parameters),
-        seed=order.seed,
-        fmus={unit: Path(file) for unit, file in order.fmus.items()},
-        folder=RunFolder(unfinished),
-        options=order.options,
-        presented=False,
-    )
     try:
-        carry_out(task, lambda _t, _end: None, Interruption())
+        carry_out_order(order, unfinished)
     except BaseException:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
