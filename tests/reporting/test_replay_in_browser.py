@@ -89,28 +89,49 @@ def test_play_goes_on_until_it_is_paused_and_leaves_the_view_as_it_is(page: Page
     wait_until(page, f"{SCENE}._fullLayout.scene.camera.eye.x !== 0.5")
 
 
-@pytest.mark.slow
-def test_a_scene_that_is_turned_while_it_plays_stays_turned(page: Page):
-    eye = f"{SCENE}._fullLayout.scene.camera.eye"
-    page.get_by_role("button", name="reset view").click()
-    move(page, 0)
-    before = page.evaluate(eye)
+def azimuth(page: Page) -> float:
+    """Return from which side the scene is seen, an angle about the vertical (rad)."""
+    camera = page.evaluate(f"{SCENE}._fullLayout.scene.camera")
+    return np.arctan2(*(camera["eye"][axis] - camera["center"][axis] for axis in "yx"))
+
+
+def turn(page: Page, width: int) -> float:
+    """Draw the mouse to the right over the scene and return the angle that it stands for (rad).
+
+    Plotly turns further by what its camera coasts between two pictures.
+    """
     page.locator(".replay-scene").scroll_into_view_if_needed()
     box = page.locator(".replay-scene").bounding_box()
     assert box is not None
-    page.get_by_label("speed").select_option("0.5")
-    page.get_by_label("play", exact=True).click()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()
-    for step in range(15):
-        page.mouse.move(x + 8 * step, y)
+    page.mouse.move(x + width, y, steps=8)
     page.mouse.up()
+    return np.pi * width / box["height"]
+
+
+def test_a_scene_is_turned_by_all_of_the_mouses_way_right_after_a_picture(page: Page):
+    page.get_by_role("button", name="reset view").click()
+    move(page, 5)
+    before = azimuth(page)
+    turned = turn(page, 80)
+    wait_until(page, f"{SCENE}.dataset.frame === '5'")
+    assert abs(np.angle(np.exp(1j * (azimuth(page) - before)))) > 0.8 * turned
+
+
+@pytest.mark.slow
+def test_a_scene_that_is_turned_while_it_plays_stays_turned(page: Page):
+    page.get_by_role("button", name="reset view").click()
+    move(page, 0)
+    page.get_by_label("speed").select_option("0.5")
+    page.get_by_label("play", exact=True).click()
+    before = azimuth(page)
+    turned = turn(page, 80)
     seen = page.evaluate(f"{SCENE}.dataset.frame")
     wait_until(page, f"{SCENE}.dataset.frame !== '{seen}'")
     page.get_by_label("pause").click()
-    after = page.evaluate(eye)
-    assert np.hypot(after["x"] - before["x"], after["y"] - before["y"]) > 0.05
+    assert abs(np.angle(np.exp(1j * (azimuth(page) - before)))) > 0.8 * turned
     page.get_by_role("button", name="reset view").click()
 
 

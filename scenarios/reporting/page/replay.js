@@ -149,6 +149,13 @@ for (const replay of document.querySelectorAll(".replay")) {
     playing = requestAnimationFrame(step);
   }
 
+  // With each picture Plotly sets its camera upright anew, which takes half a second in which it hears no mouse; that
+  // it is upright once is enough. (plotly.js has no public name for this.)
+  function hear() {
+    const space = scene._fullLayout.scene._scene, setMode = space.updateFx;
+    space.updateFx = (mode, hover) => { if (space.camera.mode !== mode) setMode.call(space, mode, hover); };
+  }
+
   // Each picture puts the view where Plotly last saved it, which is at the end of a turn: time goes on, pictures wait.
   function follow() {
     const hold = () => { clearTimeout(held); held = Infinity; };
@@ -187,6 +194,7 @@ for (const replay of document.querySelectorAll(".replay")) {
   async function draw() {
     await Plotly.newPlot(scene, run.traces.map(look), layout(),
       {displayModeBar: false, responsive: true, scrollZoom: true, doubleClick: false});
+    hear();
     follow();
     guard();
     tell();
