@@ -1,21 +1,31 @@
 """What a published experiment leaves in its campaign's folder."""
 
 import json
+from collections.abc import Sequence
 
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.experiment import Figure
 from scenarios.published.published_experiment import PublishedExperiment
 from scenarios.run_folder import told_if_not_written, write_whole
 
 
-def write_results(experiment: PublishedExperiment, table: CampaignTable, folder: CampaignFolder) -> None:
-    """Write `claims.json`, a list of claims, and the figures.
+def write_claims(experiment: PublishedExperiment, table: CampaignTable, folder: CampaignFolder) -> None:
+    """Write `claims.json`, a list of claims.
 
     Raises:
-        RecordNotWritten: they cannot be written.
+        RecordNotWritten: it cannot be written.
     """
     claims = [claim.as_data() for claim in experiment.claims(table)]
+    write_whole(folder.path / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def draw_figures(experiment: PublishedExperiment, table: CampaignTable, folder: CampaignFolder) -> Sequence[Figure]:
+    """Draw the figures into `figures/`; return them in the order of a page.
+
+    Raises:
+        RecordNotWritten: there is no room.
+    """
     with told_if_not_written(folder.figures):
         folder.figures.mkdir(exist_ok=True)
-        experiment.draw(table, folder.figures)
-    write_whole(folder.path / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+        return experiment.draw(table, folder.figures)

@@ -6,6 +6,7 @@ from scenarios.campaign.campaign_figures import draw_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.point_layout import layout_of
 from scenarios.published.catalog import EXPERIMENTS
+from scenarios.published.results import draw_figures
 from scenarios.reporting.campaign_facts import read_claims, read_results
 from scenarios.reporting.campaign_lead import campaign_lead
 from scenarios.reporting.claims_section import claims_section, comparison_section
@@ -39,10 +40,9 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
     sections: list[Section | None] = [claims_section(claims)]
     with told_if_not_written(folder.figures):
         draw_campaign(results, folder.figures)
-        if experiment is not None and results.points:
-            sections.append(comparison_section(experiment.tables(results.table)))
-            folder.figures.mkdir(exist_ok=True)
-            sections.append(figures_section(experiment.draw(results.table, folder.figures), folder.figures))
+    if experiment is not None and results.points:
+        sections.append(comparison_section(experiment.tables(results.table)))
+        sections.append(figures_section(draw_figures(experiment, results.table, folder), folder.figures))
     if results.points:
         layout = layout_of(results)
         sections += [success_section(results, layout), spread_section(results, layout)]
