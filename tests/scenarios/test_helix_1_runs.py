@@ -16,7 +16,7 @@ from scenarios.campaign.dask_crew import embedded_crew
 from scenarios.campaign.plan_check import checked_plan
 from scenarios.published.claim import Verdict
 from scenarios.published.helix_1 import Helix1
-from scenarios.published.results import write_results
+from scenarios.published.results import draw_figures, write_claims
 
 FAST = {"alpha": "0.4", "control_period": "1.45", "place": "front", "tuning": "thesis"}
 
@@ -28,7 +28,8 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     plan = checked_plan(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
     place = CampaignFolder(folder)
     table = carry_out_campaign(plan, place, OwnCrew(), CampaignProgress(StringIO()))
-    write_results(Helix1(), table, place)
+    write_claims(Helix1(), table, place)
+    draw_figures(Helix1(), table, place)
     assert len(Helix1().tables(table)) == 4
     return {claim["claim"]: claim for claim in json.loads((folder / "claims.json").read_text("utf-8"))}
 

@@ -13,7 +13,7 @@ from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan_check import checked_plan
 from scenarios.published.ir_table import IrTable
 from scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
-from scenarios.published.results import write_results
+from scenarios.published.results import draw_figures, write_claims
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,8 @@ def test_a_table_tells_why_the_hand_closed(campaign: tuple[CampaignFolder, Campa
 
 def test_results_are_left_in_the_campaigns_folder(campaign: tuple[CampaignFolder, CampaignTable]):
     folder, table = campaign
-    write_results(IrTable(), table, folder)
+    write_claims(IrTable(), table, folder)
+    draw_figures(IrTable(), table, folder)
     left = {p.relative_to(folder.path) for p in folder.path.rglob("*") if "runs" not in p.parts}
     assert {Path("claims.json"), Path("figures/success_rates.svg"), Path("figures/final_distances.png")} <= left
     assert folder.read()["experiment"] == "ir-table"
