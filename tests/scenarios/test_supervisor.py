@@ -26,8 +26,9 @@ def arguments(tmp_path: Path) -> tuple[str | Path, ...]:
 
 
 def begun(going: "subprocess.Popen[str]", folder: Path) -> int:
-    """Wait until a run records, and return the process that does it."""
-    wait_until((folder / "r" / "signals.tail").exists, going)
+    """Wait until a run has recorded a row, and return the process that does it."""
+    tail = folder / "r" / "signals.tail"
+    wait_until(lambda: tail.exists() and any(tail.read_bytes()[16:24]), going)
     (child,) = Path(f"/proc/{going.pid}/task/{going.pid}/children").read_text().split()
     return int(child)
 
