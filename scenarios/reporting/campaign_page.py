@@ -1,11 +1,16 @@
 """Writes the page of a campaign, of what is in its folder."""
 
+from collections.abc import Sequence
 from pathlib import Path
+
+from markupsafe import Markup
 
 from scenarios.campaign.campaign_figures import draw_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.point_layout import layout_of
 from scenarios.published.catalog import EXPERIMENTS
+from scenarios.published.published_experiment import PublishedExperiment
 from scenarios.published.results import draw_figures
 from scenarios.reporting.campaign_facts import read_claims, read_results
 from scenarios.reporting.campaign_lead import campaign_lead
@@ -38,11 +43,10 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
     named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
     experiment = None if named is None else named()
     sections: list[Section | None] = [claims_section(claims)]
+    if experiment is not None and results.points:
+        sections += _published(experiment, results, folder)
     with told_if_not_written(folder.figures):
         draw_campaign(results, folder.figures)
-    if experiment is not None and results.points:
-        sections.append(comparison_section(experiment.tables(results.table)))
-        sections.append(figures_section(draw_figures(experiment, results.table, folder), folder.figures))
     if results.points:
         layout = layout_of(results)
         sections += [success_section(results, layout), spread_section(results, layout)]
@@ -55,3 +59,16 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
     ]
     title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
     write_page(file or folder.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
+
+
+def _published(
+    experiment: PublishedExperiment, results: CampaignResults, folder: CampaignFolder
+) -> Sequence[Section | None]:
+    """Return published values beside ours, and the experiment's figures; a section that says why where it cannot."""
+    try:
+        tables = experiment.tables(results.table)
+        figures = draw_figures(experiment, results.table, folder)
+    except KeyError as e:
+        html = Markup("<p>The campaign is of another version of {}, so this is left out: its runs have no {}.</p>")
+        return [Section(anchor="comparison", title="Published and ours", html=html.format(experiment.name, e.args[0]))]
+    return [comparison_section(tables), figures_section(figures, folder.figures)]
