@@ -83,13 +83,13 @@ def paper(
 def _finish(experiment: PublishedExperiment, folder: CampaignFolder, table: CampaignTable, *, report: bool) -> None:
     """Write claims, figures and, if it is wanted, the page, which draws the figures by itself."""
     from scenarios.published.results import draw_figures, write_claims
-    from scenarios.reporting.campaign_page import write_campaign_page
+    from scenarios.reporting.campaign_page import write_campaign_report
 
     write_claims(experiment, table, folder)
     if report and not folder.is_reported:
-        write_campaign_page(folder)
+        write_campaign_report(folder)
     else:
-        draw_figures(experiment, table, folder)
+        draw_figures(experiment, table, folder.runs, folder.figures)
 
 
 def _list(experiments: Iterable[type[PublishedExperiment]]) -> None:

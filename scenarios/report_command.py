@@ -7,7 +7,7 @@ import click
 from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.left_run import complete_signals
-from scenarios.reporting.campaign_page import write_campaign_page
+from scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report
 from scenarios.reporting.run_facts import RunFacts
 from scenarios.reporting.run_figures import draw_run
 from scenarios.reporting.run_page import write_run_page
@@ -39,7 +39,7 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
             check_place(folder)
         campaign = CampaignFolder(folder)
         if campaign.is_there:
-            write_campaign_page(campaign, page)
+            (write_campaign_report if figures else write_campaign_page)(campaign, page)
         elif not RunFolder.left_at(folder).is_there:
             raise BadCall(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
         else:

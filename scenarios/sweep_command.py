@@ -111,6 +111,6 @@ def sweep(
 def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
     if folder.is_reported:
         return
-    from scenarios.reporting.campaign_page import write_campaign_page  # what draws takes long to load
+    from scenarios.reporting.campaign_page import write_campaign_report  # what draws takes long to load
 
-    write_campaign_page(folder)
+    write_campaign_report(folder)

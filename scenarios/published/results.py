@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
@@ -20,12 +21,12 @@ def write_claims(experiment: PublishedExperiment, table: CampaignTable, folder: 
     write_whole(folder.path / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 
 
-def draw_figures(experiment: PublishedExperiment, table: CampaignTable, folder: CampaignFolder) -> Sequence[Figure]:
-    """Draw the figures into `figures/`; return them in the order of a page.
+def draw_figures(experiment: PublishedExperiment, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
+    """Draw the figures into a folder, of runs whose folders are in `runs`; return them in the order of a page.
 
     Raises:
         RecordNotWritten: there is no room.
     """
-    with told_if_not_written(folder.figures):
-        folder.figures.mkdir(exist_ok=True)
-        return experiment.draw(table, folder.figures)
+    with told_if_not_written(folder):
+        folder.mkdir(exist_ok=True)
+        return experiment.draw(table, runs, folder)

@@ -1,5 +1,6 @@
 """Writes the page of a campaign, of what is in its folder."""
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,7 +30,7 @@ from scenarios.run_folder import told_if_not_written
 
 
 def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:
-    """Write a campaign's, or a paper's, page and its `figures/`; the campaign need not be complete.
+    """Write a campaign's, or a paper's, page; the campaign need not be complete, and nothing else is written.
 
     Args:
         folder: the campaign's.
@@ -39,14 +40,30 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
         BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
         RecordNotWritten: there is no room.
     """
-    results, claims = read_results(folder), read_claims(folder)
+    with tempfile.TemporaryDirectory(prefix="handover-") as figures:
+        _write(folder, read_results(folder), Path(figures), file)
+
+
+def write_campaign_report(folder: CampaignFolder, file: Path | None = None) -> None:
+    """Write the page, and the figures of the campaign and of its paper into `figures/`.
+
+    Raises:
+        BadRunFolder, RecordNotWritten: as `write_campaign_page`.
+    """
+    results = read_results(folder)
+    _write(folder, results, folder.figures, file)
+    with told_if_not_written(folder.figures):
+        draw_campaign(results, folder.figures)
+
+
+def _write(folder: CampaignFolder, results: CampaignResults, figures: Path, file: Path | None) -> None:
+    """Write the page; a paper's figures are drawn into a folder on the way."""
+    claims = read_claims(folder)
     named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
     experiment = None if named is None else named()
     sections: list[Section | None] = [claims_section(claims)]
     if experiment is not None and results.points:
-        sections += _published(experiment, results, folder)
-    with told_if_not_written(folder.figures):
-        draw_campaign(results, folder.figures)
+        sections += _published(experiment, results, folder.runs, figures)
     if results.points:
         layout = layout_of(results)
         sections += [success_section(results, layout), spread_section(results, layout)]
@@ -62,13 +79,13 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
 
 
 def _published(
-    experiment: PublishedExperiment, results: CampaignResults, folder: CampaignFolder
+    experiment: PublishedExperiment, results: CampaignResults, runs: Path, figures: Path
 ) -> Sequence[Section | None]:
     """Return published values beside ours, and the experiment's figures; a section that says why where it cannot."""
     try:
         tables = experiment.tables(results.table)
-        figures = draw_figures(experiment, results.table, folder)
+        drawn = draw_figures(experiment, results.table, runs, figures)
     except KeyError as e:
         html = Markup("<p>The campaign is of another version of {}, so this is left out: its runs have no {}.</p>")
         return [Section(anchor="comparison", title="Published and ours", html=html.format(experiment.name, e.args[0]))]
-    return [comparison_section(tables), figures_section(figures, folder.figures)]
+    return [comparison_section(tables), figures_section(drawn, figures)]
