@@ -1,6 +1,7 @@
 """A campaign's points in numbers: successes, and the median of the metrics that matter, with intervals."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from markupsafe import Markup
@@ -24,9 +25,10 @@ def points_section(results: CampaignResults) -> Section | None:
     metrics = results.headline[:_MOST_METRICS]
     units = {m: shown_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
     with_intervals = len(points) * len(metrics) <= _MOST_BOOTSTRAPS
+    written = _written(results)
     rows = [
         (
-            *_values(results, point),
+            *_values(results, point, written),
             str(len(point.rows)),
             *_success(point),
             *(_median(results, point, m, units[m], with_intervals) for m in metrics),
@@ -48,15 +50,20 @@ def points_section(results: CampaignResults) -> Section | None:
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
 
 
-def _values(results: CampaignResults, point: PointResults) -> list[Cell]:
+def _written(results: CampaignResults) -> Mapping[str, ShownUnit]:
+    """Return in which unit the values of each varied number are written."""
+    texts = {n: {p.values[n] for p in results.points if n in p.values} for n in results.varied if results.is_number(n)}
+    return {name: shown_unit(results.unit(name), list(map(float, values))) for name, values in texts.items()}
+
+
+def _values(results: CampaignResults, point: PointResults, written: Mapping[str, ShownUnit]) -> list[Cell]:
     cells: list[Cell] = []
     for name in results.varied:
         text = point.values.get(name)
         if text is None:
             cells.append(Cell("–"))
-        elif results.is_number(name):
-            texts = [float(p.values[name]) for p in results.points if name in p.values]
-            cells.append(Cell(shown_unit(results.unit(name), texts).text(float(text)), float(text)))
+        elif name in written:
+            cells.append(Cell(written[name].text(float(text)), float(text)))
         else:
             cells.append(Cell(text.replace("_", " ")))
     return cells or [Cell("all runs")]
