@@ -3,18 +3,12 @@
 import math
 from collections.abc import Mapping
 
-import numpy as np
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults, PointResults
 from scenarios.campaign.shown_unit import ShownUnit, shown_unit
-from scenarios.campaign.statistics import time_interval
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
-
-_MOST_METRICS = 4
-_MOST_BOOTSTRAPS = 150
-"""Of one page: each takes some 20 ms."""
 
 
 def points_section(results: CampaignResults) -> Section | None:
@@ -22,16 +16,15 @@ def points_section(results: CampaignResults) -> Section | None:
     points = results.points
     if not points:
         return None
-    metrics = results.headline[:_MOST_METRICS]
+    metrics = results.told_first
     units = {m: shown_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
-    with_intervals = len(points) * len(metrics) <= _MOST_BOOTSTRAPS
     written = _written(results)
     rows = [
         (
             *_values(results, point, written),
             str(len(point.rows)),
             *_success(point),
-            *(_median(results, point, m, units[m], with_intervals) for m in metrics),
+            *(_median(results, point, m, units[m]) for m in metrics),
         )
         for point in points
     ]
@@ -44,7 +37,7 @@ def points_section(results: CampaignResults) -> Section | None:
     )
     first = len(header) - 3 - len(metrics)
     told = "Of the runs done. Intervals of success rates: Clopper and Pearson"
-    told += "; of medians: bootstrap, from three values on." if with_intervals and metrics else "."
+    told += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
     note = Markup("<p class='soft'>{}</p>").format(told)
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
@@ -77,14 +70,11 @@ def _success(point: PointResults) -> tuple[Cell, Cell]:
     return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(told, point.rate)
 
 
-def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit, with_interval: bool) -> Cell:
-    values = results.table.column(metric)[point.done]
-    values = values[np.isfinite(values)]
-    if not len(values):
+def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit) -> Cell:
+    median, span = results.median(point, metric)
+    if math.isnan(median):
         return Cell("–", math.nan)
-    median = float(np.median(values))
     told = f"{median * unit.factor:.4g}"
-    span = time_interval(values) if with_interval and np.ptp(values) > 0.0 else None
     if span is not None:
         told += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
     return Cell(told, median)
