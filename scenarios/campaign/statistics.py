@@ -69,9 +69,7 @@ def success_interval(successes: int, n: int) -> Interval:
     return Interval(low, high, "Clopper-Pearson")
 
 
-def time_interval(
-    values: ArrayLike, statistic: Statistic = np.median, seed: int = 0, confidence: float = 1.0 - LEVEL
-) -> Interval | None:
+def time_interval(values: ArrayLike, statistic: Statistic = np.median) -> Interval | None:
     """Return the bootstrap's interval (BCa) for a statistic of values, such as np.median or np.mean.
 
     Where BCa is not defined, as where no single value left out moves the statistic, it is the percentile interval, and
@@ -88,9 +86,9 @@ def time_interval(
                 (x,),
                 statistic,
                 n_resamples=RESAMPLES,
-                confidence_level=confidence,
+                confidence_level=1.0 - LEVEL,
                 method=method,
-                rng=np.random.default_rng(seed),
+                rng=np.random.default_rng(0),
             ).confidence_interval
         if np.isfinite(ci.low) and np.isfinite(ci.high):
             return Interval(float(ci.low), float(ci.high), told)
