@@ -9,10 +9,10 @@ import numpy as np
 
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
-from scenarios.campaign.shown_unit import unit_symbol
 from scenarios.conversions import conversions_of
 from scenarios.experiment import Metric, Outcome
 from scenarios.resumption import Spent
+from scenarios.shown_unit import unit_symbol
 from scenarios.task import Task
 from scenarios.told_system import told_system
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from cosim.variable import Kind, Variable
 from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.shown_unit import shown_unit
 from scenarios.campaign.statistics import Interval, success_interval, time_interval
 from scenarios.catalog import SCENARIOS
+from scenarios.shown_unit import shown_unit
 
 _MOST_METRICS = 4
 _MOST_INTERVALS = 150

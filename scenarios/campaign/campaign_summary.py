@@ -12,11 +12,11 @@ from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_progress import told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.shown_unit import shown_unit
 from scenarios.campaign.statistics import success_interval
 from scenarios.campaign.tally import Tally
 from scenarios.chosen import scenario_named
 from scenarios.console import open_console
+from scenarios.shown_unit import shown_unit
 
 _MOST_POINTS = 12
 _MOST_REASONS = 5

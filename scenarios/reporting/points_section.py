@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults, PointResults
-from scenarios.campaign.shown_unit import ShownUnit, shown_unit
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
+from scenarios.shown_unit import ShownUnit, shown_unit
 
 
 def points_section(results: CampaignResults) -> Section | None:

@@ -10,9 +10,9 @@ import numpy as np
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.shown_unit import ShownUnit, shown_unit
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
+from scenarios.shown_unit import ShownUnit, shown_unit
 
 _MOST_ROWS = 2000
 _MOST_METRICS = 6

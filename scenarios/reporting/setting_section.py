@@ -6,9 +6,9 @@ from typing import Any, cast
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.shown_unit import shown_unit
 from scenarios.reporting.rows_table import rows_table
 from scenarios.reporting.section import Section
+from scenarios.shown_unit import shown_unit
 
 
 def setting_section(results: CampaignResults) -> Section:
