@@ -63,7 +63,7 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
             for chosen, marker, width in ((fine, "o", 0.0), (~fine, "x", 1.1)):
                 x, y = _ordered(layout, places[chosen], values[chosen])
                 axes.plot(x, y, marker, ms=4, mew=width, color=colour, alpha=0.6)
-            _median(axes, layout, k, results.median(point, name), unit)
+            _median(axes, layout, k, (results.median(point, name), results.median_interval(point, name)), unit)
         _place(axes, layout)
         _across(axes, layout, unit.axis(words), None)
     told = results.table.description(name) or words

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.ports import Floats
 from cosim.variable import Kind, Variable
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.statistics import Interval, success_interval, time_interval
@@ -59,7 +60,7 @@ class CampaignResults:
     def __init__(self, told: Mapping[str, Any], table: CampaignTable) -> None:
         self.told, self.table = told, table
         self._values: list[Mapping[str, str]] = list(told["points"])
-        self._medians: dict[tuple[int, str], tuple[float, Interval | None]] = {}
+        self._intervals: dict[tuple[int, str], Interval | None] = {}
 
     @property
     def scenario(self) -> str:
@@ -158,19 +159,23 @@ class CampaignResults:
         """Whether medians have intervals, which would take too long for very many points."""
         return len(self.points) * len(self.told_first) <= _MOST_INTERVALS
 
-    def median(self, point: PointResults, metric: str) -> tuple[float, Interval | None]:
-        """Return a metric's median over the runs done, NaN if none has it, and its interval by bootstrap.
+    def median(self, point: PointResults, metric: str) -> float:
+        """Return a metric's median over the runs done; NaN if none has it."""
+        values = self._measured_at(point, metric)
+        return float(np.median(values)) if len(values) else np.nan
 
-        The interval is None also where it says nothing, as the values are fewer than three or all the same.
-        """
+    def median_interval(self, point: PointResults, metric: str) -> Interval | None:
+        """Return the interval of a median by bootstrap; None where the values are fewer than three, or all the same."""
         key = (point.number, metric)
-        if key not in self._medians:
-            values = self.table.column(metric)[point.done]
-            values = values[np.isfinite(values)]
+        if key not in self._intervals:
+            values = self._measured_at(point, metric)
             varies = self.has_intervals and len(values) > 0 and np.ptp(values) > 0.0
-            middle = float(np.median(values)) if len(values) else np.nan
-            self._medians[key] = middle, time_interval(values) if varies else None
-        return self._medians[key]
+            self._intervals[key] = time_interval(values) if varies else None
+        return self._intervals[key]
+
+    def _measured_at(self, point: PointResults, metric: str) -> Floats:
+        values = self.table.column(metric)[point.done]
+        return values[np.isfinite(values)]
 
     def value_text(self, parameter: str, text: str) -> str:
         """Return a parameter's value as one reads it in a label."""

@@ -71,7 +71,7 @@ def _success(point: PointResults) -> tuple[Cell, Cell]:
 
 
 def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit) -> Cell:
-    median, span = results.median(point, metric)
+    median, span = results.median(point, metric), results.median_interval(point, metric)
     if math.isnan(median):
         return Cell("–", math.nan)
     told = f"{median * unit.factor:.4g}"
