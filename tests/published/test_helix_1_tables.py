@@ -16,7 +16,7 @@ def test_table_1_has_the_papers_rows_with_ours_beside():
     rows = {row[0]: row[1:] for row in table.rows}
     assert table.header[5:] == ["0.4 published", "0.4 ours"]
     assert rows["Minimum"][4:] == ["14.6", "20.0"]
-    assert rows["Median"][4:] == ["22.3", "23.0 [21.0, 25.0]"]
+    assert rows["Median"][4:] == ["22.3", "23.0 (21.0 to 25.0)"]
     assert rows["Maximum"][4:] == ["29.5", "26.0"]
     assert rows["Mean"][:2] == ["104.8 ± 52.0", "100.0 ± 50.0"]
     assert rows["Timestep"][4:] == ["1.45 ± 0.05", "1.45"]
