@@ -1,12 +1,11 @@
 """Runs the free-flyer's scenarios as the command does, on the built FMUs."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from fmus.build import cached
 from scenarios.ended import Ended
-from scenarios.experiment import Experiment, Figure
+from scenarios.experiment import Experiment
 from scenarios.interruption import Interruption
 from scenarios.parameters import parse_parameters
 from scenarios.run_folder import RunFolder
@@ -15,16 +14,14 @@ from scenarios.task import Task
 
 
 def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:
-    """Run a scenario with parameters as the command takes them; without figures unless `drawn`."""
-    experiment = scenario()
-    if not drawn:
-        vars(experiment)["draw"] = _draw_nothing
+    """Run a scenario with parameters as the command takes them; without figures and report unless `drawn`."""
     task = Task(
-        experiment=experiment,
+        experiment=scenario(),
         parameters=parse_parameters(scenario, given),
         seed=seed,
         fmus={name: cached(unit, 3) for name, unit in scenario.units.items()},
         folder=RunFolder(out),
+        presented=drawn,
     )
     return carry_out(task, _tell_nobody, Interruption())
 
@@ -37,7 +34,3 @@ def metric(ended: Ended, name: str) -> float:
 
 def _tell_nobody(*_: float) -> None:
     pass
-
-
-def _draw_nothing(*_: Any) -> Sequence[Figure]:
-    return []

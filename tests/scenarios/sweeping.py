@@ -1,7 +1,6 @@
 """Campaigns by the real command, in processes of their own, for tests that disturb them."""
 
 import contextlib
-import json
 import subprocess
 import sys
 import time
@@ -44,9 +43,9 @@ def end(going: "subprocess.Popen[Any]") -> None:
     going.wait()
 
 
-def workers_of(going: Going) -> list[psutil.Process]:
-    """Return the processes of an embedded cluster's workers."""
-    children = psutil.Process(going.pid).children()
+def workers_of(process: int) -> list[psutil.Process]:
+    """Return the workers that a process has started: an embedded cluster, or a nanny."""
+    children = psutil.Process(process).children()
     return [p for p in children if any("spawn_main" in text for text in p.cmdline())]
 
 
@@ -70,22 +69,3 @@ def without_times(folder: Path) -> list[dict[str, Any]]:
     """Return a campaign's rows without what depends on how fast it went."""
     times = ("wall_", "cpu_", "pace_", "peak_memory")
     return [{k: v for k, v in row.items() if not k.startswith(times)} for row in CampaignTable.read(folder).rows]
-
-
-@contextlib.contextmanager
-def cluster(folder: Path, workers: int) -> Generator[str, None, None]:
-    """Start a scheduler and workers as a user does; give the scheduler's address."""
-    told = folder / "scheduler.json"
-    dask = [sys.executable, "-m", "dask"]
-    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)]
-    worker = ["worker", "--scheduler-file", str(told), "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1"]
-    with contextlib.ExitStack() as started:
-        log = started.enter_context((folder / "cluster.log").open("w"))
-        for call in [scheduler, *[worker] * workers]:
-            process = subprocess.Popen([*dask, *call], stdout=log, stderr=log, cwd=folder)
-            started.callback(end, process)
-        deadline = time.monotonic() + 120
-        while not told.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        yield json.loads(told.read_text())["address"]

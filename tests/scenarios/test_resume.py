@@ -62,7 +62,7 @@ def slow(*values: Any) -> Any:
         slow("ir_grasp", 3, 7, signal.SIGINT),
         slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
         slow("vsl_hybrid", 0.5, 1.2, signal.SIGKILL),
-        slow("helix_handover", 2, 5, signal.SIGKILL),
+        slow("helix_handover -p alpha=0.4 -p tuning=thesis", 2, 5, signal.SIGKILL),
     ],
 )
 def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
