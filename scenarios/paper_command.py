@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,10 +18,12 @@ from scenarios.campaign_arguments import campaign_options
 from scenarios.campaign_call import call_campaign, workforce_of
 from scenarios.console import open_console
 from scenarios.headed_options import HeadedCommand
+from scenarios.run_folder import BadRunFolder
 
 if TYPE_CHECKING:
     from scenarios.campaign.campaign_folder import CampaignFolder
     from scenarios.campaign.campaign_table import CampaignTable
+    from scenarios.published.paper_results import PaperResults
     from scenarios.published.published_experiment import PublishedExperiment
 
 _HELP = """Carry out a paper's EXPERIMENT, and put what comes out beside what was published.
@@ -71,25 +72,38 @@ def paper(
     carried_out = EXPERIMENTS[experiment]()
     plan = carried_out.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
-    finish = partial(_finish, carried_out, report=not no_report)
+    finish = _Finish(carried_out, report=not no_report)
     call = call_campaign(replace(plan, experiment=experiment), out, workforce_of(workers, scheduler), finish)
 
     from scenarios.published.told_results import print_results
 
-    print_results(carried_out, call.table, call.folder)
+    print_results(carried_out, finish.results, call.folder)
     sys.exit(call.status)
 
 
-def _finish(experiment: PublishedExperiment, folder: CampaignFolder, table: CampaignTable, *, report: bool) -> None:
-    """Write claims, figures and, if it is wanted, the page, which draws the figures by itself."""
-    from scenarios.published.results import draw_figures, write_claims
-    from scenarios.reporting.campaign_page import write_campaign_page
+class _Finish:
+    """Writes claims, figures and, if it is wanted, the page of a campaign, and keeps its `results`."""
 
-    write_claims(experiment, table, folder)
-    if report and not folder.is_reported:
-        write_campaign_page(folder)
-    else:
-        draw_figures(experiment, table, folder)
+    results: PaperResults
+
+    def __init__(self, experiment: PublishedExperiment, report: bool) -> None:
+        self._experiment, self._report = experiment, report
+
+    def __call__(self, folder: CampaignFolder, table: CampaignTable) -> None:
+        from scenarios.published.paper_results import PaperResults
+        from scenarios.published.results import draw_figures, write_claims
+        from scenarios.reporting.campaign_page import write_campaign_report
+
+        try:
+            self.results = PaperResults.of(self._experiment, table)
+        except KeyError as e:
+            fault = f"it is of another version of {self._experiment.name}: its runs have no {e.args[0]}"
+            raise BadRunFolder(folder.path, fault) from e
+        write_claims(self.results.claims, folder)
+        if self._report and not folder.is_reported:
+            write_campaign_report(folder, paper=self.results)
+        else:
+            draw_figures(self._experiment, table, folder.runs, folder.figures)
 
 
 def _list(experiments: Iterable[type[PublishedExperiment]]) -> None:

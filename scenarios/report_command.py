@@ -6,11 +6,6 @@ import click
 
 from scenarios.bad_call import BadCall, told_in_one_line
 from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.left_run import complete_signals
-from scenarios.reporting.campaign_page import write_campaign_page
-from scenarios.reporting.run_facts import RunFacts
-from scenarios.reporting.run_figures import draw_run
-from scenarios.reporting.run_page import write_run_page
 from scenarios.run_folder import RunFolder, check_place
 
 _HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
@@ -39,7 +34,7 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
             check_place(folder)
         campaign = CampaignFolder(folder)
         if campaign.is_there:
-            write_campaign_page(campaign, page)
+            _write_of_campaign(campaign, page, figures)
         elif not RunFolder.left_at(folder).is_there:
             raise BadCall(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
         else:
@@ -47,7 +42,18 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
     click.echo(f"report: {page}")
 
 
+def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> None:
+    from scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report  # they take long to load
+
+    (write_campaign_report if figures else write_campaign_page)(campaign, page)
+
+
 def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
+    from scenarios.left_run import complete_signals
+    from scenarios.reporting.run_facts import RunFacts
+    from scenarios.reporting.run_figures import draw_run
+    from scenarios.reporting.run_page import write_run_page
+
     with left.held():
         RunFacts.read(left)  # before anything is completed: it may be no run's folder at all
         complete_signals(left)

@@ -9,12 +9,13 @@ import numpy as np
 
 from cosim.exceptions import UnitFailure
 from cosim.master import Master
-from scenarios.campaign.shown_unit import unit_symbol
 from scenarios.conversions import conversions_of
 from scenarios.experiment import Metric, Outcome
 from scenarios.resumption import Spent
+from scenarios.shown_unit import unit_symbol
 from scenarios.task import Task
 from scenarios.told_system import told_system
+from scenarios.told_value import told_value
 
 UnitRow = tuple[str, str, str, int | None, float | None]
 """Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
@@ -89,7 +90,7 @@ def parameter_rows(task: Task) -> list[tuple[str, str, str]]:
     for v in task.experiment.parameters():
         value = _plain(getattr(task.parameters, v.name))
         unit = unit_symbol(v.unit.symbol)
-        rows.append((v.name, f"{_told(value)} {unit}".rstrip(), v.description))
+        rows.append((v.name, f"{told_value(value)} {unit}".rstrip(), v.description))
     return rows
 
 
@@ -114,9 +115,3 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     name = getattr(value, "name", None)
     return value if name is None else name.lower()
-
-
-def _told(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:g}"
-    return str(value).lower() if isinstance(value, bool) else str(value)

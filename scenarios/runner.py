@@ -17,7 +17,6 @@ from scenarios.experiment import Outcome, Watch
 from scenarios.interruption import Interruption
 from scenarios.record import Record
 from scenarios.reporting.kept_pictures import write_pictures
-from scenarios.reporting.run_page import write_run_page
 from scenarios.resumption import Resumption, Spent, pack
 from scenarios.run_folder import told_if_not_written
 from scenarios.run_metrics import run_metrics
@@ -159,6 +158,8 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
 
 
 def _present(task: Task, watch: Watch) -> None:
+    from scenarios.reporting.run_page import write_run_page  # its plots take long to load
+
     record = Record(task.folder.signals) if task.folder.signals.exists() else None
     if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
         task.experiment.draw(task.parameters, watch, record, task.folder.figures)

@@ -102,15 +102,16 @@ def sweep(
         )
     call = call_campaign(plan, out, crew, (lambda _folder, _table: None) if no_report else _write_report)
 
-    from scenarios.campaign.campaign_summary import print_campaign  # its statistics take long to load
+    from scenarios.campaign.campaign_results import CampaignResults  # its statistics take long to load
+    from scenarios.campaign.campaign_summary import print_campaign
 
-    print_campaign(call.plan, call.table, call.tally, call.folder)
+    print_campaign(CampaignResults(call.folder.read(), call.table), call.tally, call.folder)
     sys.exit(call.status)
 
 
 def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
     if folder.is_reported:
         return
-    from scenarios.reporting.campaign_page import write_campaign_page  # what draws takes long to load
+    from scenarios.reporting.campaign_page import write_campaign_report  # what draws takes long to load
 
-    write_campaign_page(folder)
+    write_campaign_report(folder)

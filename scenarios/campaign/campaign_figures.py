@@ -1,5 +1,6 @@
 """Figures of a campaign for papers: success rates and metrics by point, with intervals."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,14 +10,10 @@ from matplotlib.axes import Axes
 from cosim.ports import Floats
 from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.point_layout import PointLayout, layout_of
-from scenarios.campaign.shown_unit import ShownUnit, shown_unit
-from scenarios.campaign.statistics import time_interval
+from scenarios.campaign.statistics import Interval
 from scenarios.experiment import Figure
 from scenarios.plotting import COLOURS, figure
-
-_MOST_METRICS = 4
-_MOST_INTERVALS = 60
-"""Points above which medians have none: each takes some 20 ms."""
+from scenarios.shown_unit import ShownUnit, shown_unit
 
 _LINE = 0.24
 """Height of a point of a list, in inches."""
@@ -36,7 +33,7 @@ def draw_campaign(results: CampaignResults, folder: Path) -> list[Figure]:
     if layout.listed and len(results.points) > _MOST_LISTED:
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    metrics = results.headline[:_MOST_METRICS]
+    metrics = results.told_first
     return [_success(results, layout, folder), *(_metric(results, layout, name, folder) for name in metrics)]
 
 
@@ -66,24 +63,20 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
             for chosen, marker, width in ((fine, "o", 0.0), (~fine, "x", 1.1)):
                 x, y = _ordered(layout, places[chosen], values[chosen])
                 axes.plot(x, y, marker, ms=4, mew=width, color=colour, alpha=0.6)
-            if len(results.points) <= _MOST_INTERVALS:
-                _median(axes, layout, k, (column[point.done], unit))
+            _median(axes, layout, k, (results.median(point, name), results.median_interval(point, name)), unit)
         _place(axes, layout)
         _across(axes, layout, unit.axis(words), None)
     told = results.table.description(name) or words
-    caption = (
-        f"{told[0].upper()}{told[1:]}: runs that succeeded (discs) and others (crosses); medians of the runs done "
+    caption = f"{told[0].upper()}{told[1:]}: runs that succeeded (discs) and others (crosses); medians of the runs done"
+    return Figure(
+        f"{name}_by_point", caption + (" with their 95 % bootstrap intervals." if results.has_intervals else ".")
     )
-    return Figure(f"{name}_by_point", caption + "with their 95 % bootstrap intervals.")
 
 
-def _median(axes: Axes, layout: PointLayout, k: int, measured: tuple[Floats, ShownUnit]) -> None:
-    values, unit = measured
-    values = values[np.isfinite(values)]
-    if not len(values):
+def _median(axes: Axes, layout: PointLayout, k: int, measured: tuple[float, Interval | None], unit: ShownUnit) -> None:
+    median, span = measured
+    if math.isnan(median):
         return
-    median = float(np.median(values))
-    span = time_interval(values) if np.ptp(values) > 0.0 else None
     low, high = (median, median) if span is None else (span.low, span.high)
     scaled = (low * unit.factor, median * unit.factor, high * unit.factor)
     _bar(axes, layout, float(layout.places[k]) + 0.38 * layout.room, scaled, "#1c2330")

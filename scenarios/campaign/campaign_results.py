@@ -8,11 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.ports import Floats
 from cosim.variable import Kind, Variable
 from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.shown_unit import shown_unit
-from scenarios.campaign.statistics import Interval, success_interval
+from scenarios.campaign.statistics import Interval, success_interval, time_interval
 from scenarios.catalog import SCENARIOS
+from scenarios.shown_unit import shown_unit
+
+_MOST_METRICS = 4
+_MOST_INTERVALS = 150
+"""Medians of a campaign above which they have no intervals: each takes some 20 ms."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +43,7 @@ class PointResults:
         """Share of the runs done that succeeded; NaN if none is done."""
         return self.successes / len(self.done) if len(self.done) else np.nan
 
-    @property
+    @cached_property
     def interval(self) -> Interval | None:
         """Interval of the rate; None if no run is done."""
         return success_interval(self.successes, len(self.done)) if len(self.done) else None
@@ -55,6 +60,7 @@ class CampaignResults:
     def __init__(self, told: Mapping[str, Any], table: CampaignTable) -> None:
         self.told, self.table = told, table
         self._values: list[Mapping[str, str]] = list(told["points"])
+        self._intervals: dict[tuple[int, str], Interval | None] = {}
 
     @property
     def scenario(self) -> str:
@@ -114,6 +120,11 @@ class CampaignResults:
         columns = [n if n in self.table.metrics else f"{n}_metric" for n in first]
         return tuple(n for n in columns if n in self.measured and not n.startswith(("cpu_", "pace_")))
 
+    @property
+    def told_first(self) -> tuple[str, ...]:
+        """Those of `headline` that tables and figures of points have room for."""
+        return self.headline[:_MOST_METRICS]
+
     @cached_property
     def measured(self) -> tuple[str, ...]:
         """Columns of the metrics that any run has a value of, the headline's first and those of the cost last."""
@@ -142,6 +153,29 @@ class CampaignResults:
                 successes = int(np.count_nonzero(success[done] == np.True_))
                 found.append(PointResults(number=k, values=values, rows=rows, done=done, successes=successes))
         return found
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether medians have intervals, which would take too long for very many points."""
+        return len(self.points) * len(self.told_first) <= _MOST_INTERVALS
+
+    def median(self, point: PointResults, metric: str) -> float:
+        """Return a metric's median over the runs done; NaN if none has it."""
+        values = self._measured_at(point, metric)
+        return float(np.median(values)) if len(values) else np.nan
+
+    def median_interval(self, point: PointResults, metric: str) -> Interval | None:
+        """Return the interval of a median by bootstrap; None where the values are fewer than three, or all the same."""
+        key = (point.number, metric)
+        if key not in self._intervals:
+            values = self._measured_at(point, metric)
+            varies = self.has_intervals and len(values) > 0 and np.ptp(values) > 0.0
+            self._intervals[key] = time_interval(values) if varies else None
+        return self._intervals[key]
+
+    def _measured_at(self, point: PointResults, metric: str) -> Floats:
+        values = self.table.column(metric)[point.done]
+        return values[np.isfinite(values)]
 
     def value_text(self, parameter: str, text: str) -> str:
         """Return a parameter's value as one reads it in a label."""

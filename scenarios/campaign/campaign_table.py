@@ -1,6 +1,6 @@
 """The table of a campaign: a row for each run that has ended."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -89,28 +89,6 @@ class CampaignTable:
             KeyError: there is no such column.
         """
         return self._told(name, "description")
-
-    def where(self, **values: Any) -> "CampaignTable":
-        """Return the rows in which columns, such as parameters, have the given values; numbers may be texts.
-
-        Raises:
-            KeyError: there is no such column. ValueError: a text is no number where the column has numbers.
-        """
-        fits = np.ones(len(self), dtype=bool)
-        for name, value in values.items():
-            fits &= self._equals(name, value)
-        return CampaignTable(self.table.filter(pa.array(fits)))
-
-    def _equals(self, name: str, value: Any) -> NDArray[np.bool_]:
-        kind = self._kind(name)
-        if isinstance(value, str) and pa.types.is_boolean(kind):
-            value = value.lower() == "true"
-        elif isinstance(value, str) and (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
-            value = float(value)
-        elif pa.types.is_list(kind):
-            wanted = list(map(float, value.split(",") if isinstance(value, str) else cast(Sequence[float], value)))
-            return np.array([row == wanted for row in self.column(name)], dtype=bool)
-        return np.array([row == value for row in self.column(name)], dtype=bool)
 
     def _kind(self, name: str) -> pa.DataType:
         return cast(Any, self.table.schema.field(self._known(name))).type

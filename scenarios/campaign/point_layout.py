@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.ports import Floats
 from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.shown_unit import shown_unit
+from scenarios.shown_unit import shown_unit
 
 _MOST_COLOURS = 6
 _MOST_NAMES = 10

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import binomtest, bootstrap, fisher_exact
+from scipy.stats import beta, binomtest, bootstrap, fisher_exact
 
 LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
@@ -56,21 +56,20 @@ class PairedTest:
         return self.p < LEVEL and self.only_first > self.only_second
 
 
-def success_interval(successes: int, n: int, confidence: float = 1.0 - LEVEL) -> Interval:
-    """Return the interval of Clopper and Pearson for a rate of success.
+def success_interval(successes: int, n: int) -> Interval:
+    """Return the interval of Clopper and Pearson for a rate of success, whose ends are quantiles of beta distributions.
 
     Raises:
         ValueError: there are no trials, or more successes than trials.
     """
     if n < 1 or not 0 <= successes <= n:
         raise ValueError(f"{successes} successes of {n} trials: there must be a trial, and a success is one of them")
-    ci = binomtest(successes, n).proportion_ci(confidence_level=confidence, method="exact")
-    return Interval(float(ci.low), float(ci.high), "Clopper-Pearson")
+    low = float(beta.ppf(LEVEL / 2, successes, n - successes + 1)) if successes else 0.0
+    high = float(beta.ppf(1.0 - LEVEL / 2, successes + 1, n - successes)) if successes < n else 1.0
+    return Interval(low, high, "Clopper-Pearson")
 
 
-def time_interval(
-    values: ArrayLike, statistic: Statistic = np.median, seed: int = 0, confidence: float = 1.0 - LEVEL
-) -> Interval | None:
+def time_interval(values: ArrayLike, statistic: Statistic = np.median) -> Interval | None:
     """Return the bootstrap's interval (BCa) for a statistic of values, such as np.median or np.mean.
 
     Where BCa is not defined, as where no single value left out moves the statistic, it is the percentile interval, and
@@ -87,9 +86,9 @@ def time_interval(
                 (x,),
                 statistic,
                 n_resamples=RESAMPLES,
-                confidence_level=confidence,
+                confidence_level=1.0 - LEVEL,
                 method=method,
-                rng=np.random.default_rng(seed),
+                rng=np.random.default_rng(0),
             ).confidence_interval
         if np.isfinite(ci.low) and np.isfinite(ci.high):
             return Interval(float(ci.low), float(ci.high), told)

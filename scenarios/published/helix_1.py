@@ -69,7 +69,7 @@ class Helix1(PublishedExperiment):
         arms = [Helix1Arm.of(table, tuning) for tuning in (Tuning.THESIS, Tuning.OWN)]
         return [made(arm) for arm in arms if arm.tried for made in (table_1, steps, by_place, fig_9)]
 
-    def draw(self, table: CampaignTable, folder: Path) -> Sequence[Figure]:
+    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
         """Draw the times by step size, and the error over time as in fig. 8."""
         arms = [arm for arm in (Helix1Arm.of(table, tuning) for tuning in (Tuning.THESIS, Tuning.OWN)) if arm.tried]
-        return [*draw_times(arms, folder), *draw_errors(arms, folder)]
+        return [*draw_times(arms, folder), *draw_errors(arms, runs, folder)]

@@ -46,9 +46,8 @@ def draw_times(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
     return [Figure("times", caption)]
 
 
-def draw_errors(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
-    """Draw the controller's error over time, mean and deviation by step size, from the records beside the figures."""
-    runs = folder.parent / "runs"
+def draw_errors(arms: Sequence[Helix1Arm], runs: Path, folder: Path) -> list[Figure]:
+    """Draw the controller's error over time, mean and deviation by step size, from the runs' records."""
     errors = {arm.tuning: {alpha: _errors(arm, alpha, runs) for alpha in arm.alphas} for arm in arms}
     drawn = [arm for arm in arms if any(errors[arm.tuning].values())]
     if not drawn:

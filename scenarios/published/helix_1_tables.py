@@ -5,11 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cosim.ports import Floats
-from scenarios.campaign.statistics import Statistic, time_interval
+from scenarios.campaign.statistics import Statistic
 from scenarios.helix_handover.parameters import Place, Tuning
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.helix_1_arm import Helix1Arm
 from scenarios.published.helix_1_telling import published
+from scenarios.published.telling import told_median
 
 _ON_EQUAL_BOUNDS = (
     " The thesis's ε_pose,bound and ε_control are both 5 mm. One iteration of the Jacobian loop leaves about "
@@ -24,7 +25,7 @@ def table_1(arm: Helix1Arm) -> ComparisonTable:
     header = ["α", *(f"{alpha} {whose}" for alpha in arm.alphas for whose in ("published", "ours"))]
     rows = [
         _row("Minimum", there["arm_time_min"], arm, lambda x: _figure(x, np.min)),
-        _row("Median", there["arm_time_median"], arm, lambda x: _with_interval(x, np.median)),
+        _row("Median", there["arm_time_median"], arm, lambda x: told_median(x, 1)),
         _row("Maximum", there["arm_time_max"], arm, lambda x: _figure(x, np.max)),
         _row("Mean", _plus_minus(there["arm_time_mean"], there["arm_time_std"]), arm, _mean),
         ["Timestep"],
@@ -52,7 +53,7 @@ def steps(arm: Helix1Arm) -> ComparisonTable:
         x, step = arm.metric("steps", alpha), there["timestep_mean"][i]
         ends = [f"{there[f'arm_time_{end}'][i] / step:.0f}" for end in ("min", "max")]
         ours = ["–".join(_figure(x, end, 0) for end in (np.min, np.max)) if len(x) else ""]
-        rows.append([str(alpha), str(there["steps_median"][i]), "–".join(ends), _with_interval(x, np.median, 0), *ours])
+        rows.append([str(alpha), str(there["steps_median"][i]), "–".join(ends), told_median(x, 0), *ours])
     header = ["α", "published median", "published range", "our median", "our range"]
     note = "Published: times of table 1 over its mean time steps. In brackets: 95 % interval by bootstrap."
     if arm.tuning is Tuning.THESIS:
@@ -107,9 +108,3 @@ def _mean(x: Floats) -> str:
 
 def _figure(x: Floats, statistic: Statistic, digits: int = 1) -> str:
     return f"{statistic(x):.{digits}f}" if len(x) else ""
-
-
-def _with_interval(x: Floats, statistic: Statistic, digits: int = 1) -> str:
-    interval = time_interval(x, statistic)
-    told = f" [{interval.low:.{digits}f}, {interval.high:.{digits}f}]" if interval else ""
-    return _figure(x, statistic, digits) + told

@@ -3,8 +3,9 @@
 from typing import Any
 
 from scenarios.paper import paper_values
-from scenarios.published.claim import Claim, Verdict
+from scenarios.published.claim import Claim
 from scenarios.published.helix_1_arm import Helix1Arm
+from scenarios.published.verdict_rules import nothing_measured
 
 
 def published() -> dict[str, Any]:
@@ -14,7 +15,7 @@ def published() -> dict[str, Any]:
 
 def too_few(told: dict[str, Any], what: str) -> Claim:
     """Return the claim, told but for what came out, as one that so few runs say nothing of."""
-    return Claim(**told, measured="", verdict=Verdict.NOT_COMPARABLE, reason=f"Too few runs to tell: {what}.")
+    return nothing_measured(**told, reason=f"Too few runs to tell: {what}.")
 
 
 def missing(arm: Helix1Arm, *alphas: float) -> str:

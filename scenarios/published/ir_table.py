@@ -68,6 +68,6 @@ class IrTable(PublishedExperiment):
         """Return successes, exact tests, how refinements ended, and distances."""
         return tables_of(IrTableRuns(table))
 
-    def draw(self, table: CampaignTable, folder: Path) -> Sequence[Figure]:
+    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002 (its figures need the table alone)
         """Draw rates of success and distances."""
         return draw_table(IrTableRuns(table), folder)

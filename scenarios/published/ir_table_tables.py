@@ -1,14 +1,12 @@
 """Tables I and II of Luberto et al. beside the campaign's, and what else its runs tell."""
 
 from collections import Counter
-from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers.ir_reflex import Stop
 from plants.grasp_objects import Thing
-from scenarios.campaign.statistics import LEVEL, paired_test, success_interval, time_interval, two_proportions
+from scenarios.campaign.statistics import LEVEL, paired_test, success_interval, two_proportions
 from scenarios.ir_grasp.plots import FINGER_NAMES
 from scenarios.published.comparison_table import ComparisonTable
 from scenarios.published.ir_table_runs import (
@@ -22,7 +20,7 @@ from scenarios.published.ir_table_runs import (
     Count,
     IrTableRuns,
 )
-from scenarios.published.telling import told_interval, told_p, told_share
+from scenarios.published.telling import told_interval, told_median, told_p, told_share
 
 _TITLES = {
     Thing.CYLINDER: "cylinder",
@@ -112,8 +110,8 @@ def _closing(runs: IrTableRuns) -> ComparisonTable:
                 [
                     f"{arm.title}, {pose}",
                     ", ".join(f"{n} {stop}" for stop, n in stops.most_common()),
-                    _median(runs.metric("steps", arm, perturbed), 0),
-                    _median(runs.metric("refinement_time", arm, perturbed), 1),
+                    told_median(runs.metric("steps", arm, perturbed), 0),
+                    told_median(runs.metric("refinement_time", arm, perturbed), 1),
                     f"{np.median(displaced):.1f}, {np.max(displaced):.1f}" if len(displaced) else "",
                 ]
             )
@@ -133,7 +131,7 @@ def _distances(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
         row, published = [name.replace("_", " ")], runs.published_distances(name, perturbed)
         for finger in FINGER_NAMES:
             ours = 1000 * runs.metric(f"final_distance_{finger}", REFLEX, perturbed, things)
-            row += [f"{1000 * published[finger]:.0f}", _median(ours, 1)]
+            row += [f"{1000 * published[finger]:.0f}", told_median(ours, 1)]
         rows.append(row)
     return ComparisonTable(
         title=f"Table II, {POSES[perturbed]} poses: distances at the last step (mm)",
@@ -143,13 +141,3 @@ def _distances(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
         "stands for a finger that sees nothing. Thumb and ring enter the cost. The poses of an object are "
         "taken together.",
     )
-
-
-def _median(values: NDArray[np.float64] | Sequence[float], digits: int) -> str:
-    """Return a median with its interval, such as `5.2 (4.8 to 6.1)`."""
-    x = np.asarray(values, dtype=np.float64)
-    if not len(x):
-        return ""
-    interval = time_interval(x)
-    told = f"{np.median(x):.{digits}f}"
-    return told if interval is None else f"{told} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"

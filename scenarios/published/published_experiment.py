@@ -33,5 +33,11 @@ class PublishedExperiment(abc.ABC):
         """Return published values beside the campaign's."""
 
     @abc.abstractmethod
-    def draw(self, table: CampaignTable, folder: Path) -> Sequence[Figure]:
-        """Draw the figures into a folder, as PNG and SVG; return them in the order of a page."""
+    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
+        """Draw the figures into a folder, as PNG and SVG; return them in the order of a page.
+
+        Args:
+            table: the campaign's.
+            runs: where the folders of its runs are.
+            folder: where the figures go.
+        """

@@ -1,4 +1,9 @@
-"""Writes rates, intervals and p-values for claims and tables."""
+"""Writes rates, intervals, medians and p-values for claims and tables."""
+
+import numpy as np
+
+from cosim.ports import Floats
+from scenarios.campaign.statistics import time_interval
 
 
 def told_rate(successes: int, n: int) -> str:
@@ -19,3 +24,11 @@ def told_interval(low: float, high: float) -> str:
 def told_p(p: float) -> str:
     """Return a p-value, such as `0.031` or `2e-12`."""
     return f"{p:.2g}"
+
+
+def told_median(values: Floats, digits: int) -> str:
+    """Return a median with its interval by bootstrap, such as `5.2 (4.8 to 6.1)`; "" of no values."""
+    if not len(values):
+        return ""
+    interval, told = time_interval(values), f"{np.median(values):.{digits}f}"
+    return told if interval is None else f"{told} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"

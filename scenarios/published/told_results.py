@@ -6,31 +6,30 @@ from rich.table import Table
 from rich.text import Text
 
 from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.console import open_console
 from scenarios.published.claim import Claim, Verdict, verdict_counts
 from scenarios.published.comparison_table import ComparisonTable
+from scenarios.published.paper_results import PaperResults
 from scenarios.published.published_experiment import PublishedExperiment
 
 _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red", Verdict.NOT_COMPARABLE: "bold"}
 
 
-def print_results(experiment: PublishedExperiment, table: CampaignTable, folder: CampaignFolder) -> None:
+def print_results(experiment: PublishedExperiment, results: PaperResults, folder: CampaignFolder) -> None:
     """Print tables, claims, and where the rest is."""
     console = open_console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold", markup=False)
-    for compared in experiment.tables(table):
+    for compared in results.tables:
         _print_table(console, compared)
-    claims = experiment.claims(table)
     for beyond, heading in ((False, "Claims"), (True, "Beyond the paper")):
-        told = [claim for claim in claims if claim.beyond is beyond]
+        told = [claim for claim in results.claims if claim.beyond is beyond]
         if told:
             console.print(f"\n{heading}", style="bold")
         for claim in told:
             _print_claim(console, claim)
     console.print()
     for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
-        counts = verdict_counts(claims, beyond)
+        counts = verdict_counts(results.claims, beyond)
         if counts:
             console.print(f"{heading}: " + ", ".join(f"{n} {words}" for n, _, words in counts))
     console.print(f"claims: {folder.path / 'claims.json'}", markup=False, soft_wrap=True)

@@ -4,6 +4,7 @@ A verdict is given only if the runs could have led to either: where so few can n
 claim is not comparable.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -108,8 +109,8 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
         published="",
         measured=f"{told_rate(sum(first), n)} against {told_rate(sum(second), n)}",
         interval=(interval.low, interval.high),
-        verdict=_verdict(interval.high < FEW, could_be_either=n >= _fewest_for(FEW)),
-        reason=_with_want(reason, n, _fewest_for(FEW)),
+        verdict=_verdict(interval.high < FEW, could_be_either=n >= fewest_for(FEW)),
+        reason=_with_want(reason, n, fewest_for(FEW)),
         beyond=True,
     )
 
@@ -118,7 +119,7 @@ def majority_claim(claim: str, where: str, published: str, measured: tuple[int, 
     """Judge that most trials succeed: it is reproduced if the rate's interval lies above one half."""
     if not measured[1]:
         return nothing_measured(claim, where, published)
-    interval, fewest = success_interval(*measured), _fewest_for(0.5)
+    interval, fewest = success_interval(*measured), fewest_for(0.5)
     rule = f"Reproduced if the rate's interval (Clopper-Pearson) lies above one half. {note}"
     met = interval.low > 0.5
     return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
@@ -128,7 +129,7 @@ def rare_claim(claim: str, where: str, published: str, measured: tuple[int, int]
     """Judge that something does not happen, given how often it did: it is reproduced if its interval is below 10 %."""
     if not measured[1]:
         return nothing_measured(claim, where, published)
-    interval, fewest = success_interval(*measured), _fewest_for(FEW)
+    interval, fewest = success_interval(*measured), fewest_for(FEW)
     rule = f"Reproduced if the interval of how often it happens (Clopper-Pearson) lies below {told_share(FEW)}. {note}"
     met = interval.high < FEW
     return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
@@ -182,9 +183,12 @@ def _verdict(met: bool, could_be_either: bool) -> Verdict:
     return Verdict.REPRODUCED if met else Verdict.NOT_REPRODUCED
 
 
-def _fewest_for(share: float) -> int:
-    """Return how many trials it takes until none that fails leaves an interval below a share."""
-    return next(n for n in range(1, 10_000) if success_interval(0, n).high < share)
+def fewest_for(share: float) -> int:
+    """Return how many trials it takes until none that fails leaves an interval below a share.
+
+    The interval of Clopper and Pearson then ends at 1 - (LEVEL / 2)^(1 / n).
+    """
+    return math.floor(math.log(LEVEL / 2) / math.log1p(-share)) + 1
 
 
 def _with_want(reason: str, n: int, fewest: int) -> str:

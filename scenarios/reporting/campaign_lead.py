@@ -6,10 +6,10 @@ import numpy as np
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.shown_unit import shown_unit
 from scenarios.catalog import SCENARIOS
 from scenarios.published.claim import Claim, verdict_counts
 from scenarios.reporting.claims_section import verdict_html
+from scenarios.shown_unit import shown_unit
 
 _MOST_VALUES = 10
 

@@ -1,11 +1,20 @@
 """Writes the page of a campaign, of what is in its folder."""
 
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+
+from markupsafe import Markup
 
 from scenarios.campaign.campaign_figures import draw_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.point_layout import layout_of
 from scenarios.published.catalog import EXPERIMENTS
+from scenarios.published.claim import Claim
+from scenarios.published.comparison_table import ComparisonTable
+from scenarios.published.paper_results import PaperResults
+from scenarios.published.published_experiment import PublishedExperiment
 from scenarios.published.results import draw_figures
 from scenarios.reporting.campaign_facts import read_claims, read_results
 from scenarios.reporting.campaign_lead import campaign_lead
@@ -24,7 +33,7 @@ from scenarios.run_folder import told_if_not_written
 
 
 def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:
-    """Write a campaign's, or a paper's, page and its `figures/`; the campaign need not be complete.
+    """Write a campaign's, or a paper's, page; the campaign need not be complete, and nothing else is written.
 
     Args:
         folder: the campaign's.
@@ -34,15 +43,42 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
         BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
         RecordNotWritten: there is no room.
     """
-    results, claims = read_results(folder), read_claims(folder)
+    with tempfile.TemporaryDirectory(prefix="handover-") as figures:
+        _write(folder, read_results(folder), read_claims(folder), None, Path(figures), file)
+
+
+def write_campaign_report(folder: CampaignFolder, file: Path | None = None, paper: PaperResults | None = None) -> None:
+    """Write the page, and the figures of the campaign and of its paper into `figures/`.
+
+    Args:
+        folder: the campaign's.
+        file: where the page goes, as of `write_campaign_page`.
+        paper: what the runs say of the paper, if that is known already.
+
+    Raises:
+        BadRunFolder, RecordNotWritten: as `write_campaign_page`.
+    """
+    results = read_results(folder)
+    claims, tables = (read_claims(folder), None) if paper is None else (paper.claims, paper.tables)
+    with told_if_not_written(folder.figures):
+        draw_campaign(results, folder.figures)
+    _write(folder, results, claims, tables, folder.figures, file)
+
+
+def _write(
+    folder: CampaignFolder,
+    results: CampaignResults,
+    claims: Sequence[Claim],
+    tables: Sequence[ComparisonTable] | None,
+    figures: Path,
+    file: Path | None,
+) -> None:
+    """Write the page; a paper's figures are drawn into a folder on the way, and its tables made if they are not."""
     named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
     experiment = None if named is None else named()
     sections: list[Section | None] = [claims_section(claims)]
-    with told_if_not_written(folder.figures):
-        draw_campaign(results, folder.figures)
     if experiment is not None and results.points:
-        sections.append(comparison_section(experiment.tables(results.table)))
-        sections.append(figures_section(draw_figures(experiment, results.table, folder), folder.figures))
+        sections += _published(experiment, tables, results, folder.runs, figures)
     if results.points:
         layout = layout_of(results)
         sections += [success_section(results, layout), spread_section(results, layout)]
@@ -55,3 +91,20 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
     ]
     title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
     write_page(file or folder.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
+
+
+def _published(
+    experiment: PublishedExperiment,
+    tables: Sequence[ComparisonTable] | None,
+    results: CampaignResults,
+    runs: Path,
+    figures: Path,
+) -> Sequence[Section | None]:
+    """Return published values beside ours, and the experiment's figures; a section that says why where it cannot."""
+    try:
+        tables = experiment.tables(results.table) if tables is None else tables
+        drawn = draw_figures(experiment, results.table, runs, figures)
+    except KeyError as e:
+        html = Markup("<p>The campaign is of another version of {}, so this is left out: its runs have no {}.</p>")
+        return [Section(anchor="comparison", title="Published and ours", html=html.format(experiment.name, e.args[0]))]
+    return [comparison_section(tables), figures_section(drawn, figures)]

@@ -10,12 +10,12 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from cosim.ports import Floats
-from scenarios.campaign.shown_unit import unit_symbol
 from scenarios.record import Record
 from scenarios.reporting.page import template
 from scenarios.reporting.plot_html import json_html
 from scenarios.reporting.section import Section
 from scenarios.reporting.thinned import changes_of, rows_of_curve
+from scenarios.shown_unit import unit_symbol
 
 _BUDGET = 1_400_000
 """Bytes in the page for all signals, about."""

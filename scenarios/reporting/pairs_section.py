@@ -1,7 +1,7 @@
 """A paired campaign's points against each other, run by run in the same scenes."""
 
-import itertools
-from collections.abc import Mapping
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
 
@@ -17,16 +17,14 @@ def pairs_section(results: CampaignResults) -> Section | None:
     """Return exact tests of points that differ in one parameter; None if the campaign is not paired."""
     if not results.told.get("paired") or len(results.points) < 2:
         return None
-    outcomes = [_outcomes(results, p) for p in results.points]
+    alike, outcomes = _alike(results), _outcomes(results)
     rows: list[tuple[str | Cell, ...]] = []
-    left = 0
-    for a, b in itertools.combinations(range(len(results.points)), 2):
-        if _difference(results.points[a], results.points[b]) is None:
-            continue
+    left = _number_of_pairs(results, alike)
+    for a, b, name in _pairs(results, alike):
         if len(rows) >= _MOST_PAIRS:
-            left += 1
-            continue
-        row = _row(results, a, b, outcomes[a], outcomes[b])
+            break
+        left -= 1
+        row = _row(results, (results.points[a], results.points[b], name), outcomes[a], outcomes[b])
         if row:
             rows.append(row)
     if not rows:
@@ -42,20 +40,53 @@ def pairs_section(results: CampaignResults) -> Section | None:
     return Section(anchor="pairs", title="Paired comparisons", html=html, scripts=("campaign.js",))
 
 
-def _difference(first: PointResults, second: PointResults) -> str | None:
-    """Return the one parameter in which two points differ; None if there are more."""
-    names = [n for n in first.values.keys() & second.values.keys() if first.values[n] != second.values[n]]
-    return names[0] if len(names) == 1 and first.values.keys() == second.values.keys() else None
+Alike = Mapping[tuple[str, frozenset[tuple[str, str]]], Sequence[int]]
+"""Points that differ in a parameter at most, by its name and by what they have in common."""
 
 
-def _outcomes(results: CampaignResults, point: PointResults) -> Mapping[int, bool]:
-    """Return success by seed of the runs done."""
+def _alike(results: CampaignResults) -> Alike:
+    alike: dict[tuple[str, frozenset[tuple[str, str]]], list[int]] = defaultdict(list)
+    for k, point in enumerate(results.points):
+        for key in _keys(point):
+            alike[key].append(k)
+    return alike
+
+
+def _keys(point: PointResults) -> list[tuple[str, frozenset[tuple[str, str]]]]:
+    items = frozenset(point.values.items())
+    return [(name, items - {(name, value)}) for name, value in point.values.items()]
+
+
+def _pairs(results: CampaignResults, alike: Alike) -> Iterator[tuple[int, int, str]]:
+    """Return the pairs of points that differ in one parameter, in the order of the points, and its name."""
+    points = results.points
+    for a, point in enumerate(points):
+        others = [(b, key[0]) for key in _keys(point) for b in alike[key] if b > a]
+        yield from ((a, b, n) for b, n in sorted(others) if points[b].values[n] != point.values[n])
+
+
+def _number_of_pairs(results: CampaignResults, alike: Alike) -> int:
+    def pairs(n: int) -> int:
+        return n * (n - 1) // 2
+
+    number = 0
+    for (name, _), members in alike.items():
+        same = Counter(results.points[k].values[name] for k in members)
+        number += pairs(len(members)) - sum(map(pairs, same.values()))
+    return number
+
+
+def _outcomes(results: CampaignResults) -> Sequence[Mapping[int, bool]]:
+    """Return, for each point, success by seed of the runs done."""
     seed, success = results.table.column("seed"), results.table.column("success")
-    return {int(seed[row]): bool(success[row]) for row in point.done}
+    return [{int(seed[row]): bool(success[row]) for row in point.done} for point in results.points]
 
 
 def _row(
-    results: CampaignResults, a: int, b: int, first: Mapping[int, bool], second: Mapping[int, bool]
+    results: CampaignResults,
+    pair: tuple[PointResults, PointResults, str],
+    first: Mapping[int, bool],
+    second: Mapping[int, bool],
 ) -> tuple[str | Cell, ...] | None:
     shared = sorted(first.keys() & second.keys())
     if not shared:
@@ -66,15 +97,14 @@ def _row(
     neither = len(shared) - both - test.only_first - test.only_second
     numbers = [len(shared), both, test.only_first, test.only_second, neither]
     return (
-        *_labels(results, results.points[a], results.points[b]),
+        *_labels(results, *pair),
         *(Cell(str(n), n) for n in numbers),
         Cell(f"{test.p:.2g}", test.p),
     )
 
 
-def _labels(results: CampaignResults, a: PointResults, b: PointResults) -> tuple[str, str, str]:
+def _labels(results: CampaignResults, a: PointResults, b: PointResults, name: str) -> tuple[str, str, str]:
     """Return what two points have in common, and what each has for itself."""
-    name = _difference(a, b)
     shared = [results.value_text(n, a.values[n]) for n in results.varied if n != name and n in a.values]
-    first, second = ("", "") if name is None else (results.value_text(name, p.values[name]) for p in (a, b))
+    first, second = (results.value_text(name, p.values[name]) for p in (a, b))
     return ", ".join(shared) or "all", first, second

@@ -1,19 +1,14 @@
 """A campaign's points in numbers: successes, and the median of the metrics that matter, with intervals."""
 
 import math
+from collections.abc import Mapping
 
-import numpy as np
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults, PointResults
-from scenarios.campaign.shown_unit import ShownUnit, shown_unit
-from scenarios.campaign.statistics import time_interval
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
-
-_MOST_METRICS = 4
-_MOST_BOOTSTRAPS = 150
-"""Of one page: each takes some 20 ms."""
+from scenarios.shown_unit import ShownUnit, shown_unit
 
 
 def points_section(results: CampaignResults) -> Section | None:
@@ -21,15 +16,15 @@ def points_section(results: CampaignResults) -> Section | None:
     points = results.points
     if not points:
         return None
-    metrics = results.headline[:_MOST_METRICS]
+    metrics = results.told_first
     units = {m: shown_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
-    with_intervals = len(points) * len(metrics) <= _MOST_BOOTSTRAPS
+    written = _written(results)
     rows = [
         (
-            *_values(results, point),
+            *_values(results, point, written),
             str(len(point.rows)),
             *_success(point),
-            *(_median(results, point, m, units[m], with_intervals) for m in metrics),
+            *(_median(results, point, m, units[m]) for m in metrics),
         )
         for point in points
     ]
@@ -42,21 +37,26 @@ def points_section(results: CampaignResults) -> Section | None:
     )
     first = len(header) - 3 - len(metrics)
     told = "Of the runs done. Intervals of success rates: Clopper and Pearson"
-    told += "; of medians: bootstrap, from three values on." if with_intervals and metrics else "."
+    told += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
     note = Markup("<p class='soft'>{}</p>").format(told)
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
 
 
-def _values(results: CampaignResults, point: PointResults) -> list[Cell]:
+def _written(results: CampaignResults) -> Mapping[str, ShownUnit]:
+    """Return in which unit the values of each varied number are written."""
+    texts = {n: {p.values[n] for p in results.points if n in p.values} for n in results.varied if results.is_number(n)}
+    return {name: shown_unit(results.unit(name), list(map(float, values))) for name, values in texts.items()}
+
+
+def _values(results: CampaignResults, point: PointResults, written: Mapping[str, ShownUnit]) -> list[Cell]:
     cells: list[Cell] = []
     for name in results.varied:
         text = point.values.get(name)
         if text is None:
             cells.append(Cell("–"))
-        elif results.is_number(name):
-            texts = [float(p.values[name]) for p in results.points if name in p.values]
-            cells.append(Cell(shown_unit(results.unit(name), texts).text(float(text)), float(text)))
+        elif name in written:
+            cells.append(Cell(written[name].text(float(text)), float(text)))
         else:
             cells.append(Cell(text.replace("_", " ")))
     return cells or [Cell("all runs")]
@@ -70,14 +70,11 @@ def _success(point: PointResults) -> tuple[Cell, Cell]:
     return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(told, point.rate)
 
 
-def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit, with_interval: bool) -> Cell:
-    values = results.table.column(metric)[point.done]
-    values = values[np.isfinite(values)]
-    if not len(values):
+def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit) -> Cell:
+    median, span = results.median(point, metric), results.median_interval(point, metric)
+    if math.isnan(median):
         return Cell("–", math.nan)
-    median = float(np.median(values))
     told = f"{median * unit.factor:.4g}"
-    span = time_interval(values) if with_interval and np.ptp(values) > 0.0 else None
     if span is not None:
         told += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
     return Cell(told, median)

@@ -7,6 +7,7 @@ from typing import Any, cast
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.run_folder import BadRunFolder, RunFolder
+from scenarios.told_value import told_value
 
 _NUMBER = (int, float)
 _FORMS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
@@ -79,13 +80,7 @@ class RunFacts:
         """Name, value with unit, and description of each parameter."""
         if "told_parameters" in self.run:
             return [(str(row[0]), str(row[1]), str(row[2])) for row in self.run["told_parameters"]]
-        return [(name, _plain(value), "") for name, value in self.run["parameters"].items()]
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:g}"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+        return [(name, told_value(value), "") for name, value in self.run["parameters"].items()]
 
 
 def _check(folder: RunFolder, file: str, content: Mapping[str, Any]) -> None:

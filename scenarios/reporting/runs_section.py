@@ -1,17 +1,18 @@
 """All runs of a campaign in a table that can be sorted and filtered."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.shown_unit import ShownUnit, shown_unit
 from scenarios.reporting.rows_table import Cell, rows_table
 from scenarios.reporting.section import Section
+from scenarios.shown_unit import ShownUnit, shown_unit
 
 _MOST_ROWS = 2000
 _MOST_METRICS = 6
@@ -25,7 +26,9 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
     metrics = results.headline[:_MOST_METRICS]
     varied = [name for name in results.varied if name in table.parameters]
     units = {n: shown_unit(table.unit(n), table.column(n)) for n in (*metrics, "cpu_seconds")}
-    rows = [_row(results, row, varied, units, folder) for row in table.rows[:_MOST_ROWS]]
+    columns = {n: table.column(n) for n in varied}
+    set_to = {n: shown_unit(table.unit(n), x) if x.dtype == np.float64 else None for n, x in columns.items()}
+    rows = [_row(row, set_to, units, folder) for row in table.rows[:_MOST_ROWS]]
     header = (
         "run",
         *(n.replace("_", " ") for n in varied),
@@ -65,22 +68,22 @@ def _page_of(name: str, folder: Path) -> str:
 
 
 def _row(
-    results: CampaignResults, row: dict[str, Any], varied: Sequence[str], units: dict[str, ShownUnit], folder: Path
+    row: dict[str, Any], set_to: Mapping[str, ShownUnit | None], units: Mapping[str, ShownUnit], folder: Path
 ) -> Sequence[str | Markup | Cell]:
     return (
         run_html(row["run"], folder),
-        *(_parameter(results, name, row[name]) for name in varied),
+        *(_parameter(row[name], unit) for name, unit in set_to.items()),
         Cell(str(row["seed"]), row["seed"]),
         _verdict(row),
         *(_number(row[name], unit) for name, unit in units.items()),
     )
 
 
-def _parameter(results: CampaignResults, name: str, value: Any) -> Cell:
+def _parameter(value: Any, unit: ShownUnit | None) -> Cell:
     if value is None:
         return Cell("–")
-    if isinstance(value, float):
-        return Cell(shown_unit(results.table.unit(name), results.table.column(name)).text(value), value)
+    if unit is not None:
+        return Cell(unit.text(value), value)
     if isinstance(value, bool):
         return Cell(str(value).lower())
     return Cell(str(value).replace("_", " "), value if isinstance(value, int) else None)

@@ -6,9 +6,10 @@ from typing import Any, cast
 from markupsafe import Markup
 
 from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.shown_unit import shown_unit
 from scenarios.reporting.rows_table import rows_table
 from scenarios.reporting.section import Section
+from scenarios.shown_unit import shown_unit
+from scenarios.told_value import told_value
 
 
 def setting_section(results: CampaignResults) -> Section:
@@ -61,6 +62,5 @@ def _flat(options: Mapping[str, Any]) -> dict[str, str]:
         if isinstance(value, Mapping):
             flat |= {f"{name} {n}": t for n, t in _flat(cast(Mapping[str, Any], value)).items()}
         elif value is not None:
-            text = str(value).lower() if isinstance(value, bool) else str(value)
-            flat[name.replace("_", " ")] = text
+            flat[name.replace("_", " ")] = told_value(value)
     return flat

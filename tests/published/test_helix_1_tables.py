@@ -16,7 +16,7 @@ def test_table_1_has_the_papers_rows_with_ours_beside():
     rows = {row[0]: row[1:] for row in table.rows}
     assert table.header[5:] == ["0.4 published", "0.4 ours"]
     assert rows["Minimum"][4:] == ["14.6", "20.0"]
-    assert rows["Median"][4:] == ["22.3", "23.0 [21.0, 25.0]"]
+    assert rows["Median"][4:] == ["22.3", "23.0 (21.0 to 25.0)"]
     assert rows["Maximum"][4:] == ["29.5", "26.0"]
     assert rows["Mean"][:2] == ["104.8 ± 52.0", "100.0 ± 50.0"]
     assert rows["Timestep"][4:] == ["1.45 ± 0.05", "1.45"]
@@ -49,14 +49,14 @@ def test_settings_without_runs_have_no_tables():
 def test_times_are_drawn_and_errors_of_runs_that_left_a_record(tmp_path: Path):
     figures, run = tmp_path / "figures", tmp_path / "runs" / "thesis_0.4_0"
     figures.mkdir()
-    assert [f.name for f in Helix1().draw(table_of(TIMES), figures)] == ["times"]
+    assert [f.name for f in Helix1().draw(table_of(TIMES), tmp_path / "runs", figures)] == ["times"]
     run.mkdir(parents=True)
     t = np.arange(0.0, 25.0, 0.02)
     record = {"time": t, "servo.phase": np.where(t < 1.45, 0, 1), "servo.error": 0.3 * np.exp(-t / 10.0)}
     pq.write_table(pa.table(record), run / "signals.parquet")
-    assert [f.name for f in Helix1().draw(table_of(TIMES), figures)] == ["times", "errors"]
+    assert [f.name for f in Helix1().draw(table_of(TIMES), tmp_path / "runs", figures)] == ["times", "errors"]
     assert {f.name for f in figures.iterdir()} == {f"{n}.{s}" for n in ("times", "errors") for s in ("png", "svg")}
 
 
 def test_nothing_is_drawn_where_no_gripper_closed(tmp_path: Path):
-    assert not Helix1().draw(table_of({alpha: [None] * 8 for alpha in TIMES}), tmp_path)
+    assert not Helix1().draw(table_of({alpha: [None] * 8 for alpha in TIMES}), tmp_path, tmp_path)

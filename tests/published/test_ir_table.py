@@ -152,10 +152,10 @@ def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_pat
     table = grasp_table(told, quick=True, status=lambda _run: "lost")
     assert {claim.verdict for claim in IrTable().claims(table)} == {Verdict.NOT_COMPARABLE}
     assert IrTable().tables(table)
-    assert IrTable().draw(table, tmp_path)
+    assert IrTable().draw(table, tmp_path, tmp_path)
 
 
 def test_figures_are_left_as_png_and_svg(table: CampaignTable, tmp_path: Path):
-    names = {figure.name for figure in IrTable().draw(table, tmp_path)}
+    names = {figure.name for figure in IrTable().draw(table, tmp_path, tmp_path)}
     assert names == {"success_rates", "final_distances"}
     assert {p.name for p in tmp_path.iterdir()} == {f"{n}.{s}" for n in names for s in ("png", "svg")}

@@ -1,13 +1,19 @@
 """The command `handover paper`."""
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.plan import CampaignPlan
 from scenarios.command import main
 from scenarios.published.catalog import EXPERIMENTS
+from scenarios.published.ir_table import IrTable
+from scenarios.reporting.campaign_page import write_campaign_page
 
 
 def paper(*arguments: str | Path) -> Result:
@@ -48,7 +54,17 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_quick_one_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(tmp_path: Path):
+def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    whole = IrTable().plan(quick=True)
+    cylinder = [point for point in whole.points if point["thing"] == "cylinder"]
+    few = replace(whole, points=cylinder, repetitions=1)
+
+    def plan(_experiment: IrTable, _quick: bool) -> CampaignPlan:
+        return few
+
+    monkeypatch.setattr(IrTable, "plan", plan)
     folder = tmp_path / "c"
     first = paper("ir-table", "--quick", "--out", folder)
     assert first.exit_code == 0, first.output
@@ -56,19 +72,20 @@ def test_a_quick_one_leaves_claims_figures_and_a_page_and_a_second_call_repeats_
     assert {claim["verdict"] for claim in claims} <= {"reproduced", "not reproduced", "not comparable"}
     for claim in claims:
         assert claim["claim"] in " ".join(first.output.split())
-    assert {p.name for p in folder.iterdir()} >= {
-        "campaign.json",
-        "claims.json",
-        "figures",
-        "report.html",
-        "runs.parquet",
-    }
+    left = {"campaign.json", "claims.json", "figures", "report.html", "runs.parquet"}
+    assert {p.name for p in folder.iterdir()} >= left
+    assert {p.name for p in (folder / "figures").iterdir()} >= {"success_rates.png", "success_by_point.png"}
     made = {p: p.stat().st_mtime_ns for p in (folder / "runs").glob("*/summary.json")}
-    assert len(made) == 120
+    assert len(made) == 8
     second = paper("ir-table", "--quick", "--out", folder, "--no-report")
     assert second.exit_code == 0, second.output
     assert {p: p.stat().st_mtime_ns for p in made} == made
     assert json.loads((folder / "claims.json").read_text(encoding="utf-8")) == claims
+    page = (folder / "report.html").read_bytes()
+    shutil.rmtree(folder / "figures")
+    write_campaign_page(CampaignFolder(folder))
+    assert (folder / "report.html").read_bytes() == page, "it is made of the claims and the table that were left"
+    assert not (folder / "figures").exists()
 
 
 @pytest.mark.paper

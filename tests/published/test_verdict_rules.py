@@ -2,8 +2,11 @@
 
 import pytest
 
+from scenarios.campaign.statistics import success_interval
 from scenarios.published.claim import Verdict
 from scenarios.published.verdict_rules import (
+    FEW,
+    fewest_for,
     majority_claim,
     no_worse_claim,
     order_claim,
@@ -64,6 +67,11 @@ def test_no_worse_takes_an_interval_below_the_margin(worse: int, n: int, verdict
     claim = no_worse_claim("The first does no worse.", [False] * worse + [True] * (n - worse), [True] * n)
     assert claim.verdict is verdict
     assert claim.beyond
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05, FEW, 0.2, 1 / 3, 0.5, 0.8, 0.9, 0.975, 0.99])
+def test_the_fewest_trials_are_the_first_whose_interval_can_end_below_a_share(share: float):
+    assert fewest_for(share) == next(n for n in range(1, 1000) if success_interval(0, n).high < share)
 
 
 def test_runs_in_which_only_the_first_succeeds_do_not_count_against_it():

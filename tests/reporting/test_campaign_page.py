@@ -102,6 +102,12 @@ def test_claims_stand_with_their_verdicts(tmp_path: Path):
     assert "Beyond the paper: 1 <b class='bad'>does not hold</b>." in html
 
 
+def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Path):
+    html = page_of(tmp_path, told("helix_handover", POINTS, experiment="helix-1"), table_of(POINTS))
+    part = html[html.index('id="comparison"') : html.index('id="success"')]
+    assert "The campaign is of another version of helix-1, so this is left out: its runs have no tuning." in part
+
+
 @pytest.mark.parametrize(
     ("file", "content", "fault"),
     [

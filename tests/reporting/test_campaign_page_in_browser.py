@@ -9,7 +9,7 @@ from playwright.sync_api import Browser
 
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.plan import CampaignPlan
-from scenarios.reporting.campaign_page import write_campaign_page
+from scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"strategy": "reflex"}, {"strategy": "blind"}], repetitions=2, seed=1, paired=True
@@ -20,7 +20,7 @@ LOST = "001_strategy=blind_r0001"
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> CampaignFolder:
     folder = carried_out(PLAN, tmp_path_factory.mktemp("campaigns") / "grasps", lost=[LOST])
-    write_campaign_page(folder)
+    write_campaign_report(folder)
     return folder
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.campaign_summary import print_campaign
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
@@ -15,8 +16,9 @@ from scenarios.experiment import Metric
 
 
 def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> str:
-    table = CampaignTable(table_of(plan, rows))
-    print_campaign(plan, table, Tally(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
+    told = {"scenario": plan.scenario, "points": plan.points, "repetitions": plan.repetitions}
+    results = CampaignResults(told, CampaignTable(table_of(plan, rows)))
+    print_campaign(results, Tally(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
     return capsys.readouterr().out
 
 

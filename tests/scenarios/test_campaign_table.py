@@ -80,25 +80,6 @@ def test_columns_as_arrays(table: CampaignTable):
         table.column("meen")
 
 
-@pytest.mark.parametrize(
-    ("values", "found"),
-    [
-        ({"load": 0.1}, 2),
-        ({"load": "0.10"}, 2),
-        ({"load": 0.2, "path": "custom"}, 1),
-        ({"load": 0.3}, 0),
-        ({"success": "true"}, 1),
-        ({"success": None}, 2),
-        ({"x_0": "0.3,0,0.05"}, 3),
-        ({"x_0": [0, 0, 0]}, 0),
-        ({"point": 0, "repetition": 1}, 1),
-        ({}, 3),
-    ],
-)
-def test_rows_of_given_values(table: CampaignTable, values: dict[str, Any], found: int):
-    assert len(table.where(**values)) == found
-
-
 def test_without_rows_it_has_its_columns():
     table = CampaignTable(table_of(PLAN, []))
     assert (table.rows, table.metrics, table.column("load").tolist()) == ([], (), [])

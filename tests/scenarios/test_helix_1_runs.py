@@ -28,8 +28,8 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     plan = checked_plan(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
     place = CampaignFolder(folder)
     table = carry_out_campaign(plan, place, OwnCrew(), CampaignProgress(StringIO()))
-    write_claims(Helix1(), table, place)
-    draw_figures(Helix1(), table, place)
+    write_claims(Helix1().claims(table), place)
+    draw_figures(Helix1(), table, place.runs, place.figures)
     assert len(Helix1().tables(table)) == 4
     return {claim["claim"]: claim for claim in json.loads((folder / "claims.json").read_text("utf-8"))}
 

@@ -49,8 +49,8 @@ def test_a_table_tells_why_the_hand_closed(campaign: tuple[CampaignFolder, Campa
 
 def test_results_are_left_in_the_campaigns_folder(campaign: tuple[CampaignFolder, CampaignTable]):
     folder, table = campaign
-    write_claims(IrTable(), table, folder)
-    draw_figures(IrTable(), table, folder)
+    write_claims(IrTable().claims(table), folder)
+    draw_figures(IrTable(), table, folder.runs, folder.figures)
     left = {p.relative_to(folder.path) for p in folder.path.rglob("*") if "runs" not in p.parts}
     assert {Path("claims.json"), Path("figures/success_rates.svg"), Path("figures/final_distances.png")} <= left
     assert folder.read()["experiment"] == "ir-table"

@@ -22,7 +22,8 @@ class ShownUnit:
         """Return a value with its unit, to four digits."""
         if not math.isfinite(value):
             return "–"
-        return f"{value * self.factor:.4g} {self.symbol}".rstrip()
+        between = "" if self.symbol.startswith("°") else " "
+        return f"{value * self.factor:.4g}{between}{self.symbol}".rstrip()
 
 
 def shown_unit(unit: str, values: ArrayLike) -> ShownUnit:
