@@ -22,7 +22,7 @@ class Crew(Protocol):
             folder: an existing one, into which runs are to be written.
 
         Raises:
-            BadCrew: some do not.
+            BadCrew: some do not. RecordNotWritten: nothing can be written there, as on a full disk.
         """
         ...
 
