@@ -1,7 +1,7 @@
 """A process that carries out one run after the other, each in a child of its own: `python -m` this module.
 
 It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads orders from
-standard input and answers on standard output (`messages`): an order is a `RunOrder` and the folder for its files while
+standard input and answers on standard output, all pickled: an order is a `RunOrder` and the folder for its files while
 it runs; the answer is why there is no folder of the run, or "". It ends with its input, and a run under way with it.
 
 Where processes cannot be forked (Windows) it carries runs out itself: what a unit does to the process, it does to it.
@@ -10,6 +10,7 @@ Where processes cannot be forked (Windows) it carries runs out itself: what a un
 import contextlib
 import gc
 import os
+import pickle
 import select
 import shutil
 import sys
@@ -23,7 +24,6 @@ from cosim.heartbeat import Heartbeat
 from fmus.build import import_block
 from fmus.catalog import UNITS
 from scenarios import supervisor
-from scenarios.campaign.messages import receive, send
 from scenarios.campaign.ordered_run import carry_out_order, fault_of, finish, printing_to, refuse_order
 from scenarios.campaign.run_order import RunOrder
 from scenarios.catalog import SCENARIOS
@@ -52,11 +52,12 @@ class RunServer:
         """Carry out orders until there are no more."""
         while self._comes():
             try:
-                order, folder = receive(self._orders)
-            except EOFError:
+                order, folder = pickle.load(self._orders)
+            except (EOFError, pickle.UnpicklingError):  # the worker has ended, maybe amid an order
                 return
             self._load(order.scenario)
-            send(self._answers, self._carry_out(order, folder))
+            pickle.dump(self._carry_out(order, folder), self._answers)
+            self._answers.flush()
 
     def _comes(self) -> bool:
         """Wait for an order, or the end of them."""

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import pickle
 import queue
 import shutil
 import subprocess
@@ -13,7 +14,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from scenarios.campaign.messages import receive, send
 from scenarios.campaign.run_order import RunOrder
 
 _LOOK = 0.5
@@ -74,7 +74,8 @@ class ServerProcess:
         folder = Path(order.runs, f".{order.name}.{uuid.uuid4().hex[:12]}")
         try:
             try:
-                send(self._orders, (order, folder))
+                pickle.dump((order, folder), self._orders)
+                self._orders.flush()
             except (OSError, ValueError) as e:
                 raise ServerLost(self._last_words()) from e
             while True:
@@ -110,9 +111,9 @@ class ServerProcess:
 
     def _listen(self) -> None:
         answers = cast(BinaryIO, self._process.stdout)
-        with contextlib.suppress(EOFError, OSError):
+        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it has ended, maybe amid an answer
             while True:
-                self._answers.put(receive(answers))
+                self._answers.put(pickle.load(answers))
         self._answers.put(None)
         answers.close()
 
