@@ -1,7 +1,6 @@
 """A run that a process has left: whether it can go on, and how."""
 
 import contextlib
-import errno
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +14,7 @@ from fmus.build import cached
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.resumption import Resumption, unpack
-from scenarios.run_folder import BadRunFolder, RunFolder, sha256_of, versions
+from scenarios.run_folder import BadRunFolder, RunFolder, is_full, sha256_of, versions
 from scenarios.ssp_call import open_experiment
 from scenarios.task import Task
 
@@ -35,7 +34,7 @@ def complete_signals(folder: RunFolder) -> int:
     except ValueError as e:  # Arrow's
         raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {str(e).splitlines()[0]}") from e
     except OSError as e:
-        if e.errno in (errno.ENOSPC, errno.EDQUOT):
+        if is_full(e):
             raise RecordNotWritten(folder.signals, str(e.strerror)) from e
         raise BadRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 

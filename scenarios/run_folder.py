@@ -1,6 +1,7 @@
 """The folder that a run leaves behind: checked before the run, written to during and after it."""
 
 import contextlib
+import errno
 import hashlib
 import importlib.metadata
 import json
@@ -184,6 +185,11 @@ def told_if_not_written(path: Path) -> Generator[None, None, None]:
         yield
     except OSError as e:
         raise RecordNotWritten(path, e.strerror or str(e)) from e
+
+
+def is_full(e: OSError) -> bool:
+    """Return whether there is no room: the disk is full, or someone's share of it, or a file at its largest."""
+    return e.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_whole(path: Path, text: str) -> None:

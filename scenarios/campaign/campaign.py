@@ -1,8 +1,6 @@
 """Carries out a campaign: all is checked, what is done is kept, the rest is given to a crew, and the table is kept."""
 
 import contextlib
-import errno
-import os
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -120,8 +118,8 @@ class _Work:
         run = self.runs[answer.name]
         row = None if answer.lost else row_of(run, self.folder.runs / run.name)
         if row is None:
-            if os.strerror(errno.ENOSPC) in answer.lost:
-                raise RecordNotWritten(self.folder.runs / run.name, os.strerror(errno.ENOSPC))
+            if answer.no_room:
+                raise RecordNotWritten(self.folder.runs / run.name, answer.no_room)
             reason = answer.lost or "its folder does not say how it ended"
             row = RunRow(run=run, status="lost", success=None, reason=reason)
         self._count[row.status] += 1

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from scenarios.campaign.run_order import RunOrder
+from scenarios.campaign.run_order import RunAnswer, RunOrder
 
 _LOOK = 0.5
 """How often it is asked whether a run is still wanted, s."""
@@ -65,8 +65,8 @@ class ServerProcess:
         """Whether it can be given orders."""
         return self._process.poll() is None
 
-    def carry_out(self, order: RunOrder, wanted: Callable[[], bool]) -> str:
-        """Carry out an order; return why there is no folder of the run, "" if there is one.
+    def carry_out(self, order: RunOrder, wanted: Callable[[], bool]) -> RunAnswer:
+        """Carry out an order.
 
         Raises:
             ServerLost: the server has died, or was about to end. NotWanted: `wanted` says so; the server has ended.

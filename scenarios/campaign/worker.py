@@ -31,7 +31,7 @@ def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str
     """
     worker = get_worker()
     if other := difference(wanted_versions, _versions()):
-        return RunAnswer(name=order.name, lost=f"worker {worker.address} {other}", worker=worker.address)
+        return RunAnswer(name=order.name, lost=f"worker {worker.address} {other}")
     task = worker.get_current_task()
 
     def wanted() -> bool:
@@ -41,15 +41,14 @@ def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str
     lost = ""
     for _ in range(2):
         try:
-            lost = _server_of(batch).carry_out(order, wanted)
-            break
+            return _server_of(batch).carry_out(order, wanted)
         except ServerLost as e:
             lost = str(e)
         except NotWanted:
             lost = "it was ended, as nobody waited for it"
         if not wanted():
             break
-    return RunAnswer(name=order.name, lost=lost, worker=worker.address)
+    return RunAnswer(name=order.name, lost=lost)
 
 
 def end_runs(batch: str) -> None:

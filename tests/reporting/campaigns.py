@@ -31,10 +31,10 @@ class PlainCrew:
     def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
         for order in orders:
             if order.name in self.lost:
-                yield RunAnswer(name=order.name, lost="its worker went away", worker="here")
+                yield RunAnswer(name=order.name, lost="its worker went away")
                 continue
             carry_out_order(order, Path(order.runs, order.name))
-            yield RunAnswer(name=order.name, worker="here")
+            yield RunAnswer(name=order.name)
 
 
 def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:

@@ -26,7 +26,7 @@ class OwnCrew:
             lost = self._before(order)
             if not lost:
                 _run(order)
-            yield RunAnswer(name=order.name, lost=lost, worker="here")
+            yield RunAnswer(name=order.name, lost=lost)
 
 
 def _run(order: RunOrder) -> None:
