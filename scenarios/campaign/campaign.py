@@ -11,7 +11,7 @@ from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.plan import CampaignPlan, PlannedRun
-from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
+from scenarios.campaign.plan_check import PreparedPlan
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.run_row import RunRow, row_of
 from scenarios.campaign.table_writer import TableWriter
@@ -19,24 +19,20 @@ from scenarios.campaign.tally import OnTally, Tally
 from scenarios.run_folder import told_if_not_written
 
 
-def carry_out_campaign(plan: CampaignPlan, folder: CampaignFolder, crew: Crew, progress: OnTally) -> CampaignTable:
+def carry_out_campaign(ready: PreparedPlan, folder: CampaignFolder, crew: Crew, progress: OnTally) -> CampaignTable:
     """Carry out the runs of a campaign that are not done yet, and return the table of all.
 
     Whatever ends it, what was done stays, and the same call goes on: a run is done when it has left its folder,
     also if a unit failed in it. Lost runs are tried again by the next call.
 
     Raises:
-        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError, BadCrew: before anything was
-            written.
+        BadRunFolder, BadCrew: before anything was written.
         RecordNotWritten: there is no room.
         CrewLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
-    plan = checked_plan(plan)
-    files = unit_fmus(plan)
-    check_units(plan, files)
-    with folder.opened(plan, files, crew.check) as fmus:
-        work = _Work(plan, folder, progress)
+    with folder.opened(ready.plan, ready.fmus, crew.check) as fmus:
+        work = _Work(ready.plan, folder, progress)
         try:
             work.give_to(crew, fmus)
         finally:

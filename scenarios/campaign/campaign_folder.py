@@ -20,7 +20,10 @@ _FILE = "campaign.json"
 
 
 class CampaignFolder:
-    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`."""
+    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`.
+
+    A paper's experiment leaves `claims.json` and `figures/` besides.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -77,9 +80,7 @@ class CampaignFolder:
         Raises:
             BadRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
         """
-        if self.path.exists() and not self.path.is_dir():
-            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
-        check_place(self.path)
+        self._check_place()
         if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
             return
         if not (self.path / _FILE).exists():
@@ -114,11 +115,10 @@ class CampaignFolder:
             BadRunFolder: as by `check`; or another command holds it, or it cannot be made.
             RecordNotWritten: it cannot be written to.
         """
-        self.check(plan, fmus)
         with contextlib.ExitStack() as held:
             with self._made():
                 held.enter_context(self._held())
-                self.check(plan, fmus)  # another command may have made it meanwhile
+                self.check(plan, fmus)
                 with self._written(plan, fmus):
                     check(self.path)
             with told_if_not_written(self.path):
@@ -144,9 +144,15 @@ class CampaignFolder:
         except OSError:
             return False
 
+    def _check_place(self) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
+        check_place(self.path)
+
     @contextlib.contextmanager
     def _made(self) -> Generator[None, None, None]:
         """Make the folder; if what follows fails, remove what was made and is empty."""
+        self._check_place()
         absent = [p for p in (self.path, *self.path.parents) if not p.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)

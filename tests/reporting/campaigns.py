@@ -15,6 +15,7 @@ from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.ordered_run import carry_out_order
 from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.plan_check import prepared
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 
 
@@ -40,7 +41,7 @@ class PlainCrew:
 def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:
     """Carry a campaign out and return its folder."""
     folder = CampaignFolder(path)
-    carry_out_campaign(plan, folder, PlainCrew(lost), lambda _tally: None)
+    carry_out_campaign(prepared(plan), folder, PlainCrew(lost), lambda _tally: None)
     return folder
 
 

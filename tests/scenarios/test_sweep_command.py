@@ -11,8 +11,7 @@ from own_crew import OwnCrew
 
 from cosim.record.file_lock import folder_locked
 from fmus.build import cached
-from scenarios import campaign_call
-from scenarios.campaign import dask_crew
+from scenarios.campaign import dask_crew, plan_check
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
@@ -195,7 +194,7 @@ def test_a_campaign_under_way_is_refused_before_anything_else(here: Path, monkey
     def build(_plan: CampaignPlan) -> dict[str, Path]:
         raise AssertionError("units are not to be built")
 
-    monkeypatch.setattr(campaign_call, "unit_fmus", build)
+    monkeypatch.setattr(plan_check, "unit_fmus", build)
     (here / "c").mkdir()
     with folder_locked(here / "c"):
         result, begun = sweep(monkeypatch, *CALL)
@@ -207,7 +206,7 @@ def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: py
     def build(_plan: CampaignPlan) -> dict[str, Path]:
         raise AssertionError("units are not to be built")
 
-    monkeypatch.setattr(campaign_call, "unit_fmus", build)
+    monkeypatch.setattr(plan_check, "unit_fmus", build)
     address = f"127.0.0.1:{closed_port()}"
     result = CliRunner().invoke(main, [*CALL[:-2], "--scheduler", address])
     assert result.exit_code == 2
