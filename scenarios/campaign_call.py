@@ -20,7 +20,6 @@ from scenarios.campaign.campaign_place import place_of
 from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
-from scenarios.campaign.idle_crew import IdleCrew
 from scenarios.campaign.late_crew import LateCrew
 from scenarios.campaign.plan import CampaignPlan
 from scenarios.campaign.plan_check import PreparedPlan, prepared
@@ -104,16 +103,14 @@ def _carry_out(
     progress: CampaignProgress,
 ) -> CampaignTable:
     plan = ready.plan
-    begins = not folder.has_all(plan)
-    if begins:
+    if not folder.has_all(plan):
         done = sum(map(folder.is_done, plan.runs()))
         told = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
         click.echo(f"{told}{f'; {done} are done' if done else ''}", err=True)
     try:
         with contextlib.ExitStack() as opened, progress:
             start = partial(_started, workers, interruption)
-            crew = LateCrew(start, opened) if begins else IdleCrew(start)
-            return carry_out_campaign(ready, folder, crew, progress)
+            return carry_out_campaign(ready, folder, LateCrew(start, opened), progress)
     except (RecordNotWritten, CrewLost) as e:
         if progress.tally is None:
             raise

@@ -3,7 +3,7 @@
 import contextlib
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from cosim.exceptions import RecordNotWritten
@@ -31,13 +31,18 @@ def carry_out_campaign(ready: PreparedPlan, folder: CampaignFolder, crew: Crew, 
         CrewLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
-    with folder.opened(ready.plan, ready.fmus, crew.check) as fmus:
+    check = _nothing if folder.has_all(ready.plan) else crew.check
+    with folder.opened(ready.plan, ready.fmus, check) as fmus:
         work = _Work(ready.plan, folder, progress)
         try:
             work.give_to(crew, fmus)
         finally:
             work.end()
     return CampaignTable.read(folder.table)
+
+
+def _nothing(_folder: Path) -> None:
+    """Check no crew, as none is needed unless a run turns out to be damaged."""
 
 
 class _Work:
@@ -56,11 +61,7 @@ class _Work:
         orders = [self._order(run, fmus) for run in self._to_do()]
         if not orders:
             return
-        with contextlib.ExitStack() as stack:
-            answers = crew.carry_out(orders)
-            close: Callable[[], None] | None = getattr(answers, "close", None)
-            if close is not None:
-                stack.callback(close)
+        with contextlib.closing(crew.carry_out(orders)) as answers:
             for answer in answers:
                 self._take(answer)
 

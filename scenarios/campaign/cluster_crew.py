@@ -6,7 +6,7 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -74,7 +74,7 @@ class ClusterCrew:
                 mark.unlink(missing_ok=True)
         self._refuse({w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
         """Give each order to a worker; yield the answers as they come.
 
         A worker that is lost is replaced where something watches it (a nanny), and its run begun anew. If the iteration

@@ -15,7 +15,6 @@ from distributed import Client, LocalCluster
 from cosim.exceptions import one_line
 from scenarios.campaign.bad_crew import BadCrew
 from scenarios.campaign.cluster_crew import ClusterCrew
-from scenarios.campaign.crew import Crew
 from scenarios.campaign.workforce import cores
 
 _SILENT = logging.CRITICAL + 1
@@ -42,7 +41,7 @@ _STILL = {
 
 
 @contextlib.contextmanager
-def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
+def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
     """Start workers on this machine, a process each; by default one for each core that this process may use.
 
     They hear of no Ctrl-C, and end with this process, however it ends.
@@ -74,7 +73,7 @@ def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
 
 
 @contextlib.contextmanager
-def crew_at(address: str) -> Generator[Crew, None, None]:
+def crew_at(address: str) -> Generator[ClusterCrew, None, None]:
     """Use the workers of a cluster that the user runs; the address is one that `scheduler_address` has returned.
 
     Raises:

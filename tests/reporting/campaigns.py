@@ -1,7 +1,7 @@
 """Campaigns to make pages of: real ones, and tables that a test chooses."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,11 @@ class PlainCrew:
     """Carries runs out one after another in this process, and loses those that are named."""
 
     lost: Sequence[str] = ()
-    workers: int = 1
 
     def check(self, folder: Path) -> None:
         assert folder.is_dir()
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
         for order in orders:
             if order.name in self.lost:
                 yield RunAnswer(name=order.name, lost="its worker went away")

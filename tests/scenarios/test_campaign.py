@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -88,7 +88,7 @@ def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path
 
 def test_a_run_whose_answer_did_not_come_is_in_the_table_all_the_same(tmp_path: Path):
     class Mute(OwnCrew):
-        def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+        def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
             for _ in super().carry_out(orders[:1]):
                 raise KeyboardInterrupt
             yield from ()

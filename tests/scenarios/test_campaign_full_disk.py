@@ -6,7 +6,7 @@ import io
 import os
 import pickle
 import tempfile
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,7 @@ def test_a_mark_for_workers_that_cannot_be_written_is_told(here: Path, monkeypat
 
 def test_a_run_without_room_stops_it_and_what_is_done_stays(monkeypatch: pytest.MonkeyPatch):
     class Full(OwnCrew):
-        def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+        def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
             yield from super().carry_out(orders[:1])
             yield RunAnswer(name=orders[1].name, lost="it was lost", no_room="Disk quota exceeded")
             raise AssertionError("no other run is waited for")

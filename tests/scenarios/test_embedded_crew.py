@@ -81,7 +81,7 @@ def test_an_iteration_that_is_left_ends_its_runs(crew: Crew, runs: Path, tmp_pat
     hanging = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
     answers = crew.carry_out([order(runs), *hanging])
     assert next(iter(answers)).name == "run"
-    answers.close()  # pyright: ignore[reportAttributeAccessIssue]
+    answers.close()
     assert servers(os.getpid()) == []
     assert [p.name for p in runs.iterdir()] == ["run"]
 
