@@ -117,8 +117,7 @@ class RunServer:
 
         def begin() -> NoReturn:
             supervisor.begin_child()
-            for pipe in (self._orders, self._answers):
-                os.close(pipe.fileno())
+            os.close(self._orders.fileno())  # answers stay open: by their end the worker knows that runs have ended too
             for number in (1, 2):
                 os.dup2(log.fileno(), number)
             answer = work()

@@ -53,7 +53,8 @@ class ServerProcess:
             start_new_session=True,
         )
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listening = threading.Thread(target=self._listen, daemon=True)
+        self._listening.start()
 
     @property
     def pid(self) -> int:
@@ -79,16 +80,19 @@ class ServerProcess:
             except (OSError, ValueError) as e:
                 raise ServerLost(self._last_words()) from e
             while True:
+                lives = self.lives
                 with contextlib.suppress(queue.Empty):
                     answer = self._answers.get(timeout=_LOOK)
                     if answer is None:
                         raise ServerLost(self._last_words())
                     return answer
+                if not lives:
+                    raise ServerLost(self._last_words())
                 if not wanted():
                     raise NotWanted
         except BaseException:
             self.end()
-            _remove(folder)
+            shutil.rmtree(folder, ignore_errors=True)
             raise
 
     def ask_to_end(self) -> None:
@@ -104,12 +108,14 @@ class ServerProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._listening.join(_GRACE)  # its run dies after it, and writes until then
 
     @property
     def _orders(self) -> BinaryIO:
         return cast(BinaryIO, self._process.stdin)
 
     def _listen(self) -> None:
+        """Take answers until both the server and the run that it carries out have ended."""
         answers = cast(BinaryIO, self._process.stdout)
         with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it has ended, maybe amid an answer
             while True:
@@ -124,11 +130,3 @@ class ServerProcess:
         lines = self._errors.read().decode("utf-8", "replace").split("\n")
         said = next((f": {line.strip()}" for line in reversed(lines) if line.strip()), "")
         return f"its run server ended with status {status}{said}"
-
-
-def _remove(folder: Path) -> None:
-    """Remove what is left of a run whose process may just be ending."""
-    for _ in range(20):
-        shutil.rmtree(folder, ignore_errors=True)
-        if not folder.exists():
-            return
