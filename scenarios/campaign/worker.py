@@ -13,7 +13,7 @@ from distributed import get_worker
 
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
-from scenarios.run_folder import versions
+from scenarios.run_folder import version_differences, versions
 
 _servers: dict[tuple[str, int], ServerProcess] = {}
 """By batch and thread."""
@@ -72,9 +72,8 @@ _versions = functools.cache(versions)
 
 def difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
     """Return what other versions a worker has, "" if it has none."""
-    other = [f"{name} {there.get(name)} (here {version})" for name, version in here.items()
-             if there.get(name) != version]  # fmt: skip
-    return f"has other versions: {', '.join(other)}" if other else ""
+    other = version_differences(here, there)
+    return f"has other versions: {other}" if other else ""
 
 
 def fault_of_folder(folder: str, file: str, content: str) -> str:
