@@ -20,10 +20,9 @@ from scenarios.campaign.campaign_place import place_of
 from scenarios.campaign.campaign_progress import CampaignProgress, told_done
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
-from scenarios.campaign.idle_crew import IdleCrew
 from scenarios.campaign.late_crew import LateCrew
 from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
+from scenarios.campaign.plan_check import PreparedPlan, prepared
 from scenarios.campaign.tally import Tally
 from scenarios.campaign.workforce import Workforce
 from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
@@ -70,15 +69,11 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
     folder = None
     try:
         with CampaignInterruption() as interruption, told_in_one_line():
-            plan = checked_plan(plan)
             called = CampaignFolder(out) if out else None
-            _check_cheaply(plan, called, workers, interruption)
-            fmus = unit_fmus(plan)
-            check_units(plan, fmus)
-            folder = called or place_of(plan, fmus)
-            folder.check_free()
-            folder.check(plan, fmus)
-            table = _carry_out(plan, folder, workers, interruption, progress)
+            ready = prepared(plan, lambda checked: _check_cheaply(checked, called, workers, interruption))
+            folder = called or place_of(ready.plan, ready.fmus)
+            folder.check(ready.plan, ready.fmus)  # before it is told what begins
+            table = _carry_out(ready, folder, workers, interruption, progress)
             finish(folder, table)
     except KeyboardInterrupt:
         _end_interrupted(folder, progress)
@@ -86,7 +81,7 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
     assert tally is not None
     if tally.kept == tally.total:
         click.echo(f"{folder.path} has all of its runs; none was carried out", err=True)
-    return CampaignCall(plan, folder, table, tally)
+    return CampaignCall(ready.plan, folder, table, tally)
 
 
 def _check_cheaply(
@@ -101,22 +96,21 @@ def _check_cheaply(
 
 
 def _carry_out(
-    plan: CampaignPlan,
+    ready: PreparedPlan,
     folder: CampaignFolder,
     workers: Workforce,
     interruption: CampaignInterruption,
     progress: CampaignProgress,
 ) -> CampaignTable:
-    begins = not folder.has_all(plan)
-    if begins:
+    plan = ready.plan
+    if not folder.has_all(plan):
         done = sum(map(folder.is_done, plan.runs()))
         told = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
         click.echo(f"{told}{f'; {done} are done' if done else ''}", err=True)
     try:
         with contextlib.ExitStack() as opened, progress:
             start = partial(_started, workers, interruption)
-            crew = LateCrew(start, opened) if begins else IdleCrew(start)
-            return carry_out_campaign(plan, folder, crew, progress)
+            return carry_out_campaign(ready, folder, LateCrew(start, opened), progress)
     except (RecordNotWritten, CrewLost) as e:
         if progress.tally is None:
             raise

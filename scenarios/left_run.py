@@ -1,21 +1,20 @@
 """A run that a process has left: whether it can go on, and how."""
 
 import contextlib
-import errno
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
 from cosim.checkpoint import BadCheckpoint
-from cosim.exceptions import RecordNotWritten, nearest
+from cosim.exceptions import RecordNotWritten, nearest, one_line
 from cosim.record.complete_record import complete_record
 from cosim.record.file_lock import FileLocked
 from fmus.build import cached
 from scenarios.catalog import SCENARIOS
 from scenarios.experiment import Experiment
 from scenarios.resumption import Resumption, unpack
-from scenarios.run_folder import BadRunFolder, RunFolder, sha256_of, versions
+from scenarios.run_folder import BadRunFolder, RunFolder, is_full, sha256_of, version_differences, versions
 from scenarios.ssp_call import open_experiment
 from scenarios.task import Task
 
@@ -33,9 +32,9 @@ def complete_signals(folder: RunFolder) -> int:
     except FileNotFoundError:  # it ended before it recorded
         return 0
     except ValueError as e:  # Arrow's
-        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {str(e).splitlines()[0]}") from e
+        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
     except OSError as e:
-        if e.errno in (errno.ENOSPC, errno.EDQUOT):
+        if is_full(e):
             raise RecordNotWritten(folder.signals, str(e.strerror)) from e
         raise BadRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 
@@ -96,11 +95,8 @@ class LeftRun:
         return cast(Mapping[str, Any], found)
 
     def _check_versions(self, before: Mapping[str, str]) -> None:
-        here = versions()
-        other = [f"{name} {before.get(name)} (here {version})" for name, version in here.items()
-                 if before.get(name) != version]  # fmt: skip
-        if other:
-            raise BadRunFolder(self.folder.path, f"the run began with other versions: {', '.join(other)}")
+        if other := version_differences(versions(), before):
+            raise BadRunFolder(self.folder.path, f"the run began with other versions: {other}")
 
     def _experiment(self, opened: contextlib.ExitStack) -> Experiment[Any]:
         source, name = self._told["source"], self._told["scenario"]

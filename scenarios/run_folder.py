@@ -1,6 +1,7 @@
 """The folder that a run leaves behind: checked before the run, written to during and after it."""
 
 import contextlib
+import errno
 import hashlib
 import importlib.metadata
 import json
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from cosim.exceptions import RecordNotWritten, one_line
-from cosim.record.file_lock import FileLocked, folder_locked
+from cosim.record.file_lock import FileLocked, folder_locked, holder_of
 
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 
@@ -122,13 +123,7 @@ class RunFolder:
         Raises:
             BadRunFolder: another process holds it, or it is not there.
         """
-        with contextlib.ExitStack() as held:
-            try:
-                held.enter_context(folder_locked(self.path))
-            except FileLocked as e:
-                raise BadRunFolder(self.path, "the run still goes on") from e
-            except OSError as e:
-                raise BadRunFolder(self.path, f"it cannot be opened: {e.strerror}") from e
+        with folder_held(self.path, "the run still goes on"):
             yield
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
@@ -155,7 +150,7 @@ class RunFolder:
         Raises:
             BadRunFolder: there is nothing of the kind.
         """
-        return self._read("run.json", "it is not the folder of a run: it has no run.json")
+        return read_object(self.path / "run.json", "it is not the folder of a run: it has no run.json")
 
     def read_summary(self) -> dict[str, Any]:
         """Return what `write_summary` wrote; nothing if the run has not come so far.
@@ -163,18 +158,43 @@ class RunFolder:
         Raises:
             BadRunFolder: it is damaged.
         """
-        return self._read("summary.json", "") if (self.path / "summary.json").exists() else {}
+        file = self.path / "summary.json"
+        return read_object(file, "") if file.exists() else {}
 
-    def _read(self, name: str, missing: str) -> dict[str, Any]:
+
+def read_object(file: Path, missing: str) -> dict[str, Any]:
+    """Return the JSON object in a file of a folder.
+
+    Raises:
+        BadRunFolder: it is damaged, or cannot be read, which is told as `missing`.
+    """
+    try:
+        content = json.loads(file.read_bytes())
+    except OSError as e:
+        raise BadRunFolder(file.parent, missing) from e
+    except ValueError as e:
+        raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}") from e
+    if not isinstance(content, dict):
+        raise BadRunFolder(file.parent, f"its {file.name} is damaged: it holds no JSON object")
+    return cast(dict[str, Any], content)
+
+
+@contextlib.contextmanager
+def folder_held(path: Path, by_another: str) -> Generator[None, None, None]:
+    """Keep other processes that call this from a folder.
+
+    Raises:
+        BadRunFolder: another process holds it, which is told as `by_another`, or it is not there.
+    """
+    with contextlib.ExitStack() as held:
         try:
-            content = json.loads((self.path / name).read_bytes())
+            held.enter_context(folder_locked(path))
+        except FileLocked as e:
+            holder = holder_of(path)
+            raise BadRunFolder(path, by_another + (f" (process {holder})" if holder else "")) from e
         except OSError as e:
-            raise BadRunFolder(self.path, missing) from e
-        except ValueError as e:
-            raise BadRunFolder(self.path, f"its {name} is damaged: {one_line(e)}") from e
-        if not isinstance(content, dict):
-            raise BadRunFolder(self.path, f"its {name} is damaged: it holds no JSON object")
-        return cast(dict[str, Any], content)
+            raise BadRunFolder(path, f"it cannot be opened: {e.strerror}") from e
+        yield
 
 
 @contextlib.contextmanager
@@ -184,6 +204,11 @@ def told_if_not_written(path: Path) -> Generator[None, None, None]:
         yield
     except OSError as e:
         raise RecordNotWritten(path, e.strerror or str(e)) from e
+
+
+def is_full(e: OSError) -> bool:
+    """Return whether there is no room: the disk is full, or someone's share of it, or a file at its largest."""
+    return e.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -210,6 +235,12 @@ def sha256_of(file: Path) -> str:
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that a run's numbers depend on."""
     return {"python": platform.python_version(), **{p: _version(p) for p in _PACKAGES}}
+
+
+def version_differences(here: Mapping[str, str], there: Mapping[str, str]) -> str:
+    """Return which of `versions` are others elsewhere, "" if none is."""
+    other = [name for name, version in here.items() if there.get(name) != version]
+    return ", ".join(f"{name} {there.get(name)} (here {here[name]})" for name in other)
 
 
 def _version(package: str) -> str:

@@ -1,11 +1,9 @@
 """Carries out a campaign: all is checked, what is done is kept, the rest is given to a crew, and the table is kept."""
 
 import contextlib
-import errno
-import os
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from cosim.exceptions import RecordNotWritten
@@ -13,7 +11,7 @@ from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.crew import Crew
 from scenarios.campaign.plan import CampaignPlan, PlannedRun
-from scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
+from scenarios.campaign.plan_check import PreparedPlan
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.run_row import RunRow, row_of
 from scenarios.campaign.table_writer import TableWriter
@@ -21,29 +19,30 @@ from scenarios.campaign.tally import OnTally, Tally
 from scenarios.run_folder import told_if_not_written
 
 
-def carry_out_campaign(plan: CampaignPlan, folder: CampaignFolder, crew: Crew, progress: OnTally) -> CampaignTable:
+def carry_out_campaign(ready: PreparedPlan, folder: CampaignFolder, crew: Crew, progress: OnTally) -> CampaignTable:
     """Carry out the runs of a campaign that are not done yet, and return the table of all.
 
     Whatever ends it, what was done stays, and the same call goes on: a run is done when it has left its folder,
     also if a unit failed in it. Lost runs are tried again by the next call.
 
     Raises:
-        BadCall, BadParameter, BadRunFolder, InvalidFmu, WiringError, ScheduleError, BadCrew: before anything was
-            written.
+        BadRunFolder, BadCrew: before anything was written.
         RecordNotWritten: there is no room.
         CrewLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
-    plan = checked_plan(plan)
-    files = unit_fmus(plan)
-    check_units(plan, files)
-    with folder.opened(plan, files, crew.check) as fmus:
-        work = _Work(plan, folder, progress)
+    check = _nothing if folder.has_all(ready.plan) else crew.check
+    with folder.opened(ready.plan, ready.fmus, check) as fmus:
+        work = _Work(ready.plan, folder, progress)
         try:
             work.give_to(crew, fmus)
         finally:
             work.end()
     return CampaignTable.read(folder.table)
+
+
+def _nothing(_folder: Path) -> None:
+    """Check no crew, as none is needed unless a run turns out to be damaged."""
 
 
 class _Work:
@@ -62,11 +61,7 @@ class _Work:
         orders = [self._order(run, fmus) for run in self._to_do()]
         if not orders:
             return
-        with contextlib.ExitStack() as stack:
-            answers = crew.carry_out(orders)
-            close: Callable[[], None] | None = getattr(answers, "close", None)
-            if close is not None:
-                stack.callback(close)
+        with contextlib.closing(crew.carry_out(orders)) as answers:
             for answer in answers:
                 self._take(answer)
 
@@ -120,8 +115,8 @@ class _Work:
         run = self.runs[answer.name]
         row = None if answer.lost else row_of(run, self.folder.runs / run.name)
         if row is None:
-            if os.strerror(errno.ENOSPC) in answer.lost:
-                raise RecordNotWritten(self.folder.runs / run.name, os.strerror(errno.ENOSPC))
+            if answer.no_room:
+                raise RecordNotWritten(self.folder.runs / run.name, answer.no_room)
             reason = answer.lost or "its folder does not say how it ended"
             row = RunRow(run=run, status="lost", success=None, reason=reason)
         self._count[row.status] += 1

@@ -7,20 +7,29 @@ import platform
 import shutil
 from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from cosim.exceptions import one_line
-from cosim.record.file_lock import FileLocked, folder_locked, holder_of
 from scenarios.campaign.campaign_identity import differences, identity_of
 from scenarios.campaign.plan import CampaignPlan, PlannedRun
 from scenarios.catalog import SCENARIOS
-from scenarios.run_folder import BadRunFolder, check_place, sha256_of, told_if_not_written, write_whole
+from scenarios.run_folder import (
+    BadRunFolder,
+    check_place,
+    folder_held,
+    read_object,
+    sha256_of,
+    told_if_not_written,
+    write_whole,
+)
 
 _FILE = "campaign.json"
 
 
 class CampaignFolder:
-    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`."""
+    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`.
+
+    A paper's experiment leaves `claims.json` and `figures/` besides.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -61,15 +70,7 @@ class CampaignFolder:
         Raises:
             BadRunFolder: it is not the folder of a campaign, or damaged.
         """
-        try:
-            content = json.loads((self.path / _FILE).read_bytes())
-        except OSError as e:
-            raise BadRunFolder(self.path, f"it is not the folder of a campaign: it has no {_FILE}") from e
-        except ValueError as e:
-            raise BadRunFolder(self.path, f"its {_FILE} is damaged: {one_line(e)}") from e
-        if not isinstance(content, dict):
-            raise BadRunFolder(self.path, f"its {_FILE} is damaged: it holds no JSON object")
-        return cast(dict[str, Any], content)
+        return read_object(self.path / _FILE, f"it is not the folder of a campaign: it has no {_FILE}")
 
     def check(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Check that a campaign can begin or go on here; nothing is written.
@@ -77,9 +78,7 @@ class CampaignFolder:
         Raises:
             BadRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
         """
-        if self.path.exists() and not self.path.is_dir():
-            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
-        check_place(self.path)
+        self._check_place()
         if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
             return
         if not (self.path / _FILE).exists():
@@ -114,11 +113,10 @@ class CampaignFolder:
             BadRunFolder: as by `check`; or another command holds it, or it cannot be made.
             RecordNotWritten: it cannot be written to.
         """
-        self.check(plan, fmus)
         with contextlib.ExitStack() as held:
             with self._made():
                 held.enter_context(self._held())
-                self.check(plan, fmus)  # another command may have made it meanwhile
+                self.check(plan, fmus)
                 with self._written(plan, fmus):
                     check(self.path)
             with told_if_not_written(self.path):
@@ -144,9 +142,15 @@ class CampaignFolder:
         except OSError:
             return False
 
+    def _check_place(self) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
+        check_place(self.path)
+
     @contextlib.contextmanager
     def _made(self) -> Generator[None, None, None]:
         """Make the folder; if what follows fails, remove what was made and is empty."""
+        self._check_place()
         absent = [p for p in (self.path, *self.path.parents) if not p.exists()]
         try:
             self.path.mkdir(parents=True, exist_ok=True)
@@ -160,18 +164,8 @@ class CampaignFolder:
                     folder.rmdir()
             raise
 
-    @contextlib.contextmanager
-    def _held(self) -> Generator[None, None, None]:
-        with contextlib.ExitStack() as held:
-            try:
-                held.enter_context(folder_locked(self.path))
-            except FileLocked as e:
-                by = holder_of(self.path)
-                process = f" (process {by})" if by else ""
-                raise BadRunFolder(self.path, f"another command carries this campaign out{process}") from e
-            except OSError as e:
-                raise BadRunFolder(self.path, f"it cannot be opened: {e.strerror}") from e
-            yield
+    def _held(self) -> contextlib.AbstractContextManager[None]:
+        return folder_held(self.path, "another command carries this campaign out")
 
     def _counts(self, entry: Path) -> bool:
         """Return whether something is more than what a call leaves that was killed before it wrote `campaign.json`."""

@@ -6,7 +6,7 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,7 +16,7 @@ from cosim.exceptions import one_line
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
-from scenarios.run_folder import versions
+from scenarios.run_folder import told_if_not_written, versions
 
 _AHEAD = 2
 """Orders that the scheduler holds for each thread: one that is carried out and one that waits.
@@ -60,19 +60,21 @@ class ClusterCrew:
 
         Raises:
             BadCrew: some do not; the first of them are named.
+            RecordNotWritten: this process cannot write there itself.
         """
         told = self._ask(tell_versions)
         self._refuse({worker: _difference(self._versions, other) for worker, other in told.items()})
         token = uuid.uuid4().hex
         mark = folder / f".{token}"
-        mark.write_text(token, encoding="utf-8")
-        try:
-            told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
-        finally:
-            mark.unlink()
+        with told_if_not_written(folder):
+            try:
+                mark.write_text(token, encoding="utf-8")
+                told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
+            finally:
+                mark.unlink(missing_ok=True)
         self._refuse({w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
         """Give each order to a worker; yield the answers as they come.
 
         A worker that is lost is replaced where something watches it (a nanny), and its run begun anew. If the iteration

@@ -1,6 +1,6 @@
 """Who carries out the runs of a campaign."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -10,11 +10,6 @@ from scenarios.campaign.run_order import RunAnswer, RunOrder
 class Crew(Protocol):
     """Workers that carry out orders side by side."""
 
-    @property
-    def workers(self) -> int:
-        """How many runs go on at the same time."""
-        ...
-
     def check(self, folder: Path) -> None:
         """Check that all workers give the same numbers as this process would, and write to the same folder.
 
@@ -22,11 +17,11 @@ class Crew(Protocol):
             folder: an existing one, into which runs are to be written.
 
         Raises:
-            BadCrew: some do not.
+            BadCrew: some do not. RecordNotWritten: nothing can be written there, as on a full disk.
         """
         ...
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
         """Give each order to a worker; yield the answers as they come.
 
         A worker that is lost is replaced where that is possible, and its run begun anew. If the iteration is left

@@ -15,8 +15,6 @@ from distributed import Client, LocalCluster
 from cosim.exceptions import one_line
 from scenarios.campaign.bad_crew import BadCrew
 from scenarios.campaign.cluster_crew import ClusterCrew
-from scenarios.campaign.crew import Crew
-from scenarios.campaign.scheduler_address import scheduler_address
 from scenarios.campaign.workforce import cores
 
 _SILENT = logging.CRITICAL + 1
@@ -43,7 +41,7 @@ _STILL = {
 
 
 @contextlib.contextmanager
-def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
+def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
     """Start workers on this machine, a process each; by default one for each core that this process may use.
 
     They hear of no Ctrl-C, and end with this process, however it ends.
@@ -75,23 +73,22 @@ def embedded_crew(workers: int | None) -> Generator[Crew, None, None]:
 
 
 @contextlib.contextmanager
-def crew_at(address: str) -> Generator[Crew, None, None]:
-    """Use the workers of a cluster that the user runs.
+def crew_at(address: str) -> Generator[ClusterCrew, None, None]:
+    """Use the workers of a cluster that the user runs; the address is one that `scheduler_address` has returned.
 
     Raises:
-        BadCrew: the address is malformed, no scheduler answers there, or it has no workers.
+        BadCrew: no scheduler answers there any more, or it has no workers.
     """
     with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
-        whole = scheduler_address(address)
         try:
-            client = opened.enter_context(Client(whole, timeout=5, set_as_default=False))
+            client = opened.enter_context(Client(address, timeout=5, set_as_default=False))
         except (OSError, ValueError) as e:
-            raise BadCrew(f"the scheduler at {whole} cannot be used: {one_line(e)}") from e
+            raise BadCrew(f"the scheduler at {address} cannot be used: {one_line(e)}") from e
         try:
             client.wait_for_workers(1, timeout=_WORKERS)
         except TimeoutError as e:
-            raise BadCrew(f"the scheduler at {whole} has no workers; `dask worker {whole}` starts some") from e
-        crew = ClusterCrew(client, whole)
+            raise BadCrew(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
+        crew = ClusterCrew(client, address)
         opened.callback(crew.end)
         yield crew
 

@@ -1,7 +1,7 @@
 """Workers of a campaign that are started when its folder is held, so that no other command can take it meanwhile."""
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 from scenarios.campaign.crew import Crew
@@ -9,7 +9,7 @@ from scenarios.campaign.run_order import RunAnswer, RunOrder
 
 
 class LateCrew:
-    """Starts a crew when it is checked.
+    """Starts a crew when it is checked, or with its first order if it was not: a campaign may seem to need none.
 
     Args:
         start: gives the crew.
@@ -22,26 +22,24 @@ class LateCrew:
         self._start, self._opened = start, opened
         self._crew: Crew | None = None
 
-    @property
-    def workers(self) -> int:
-        """How many runs go on at the same time."""
-        return 0 if self._crew is None else self._crew.workers
-
     def check(self, folder: Path) -> None:
         """Start the crew and check it.
 
         Raises:
-            BadCrew: it cannot be started or used.
+            BadCrew: it cannot be started or used. RecordNotWritten: as `Crew.check`.
         """
-        self._crew = self._opened.enter_context(self._start())
-        self._crew.check(folder)
+        self._crew = self._checked(folder)
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
-        """Let the crew carry out orders, after `check`.
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+        """Let the crew carry out orders.
 
         Raises:
-            CrewLost: it has gone.
+            BadCrew, RecordNotWritten: as `check`, if that was not called. CrewLost: it has gone.
         """
-        if self._crew is None:
-            raise RuntimeError("check the crew first: that starts it")
-        return self._crew.carry_out(orders)
+        crew = self._crew or self._checked(Path(orders[0].runs))
+        return crew.carry_out(orders)
+
+    def _checked(self, folder: Path) -> Crew:
+        crew = self._opened.enter_context(self._start())
+        crew.check(folder)
+        return crew

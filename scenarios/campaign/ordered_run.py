@@ -14,12 +14,12 @@ import click
 from cosim.exceptions import UnitFailure, one_line
 from scenarios.bad_call import told_in_one_line
 from scenarios.campaign.refused_run import REFUSALS, write_refused_run
-from scenarios.campaign.run_order import RunOrder
+from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.chosen import scenario_named
 from scenarios.interruption import Interruption
 from scenarios.parameters import parse_parameters
 from scenarios.resumption import Spent
-from scenarios.run_folder import RunFolder
+from scenarios.run_folder import RunFolder, is_full
 from scenarios.runner import carry_out
 from scenarios.task import Task
 
@@ -55,17 +55,27 @@ def _task(order: RunOrder, folder: Path) -> Task:
     )
 
 
-def fault_of(work: Callable[[], object]) -> str:
-    """Do something; return in a sentence why it could not be done, and "" if it could."""
+def answer_of(order: RunOrder, work: Callable[[], object]) -> RunAnswer:
+    """Do something for an order; answer why it could not be done, if it could not."""
     try:
         with told_in_one_line():
             work()
     except click.ClickException as e:
-        return e.message
+        return lost_by(e, order, e.message)
     except BaseException as e:  # a run may raise what it likes: the campaign goes on
         traceback.print_exc()
-        return f"{type(e).__name__}: {one_line(e)}"
-    return ""
+        return lost_by(e, order, f"{type(e).__name__}: {one_line(e)}")
+    return RunAnswer(name=order.name)
+
+
+def lost_by(error: BaseException, order: RunOrder, told: str) -> RunAnswer:
+    """Answer that a run is lost by an exception, with what is told of it."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and is_full(cause):
+            return RunAnswer(name=order.name, lost=told, no_room=cause.strerror or one_line(cause))
+        cause = cause.__cause__
+    return RunAnswer(name=order.name, lost=told)
 
 
 @contextlib.contextmanager
@@ -83,14 +93,14 @@ def printing_to(log: BinaryIO):
             os.close(before[number - 1])
 
 
-def finish(order: RunOrder, folder: Path, log: BinaryIO) -> str:
-    """Name the folder of a run that has ended as the order says; return why it cannot be, and "" if it is.
+def finish(order: RunOrder, folder: Path, log: BinaryIO) -> RunAnswer:
+    """Name the folder of a run that has ended as the order says; answer why it cannot be, if it cannot.
 
     What the run printed goes into its `log.txt`. A folder without a summary is left as it is.
     """
     named = Path(order.runs, order.name)
     if not (folder / "summary.json").exists():
-        return "it ended without a summary"
+        return RunAnswer(name=order.name, lost="it ended without a summary")
     with contextlib.suppress(OSError):  # a full disk: the run itself is complete
         log.seek(0)
         if printed := log.read():
@@ -99,6 +109,6 @@ def finish(order: RunOrder, folder: Path, log: BinaryIO) -> str:
         os.rename(folder, named)
     except OSError as e:
         if not (named / "summary.json").exists():  # else it was carried out twice, as when a worker was taken for lost
-            return f"its folder cannot be named {named}: {e.strerror}"
+            return lost_by(e, order, f"its folder cannot be named {named}: {e.strerror}")
         shutil.rmtree(folder, ignore_errors=True)
-    return ""
+    return RunAnswer(name=order.name)

@@ -1,8 +1,8 @@
 """Checks all of a campaign's plan before any of its runs begins."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,6 +15,36 @@ from scenarios.parameters import BadParameter, parse_parameters, text_of
 
 _MOST_TOLD = 8
 """Faults that are told; there may be one a point."""
+
+
+@dataclass(frozen=True)
+class PreparedPlan:
+    """A plan whose runs can begin, as `prepared` gives it.
+
+    Attributes:
+        plan: the plan as it was checked.
+        fmus: the FMU of each unit.
+    """
+
+    plan: CampaignPlan
+    fmus: Mapping[str, Path]
+
+
+def prepared(plan: CampaignPlan, before_units: Callable[[CampaignPlan], None] = lambda _plan: None) -> PreparedPlan:
+    """Check a plan and its units, which may have to be built.
+
+    Args:
+        plan: what is to be carried out.
+        before_units: refuses what can be refused without units; it is given the checked plan.
+
+    Raises:
+        As `checked_plan`, `before_units`, `unit_fmus` and `check_units`.
+    """
+    plan = checked_plan(plan)
+    before_units(plan)
+    fmus = unit_fmus(plan)
+    check_units(plan, fmus)
+    return PreparedPlan(plan, fmus)
 
 
 def checked_plan(plan: CampaignPlan) -> CampaignPlan:

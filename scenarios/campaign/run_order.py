@@ -35,9 +35,9 @@ class RunAnswer:
     Attributes:
         name: the order's.
         lost: why there is no folder of the run, in a sentence; "" if there is one, whose `summary.json` tells the rest.
-        worker: address of the worker.
+        no_room: what the system says if a full disk is why it is lost, as "No space left on device"; else "".
     """
 
     name: str
     lost: str = ""
-    worker: str = ""
+    no_room: str = ""

@@ -1,8 +1,8 @@
 """A process that carries out one run after the other, each in a child of its own: `python -m` this module.
 
 It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads orders from
-standard input and answers on standard output (`messages`): an order is a `RunOrder` and the folder for its files while
-it runs; the answer is why there is no folder of the run, or "". It ends with its input, and a run under way with it.
+standard input and answers on standard output, all pickled: an order is a `RunOrder` and the folder for its files while
+it runs; the answer is a `RunAnswer`. It ends with its input, and a run under way with it.
 
 Where processes cannot be forked (Windows) it carries runs out itself: what a unit does to the process, it does to it.
 """
@@ -10,12 +10,13 @@ Where processes cannot be forked (Windows) it carries runs out itself: what a un
 import contextlib
 import gc
 import os
+import pickle
 import select
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
@@ -23,9 +24,8 @@ from cosim.heartbeat import Heartbeat
 from fmus.build import import_block
 from fmus.catalog import UNITS
 from scenarios import supervisor
-from scenarios.campaign.messages import receive, send
-from scenarios.campaign.ordered_run import carry_out_order, fault_of, finish, printing_to, refuse_order
-from scenarios.campaign.run_order import RunOrder
+from scenarios.campaign.ordered_run import answer_of, carry_out_order, finish, lost_by, printing_to, refuse_order
+from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.catalog import SCENARIOS
 from scenarios.death import Death
 from scenarios.forked_child import ChildEnd, ForkedChild
@@ -52,11 +52,12 @@ class RunServer:
         """Carry out orders until there are no more."""
         while self._comes():
             try:
-                order, folder = receive(self._orders)
-            except EOFError:
+                order, folder = pickle.load(self._orders)
+            except (EOFError, pickle.UnpicklingError):  # the worker has ended, maybe amid an order
                 return
             self._load(order.scenario)
-            send(self._answers, self._carry_out(order, folder))
+            pickle.dump(self._carry_out(order, folder), self._answers)
+            self._answers.flush()
 
     def _comes(self) -> bool:
         """Wait for an order, or the end of them."""
@@ -73,30 +74,34 @@ class RunServer:
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
 
-    def _carry_out(self, order: RunOrder, folder: Path) -> str:
-        with tempfile.TemporaryFile(dir=order.runs) as log:
+    def _carry_out(self, order: RunOrder, folder: Path) -> RunAnswer:
+        try:
+            log = tempfile.TemporaryFile(dir=order.runs)  # noqa: SIM115 (closed below)
+        except OSError as e:
+            return lost_by(e, order, f"{order.runs} cannot be written: {e.strerror}")
+        with log:
             if self._forks:
-                lost = self._fork(order, folder, log)
+                answer = self._fork(order, folder, log)
             else:
                 with printing_to(log):
-                    lost = fault_of(lambda: carry_out_order(order, folder))
-            lost = lost or finish(order, folder, log)
-        if lost:
+                    answer = answer_of(order, lambda: carry_out_order(order, folder))
+            answer = answer if answer.lost else finish(order, folder, log)
+        if answer.lost:
             shutil.rmtree(folder, ignore_errors=True)
-        return lost
+        return answer
 
-    def _fork(self, order: RunOrder, folder: Path, log: BinaryIO) -> str:
+    def _fork(self, order: RunOrder, folder: Path, log: BinaryIO) -> RunAnswer:
         """Carry out a run in a child; if that dies of a unit, another child tells of it in the folder."""
         began = time.monotonic()
-        end, heartbeat = self._in_child(lambda: fault_of(lambda: carry_out_order(order, folder)), folder, log)
+        end, heartbeat = self._in_child(lambda: answer_of(order, lambda: carry_out_order(order, folder)), folder, log)
         if heartbeat.status is not None:
-            return heartbeat.facts.get("lost", "")
+            return _answer(order, heartbeat, "")
         death = Death(heartbeat, end, time.monotonic() - began)
         if death.was_killed or end.signal in supervisor.ORDERS:
-            return death.told
+            return RunAnswer(name=order.name, lost=death.told)
         left, failure, spent = death.folder, death.failure, Spent(time.monotonic() - began, end.cpu)
         if left is None and failure is None:
-            return death.told
+            return RunAnswer(name=order.name, lost=death.told)
 
         def tell() -> None:
             if left is not None:
@@ -104,21 +109,21 @@ class RunServer:
             elif failure is not None:
                 refuse_order(order, folder, failure, spent)
 
-        end, heartbeat = self._in_child(lambda: fault_of(tell), folder, log)
-        return "" if heartbeat.status == 0 else heartbeat.facts.get("lost", death.told)
+        end, heartbeat = self._in_child(lambda: answer_of(order, tell), folder, log)
+        return _answer(order, heartbeat, "" if heartbeat.status == 0 else death.told)
 
-    def _in_child(self, work: Callable[[], str], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
+    def _in_child(self, work: Callable[[], RunAnswer], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
         heartbeat = supervisor.renew_heartbeat()
 
         def begin() -> NoReturn:
             supervisor.begin_child()
-            for pipe in (self._orders, self._answers):
-                os.close(pipe.fileno())
+            os.close(self._orders.fileno())  # answers stay open: by their end the worker knows that runs have ended too
             for number in (1, 2):
                 os.dup2(log.fileno(), number)
-            if lost := work():
-                heartbeat.tell(lost=lost)
-            supervisor.leave(1 if lost else 0)
+            answer = work()
+            if answer.lost:
+                heartbeat.tell(loss={"lost": answer.lost, "no_room": answer.no_room})
+            supervisor.leave(1 if answer.lost else 0)
 
         child = ForkedChild(begin, heartbeat)
         end = child.wait(self._orders.fileno())
@@ -129,6 +134,12 @@ class RunServer:
             shutil.rmtree(folder, ignore_errors=True)
             sys.exit()
         return end, heartbeat
+
+
+def _answer(order: RunOrder, heartbeat: Heartbeat, otherwise: str) -> RunAnswer:
+    """Answer as the child has told that the run is lost, or otherwise."""
+    loss: Mapping[str, str] = heartbeat.facts.get("loss", {"lost": otherwise})
+    return RunAnswer(name=order.name, **loss)
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import pickle
 import queue
 import shutil
 import subprocess
@@ -13,8 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from scenarios.campaign.messages import receive, send
-from scenarios.campaign.run_order import RunOrder
+from scenarios.campaign.run_order import RunAnswer, RunOrder
 
 _LOOK = 0.5
 """How often it is asked whether a run is still wanted, s."""
@@ -53,7 +53,8 @@ class ServerProcess:
             start_new_session=True,
         )
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listening = threading.Thread(target=self._listen, daemon=True)
+        self._listening.start()
 
     @property
     def pid(self) -> int:
@@ -65,8 +66,8 @@ class ServerProcess:
         """Whether it can be given orders."""
         return self._process.poll() is None
 
-    def carry_out(self, order: RunOrder, wanted: Callable[[], bool]) -> str:
-        """Carry out an order; return why there is no folder of the run, "" if there is one.
+    def carry_out(self, order: RunOrder, wanted: Callable[[], bool]) -> RunAnswer:
+        """Carry out an order.
 
         Raises:
             ServerLost: the server has died, or was about to end. NotWanted: `wanted` says so; the server has ended.
@@ -74,20 +75,24 @@ class ServerProcess:
         folder = Path(order.runs, f".{order.name}.{uuid.uuid4().hex[:12]}")
         try:
             try:
-                send(self._orders, (order, folder))
+                pickle.dump((order, folder), self._orders)
+                self._orders.flush()
             except (OSError, ValueError) as e:
                 raise ServerLost(self._last_words()) from e
             while True:
+                lives = self.lives
                 with contextlib.suppress(queue.Empty):
                     answer = self._answers.get(timeout=_LOOK)
                     if answer is None:
                         raise ServerLost(self._last_words())
                     return answer
+                if not lives:
+                    raise ServerLost(self._last_words())
                 if not wanted():
                     raise NotWanted
         except BaseException:
             self.end()
-            _remove(folder)
+            shutil.rmtree(folder, ignore_errors=True)
             raise
 
     def ask_to_end(self) -> None:
@@ -103,16 +108,18 @@ class ServerProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._listening.join(_GRACE)  # its run dies after it, and writes until then
 
     @property
     def _orders(self) -> BinaryIO:
         return cast(BinaryIO, self._process.stdin)
 
     def _listen(self) -> None:
+        """Take answers until both the server and the run that it carries out have ended."""
         answers = cast(BinaryIO, self._process.stdout)
-        with contextlib.suppress(EOFError, OSError):
+        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it has ended, maybe amid an answer
             while True:
-                self._answers.put(receive(answers))
+                self._answers.put(pickle.load(answers))
         self._answers.put(None)
         answers.close()
 
@@ -123,11 +130,3 @@ class ServerProcess:
         lines = self._errors.read().decode("utf-8", "replace").split("\n")
         said = next((f": {line.strip()}" for line in reversed(lines) if line.strip()), "")
         return f"its run server ended with status {status}{said}"
-
-
-def _remove(folder: Path) -> None:
-    """Remove what is left of a run whose process may just be ending."""
-    for _ in range(20):
-        shutil.rmtree(folder, ignore_errors=True)
-        if not folder.exists():
-            return

@@ -13,7 +13,7 @@ from distributed import get_worker
 
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
-from scenarios.run_folder import versions
+from scenarios.run_folder import version_differences, versions
 
 _servers: dict[tuple[str, int], ServerProcess] = {}
 """By batch and thread."""
@@ -31,7 +31,7 @@ def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str
     """
     worker = get_worker()
     if other := difference(wanted_versions, _versions()):
-        return RunAnswer(name=order.name, lost=f"worker {worker.address} {other}", worker=worker.address)
+        return RunAnswer(name=order.name, lost=f"worker {worker.address} {other}")
     task = worker.get_current_task()
 
     def wanted() -> bool:
@@ -41,15 +41,14 @@ def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str
     lost = ""
     for _ in range(2):
         try:
-            lost = _server_of(batch).carry_out(order, wanted)
-            break
+            return _server_of(batch).carry_out(order, wanted)
         except ServerLost as e:
             lost = str(e)
         except NotWanted:
             lost = "it was ended, as nobody waited for it"
         if not wanted():
             break
-    return RunAnswer(name=order.name, lost=lost, worker=worker.address)
+    return RunAnswer(name=order.name, lost=lost)
 
 
 def end_runs(batch: str) -> None:
@@ -73,9 +72,8 @@ _versions = functools.cache(versions)
 
 def difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
     """Return what other versions a worker has, "" if it has none."""
-    other = [f"{name} {there.get(name)} (here {version})" for name, version in here.items()
-             if there.get(name) != version]  # fmt: skip
-    return f"has other versions: {', '.join(other)}" if other else ""
+    other = version_differences(here, there)
+    return f"has other versions: {other}" if other else ""
 
 
 def fault_of_folder(folder: str, file: str, content: str) -> str:

@@ -1,6 +1,7 @@
 """Who is to carry out a campaign's runs, as the call says: workers of this machine, or those of a scheduler."""
 
 import contextlib
+import functools
 import os
 from dataclasses import dataclass
 
@@ -32,21 +33,25 @@ class Workforce:
         Raises:
             BadCrew: the address is malformed, or no scheduler answers there.
         """
-        if self.scheduler is None:
-            return
-        from scenarios.campaign.scheduler_address import scheduler_address
-
-        scheduler_address(self.scheduler)
+        if self.scheduler is not None:
+            _ = self._address
 
     def start(self) -> contextlib.AbstractContextManager[Crew]:
         """Return the workers; entering starts them.
 
         Raises:
-            BadCrew: on entering, if they cannot be started or used.
+            BadCrew: here or on entering, if they cannot be started or used.
         """
         from scenarios.campaign.dask_crew import crew_at, embedded_crew
 
-        return embedded_crew(self.workers) if self.scheduler is None else crew_at(self.scheduler)
+        return embedded_crew(self.workers) if self.scheduler is None else crew_at(self._address)
+
+    @functools.cached_property
+    def _address(self) -> str:
+        """The whole address of the scheduler, found out once."""
+        from scenarios.campaign.scheduler_address import scheduler_address
+
+        return scheduler_address(self.scheduler or "")
 
 
 def cores() -> int:

@@ -1,5 +1,6 @@
 """The record in a run's folder, as pages and figures need it."""
 
+from cosim.exceptions import one_line
 from scenarios.record import Record
 from scenarios.run_folder import BadRunFolder, RunFolder
 
@@ -16,4 +17,4 @@ def record_of(folder: RunFolder) -> Record | None:
         record = Record(folder.signals)
         return record if len(record.time) > 1 else None
     except (OSError, ValueError, KeyError) as e:  # Arrow's faults are among them
-        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {str(e).splitlines()[0]}") from e
+        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e

@@ -1,7 +1,7 @@
 """Campaigns to make pages of: real ones, and tables that a test chooses."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from scenarios.campaign.campaign_results import CampaignResults
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.ordered_run import carry_out_order
 from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.plan_check import prepared
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 
 
@@ -23,24 +24,23 @@ class PlainCrew:
     """Carries runs out one after another in this process, and loses those that are named."""
 
     lost: Sequence[str] = ()
-    workers: int = 1
 
     def check(self, folder: Path) -> None:
         assert folder.is_dir()
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
         for order in orders:
             if order.name in self.lost:
-                yield RunAnswer(name=order.name, lost="its worker went away", worker="here")
+                yield RunAnswer(name=order.name, lost="its worker went away")
                 continue
             carry_out_order(order, Path(order.runs, order.name))
-            yield RunAnswer(name=order.name, worker="here")
+            yield RunAnswer(name=order.name)
 
 
 def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:
     """Carry a campaign out and return its folder."""
     folder = CampaignFolder(path)
-    carry_out_campaign(plan, folder, PlainCrew(lost), lambda _tally: None)
+    carry_out_campaign(prepared(plan), folder, PlainCrew(lost), lambda _tally: None)
     return folder
 
 

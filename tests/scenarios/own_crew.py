@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 from scenarios.campaign.ordered_run import carry_out_order
@@ -13,20 +13,19 @@ class OwnCrew:
     """Carries out real runs; `before` is called with each order and may raise, or return why the run is lost."""
 
     def __init__(self, before: Callable[[RunOrder], str] = lambda _order: "") -> None:
-        self.workers = 1
         self.begun: list[str] = []
         self._before = before
 
     def check(self, folder: Path) -> None:
         assert folder.is_dir()
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
         for order in orders:
             self.begun.append(order.name)
             lost = self._before(order)
             if not lost:
                 _run(order)
-            yield RunAnswer(name=order.name, lost=lost, worker="here")
+            yield RunAnswer(name=order.name, lost=lost)
 
 
 def _run(order: RunOrder) -> None:

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from scenarios.campaign.campaign import carry_out_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.plan_check import prepared
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.tally import Tally
 
@@ -30,7 +31,7 @@ NAMES = [run.name for run in PLAN.runs()]
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "done"
-    carry_out_campaign(PLAN, CampaignFolder(path), OwnCrew(), lambda _tally: None)
+    carry_out_campaign(prepared(PLAN), CampaignFolder(path), OwnCrew(), lambda _tally: None)
     return path
 
 
@@ -45,7 +46,7 @@ def go_on(
 ) -> tuple[list[str], list[Tally]]:
     """Return which runs were begun, and what was told."""
     crew, told = crew or OwnCrew(), list[Tally]()
-    carry_out_campaign(plan, folder, crew, told.append)
+    carry_out_campaign(prepared(plan), folder, crew, told.append)
     return crew.begun, told
 
 
@@ -87,14 +88,14 @@ def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path
 
 def test_a_run_whose_answer_did_not_come_is_in_the_table_all_the_same(tmp_path: Path):
     class Mute(OwnCrew):
-        def carry_out(self, orders: Sequence[RunOrder]) -> Iterator[RunAnswer]:
+        def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
             for _ in super().carry_out(orders[:1]):
                 raise KeyboardInterrupt
             yield from ()
 
     folder, told = CampaignFolder(tmp_path / "c"), list[Tally]()
     with pytest.raises(KeyboardInterrupt):
-        carry_out_campaign(PLAN, folder, Mute(), told.append)
+        carry_out_campaign(prepared(PLAN), folder, Mute(), told.append)
     assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0]]
     assert told[-1] == Tally(total=4, ended=1)
 

@@ -55,7 +55,6 @@ def test_all_are_answered_and_one_that_fails_ends_no_other(crew: Crew, runs: Pat
     assert [answer.name for answer in told if answer.lost] == ["killed"]
     assert "was killed" in told[1].lost
     assert sorted(p.name for p in runs.iterdir()) == ["bad", *(f"run_{i}" for i in range(5))]
-    assert len({answer.worker for answer in told}) == 2
 
 
 def test_a_killed_worker_is_replaced_and_its_run_begun_anew(crew: Crew, runs: Path):
@@ -82,7 +81,7 @@ def test_an_iteration_that_is_left_ends_its_runs(crew: Crew, runs: Path, tmp_pat
     hanging = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
     answers = crew.carry_out([order(runs), *hanging])
     assert next(iter(answers)).name == "run"
-    answers.close()  # pyright: ignore[reportAttributeAccessIssue]
+    answers.close()
     assert servers(os.getpid()) == []
     assert [p.name for p in runs.iterdir()] == ["run"]
 

@@ -13,7 +13,7 @@ from scenarios.campaign.campaign import carry_out_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_progress import CampaignProgress
 from scenarios.campaign.dask_crew import embedded_crew
-from scenarios.campaign.plan_check import checked_plan
+from scenarios.campaign.plan_check import prepared
 from scenarios.published.claim import Verdict
 from scenarios.published.helix_1 import Helix1
 from scenarios.published.results import draw_figures, write_claims
@@ -25,9 +25,9 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     """Carry out one run of the plan and return the claims that are left, by their texts."""
     plan = Helix1().plan(quick=True)
     (point,) = [p for p in plan.points if p == FAST]
-    plan = checked_plan(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
+    ready = prepared(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
     place = CampaignFolder(folder)
-    table = carry_out_campaign(plan, place, OwnCrew(), CampaignProgress(StringIO()))
+    table = carry_out_campaign(ready, place, OwnCrew(), CampaignProgress(StringIO()))
     write_claims(Helix1().claims(table), place)
     draw_figures(Helix1(), table, place.runs, place.figures)
     assert len(Helix1().tables(table)) == 4
@@ -54,9 +54,9 @@ def test_a_run_takes_its_ball_and_is_drawn(tmp_path: Path):
 @pytest.mark.paper
 def test_table_1_at_full_size(tmp_path: Path):
     experiment, folder = Helix1(), CampaignFolder(tmp_path / "campaign")
-    plan = checked_plan(experiment.plan(quick=False))
+    ready = prepared(experiment.plan(quick=False))
     with embedded_crew(None) as crew:
-        table = carry_out_campaign(plan, folder, crew, CampaignProgress(StringIO()))
+        table = carry_out_campaign(ready, folder, crew, CampaignProgress(StringIO()))
     assert set(table.column("status")) == {"done"}
     verdicts = {claim.claim: claim.verdict for claim in experiment.claims(table)}
     assert verdicts["The arm reaches the ball and the gripper begins to close in every run"] is Verdict.REPRODUCED

@@ -10,7 +10,7 @@ from plants.grasp_objects import Thing
 from scenarios.campaign.campaign import carry_out_campaign
 from scenarios.campaign.campaign_folder import CampaignFolder
 from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan_check import checked_plan
+from scenarios.campaign.plan_check import prepared
 from scenarios.published.ir_table import IrTable
 from scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
 from scenarios.published.results import draw_figures, write_claims
@@ -22,7 +22,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> tuple[CampaignFolder, 
     plan = IrTable().plan(quick=True)
     points = [p for p in plan.points if p["thing"] == "cylinder" and p["perturbed"] == "true"]
     folder = CampaignFolder(tmp_path_factory.mktemp("campaigns") / "c")
-    few = checked_plan(replace(plan, points=points, repetitions=1))
+    few = prepared(replace(plan, points=points, repetitions=1))
     return folder, carry_out_campaign(few, folder, OwnCrew(), lambda _tally: None)
 
 

@@ -13,12 +13,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from clusters import closed_port
 
 from scenarios.campaign.bad_crew import BadCrew
-from scenarios.campaign.dask_crew import crew_at
+from scenarios.campaign.scheduler_address import scheduler_address
 
 
 def refused(address: str) -> str:
-    with pytest.raises(BadCrew) as caught, crew_at(address):
-        pass
+    with pytest.raises(BadCrew) as caught:
+        scheduler_address(address)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 

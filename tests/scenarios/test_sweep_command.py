@@ -1,8 +1,6 @@
 """`handover sweep`: what it prints, with which status it ends, and what a call is refused for."""
 
 import contextlib
-import errno
-import os
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -11,11 +9,9 @@ from click.testing import CliRunner, Result
 from clusters import closed_port
 from own_crew import OwnCrew
 
-from cosim.exceptions import RecordNotWritten
 from cosim.record.file_lock import folder_locked
 from fmus.build import cached
-from scenarios import campaign_call
-from scenarios.campaign import dask_crew
+from scenarios.campaign import dask_crew, plan_check
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.campaign.campaign_table import CampaignTable
 from scenarios.campaign.plan import CampaignPlan
@@ -151,43 +147,6 @@ def test_a_lost_run_is_told_by_the_status(monkeypatch: pytest.MonkeyPatch):
     assert "1 lost: its machine burnt" in result.output
 
 
-def test_a_full_disk_stops_and_what_is_done_stays(monkeypatch: pytest.MonkeyPatch):
-    full = RecordNotWritten(Path("c/x"), os.strerror(errno.ENOSPC))
-    told: list[str] = []
-
-    def fill(order: RunOrder) -> str:
-        told.append(order.name)
-        return str(full) if len(told) > 1 else ""
-
-    result, begun = sweep(monkeypatch, *CALL, "--repeat", "3", before=fill)
-    assert result.exit_code == 3
-    assert len(begun) == 2
-    assert result.output == (
-        "6 runs of ir_grasp on 2 workers into c\n"
-        "Error: c/runs/001_forward=0.1_r0000 cannot be written: No space left on device; "
-        "1 of 6 runs done; the same call goes on\n"
-    )
-    assert CampaignTable.read(Path("c")).column("run").tolist() == [ALL[0]]
-
-
-def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
-    replace = os.replace
-
-    def refuse(source: str | Path, target: str | Path) -> None:
-        if Path(target).name == "runs.parquet":
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        replace(source, target)
-
-    monkeypatch.setattr(os, "replace", refuse)
-    result, _ = sweep(monkeypatch, *CALL)
-    assert (result.exit_code, result.output) == (
-        3,
-        f"{BEGINNING}Error: c/runs.parquet cannot be written: No space left on device; "
-        "1 of 2 runs done; the same call goes on\n",
-    )
-    assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]
-
-
 @pytest.mark.slow
 def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(CrewLost("the scheduler is gone"), at=1))
@@ -235,7 +194,7 @@ def test_a_campaign_under_way_is_refused_before_anything_else(here: Path, monkey
     def build(_plan: CampaignPlan) -> dict[str, Path]:
         raise AssertionError("units are not to be built")
 
-    monkeypatch.setattr(campaign_call, "unit_fmus", build)
+    monkeypatch.setattr(plan_check, "unit_fmus", build)
     (here / "c").mkdir()
     with folder_locked(here / "c"):
         result, begun = sweep(monkeypatch, *CALL)
@@ -247,7 +206,7 @@ def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: py
     def build(_plan: CampaignPlan) -> dict[str, Path]:
         raise AssertionError("units are not to be built")
 
-    monkeypatch.setattr(campaign_call, "unit_fmus", build)
+    monkeypatch.setattr(plan_check, "unit_fmus", build)
     address = f"127.0.0.1:{closed_port()}"
     result = CliRunner().invoke(main, [*CALL[:-2], "--scheduler", address])
     assert result.exit_code == 2

@@ -1,0 +1,122 @@
+"""A campaign on a disk that is full ends in one line, with status 3, and the same call goes on."""
+
+import contextlib
+import errno
+import io
+import os
+import pickle
+import tempfile
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from own_crew import OwnCrew
+
+from cosim.master_options import MasterOptions
+from scenarios import supervisor
+from scenarios.campaign import dask_crew
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.cluster_crew import ClusterCrew
+from scenarios.campaign.crew import Crew
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+from scenarios.campaign.run_server import RunServer
+from scenarios.command import main
+
+CALL = ["sweep", "ir_grasp", "-p", "strategy=forward", "--repeat", "3", "--out", "c", "--no-report", "--workers", "2"]
+BEGINNING = "3 runs of ir_grasp on 2 workers into c\n"
+FULL = os.strerror(errno.ENOSPC)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def sweep(monkeypatch: pytest.MonkeyPatch, crew: Crew) -> Result:
+    """Return how the command ended with a crew."""
+
+    @contextlib.contextmanager
+    def given(_workers: int | None) -> Generator[Crew, None, None]:
+        yield crew
+
+    monkeypatch.setattr(dask_crew, "embedded_crew", given)
+    return CliRunner().invoke(main, CALL)
+
+
+def interrupt(_order: RunOrder) -> str:
+    raise KeyboardInterrupt
+
+
+def test_a_mark_for_workers_that_cannot_be_written_is_told(here: Path, monkeypatch: pytest.MonkeyPatch):
+    """It is the first that a campaign which goes on writes."""
+    assert sweep(monkeypatch, OwnCrew(interrupt)).exit_code == 1
+    before = sorted(here.rglob("*"))
+
+    def refuse(file: Path, *_text: Any, **_options: Any) -> None:
+        file.touch()  # a name takes no room
+        raise OSError(errno.ENOSPC, FULL, str(file))
+
+    monkeypatch.setattr(Path, "write_text", refuse)
+    monkeypatch.setattr(ClusterCrew, "_ask", lambda *_question: dict[str, Any]())  # pyright: ignore
+    result = sweep(monkeypatch, ClusterCrew(None, "nowhere"))  # type: ignore[arg-type]
+    told = f"{BEGINNING}Error: c cannot be written: No space left on device\n"
+    assert (result.exit_code, result.output) == (3, told)
+    assert sorted(here.rglob("*")) == before
+
+
+def test_a_run_without_room_stops_it_and_what_is_done_stays(monkeypatch: pytest.MonkeyPatch):
+    class Full(OwnCrew):
+        def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+            yield from super().carry_out(orders[:1])
+            yield RunAnswer(name=orders[1].name, lost="it was lost", no_room="Disk quota exceeded")
+            raise AssertionError("no other run is waited for")
+
+    result = sweep(monkeypatch, Full())
+    told = "c/runs/000_r0001 cannot be written: Disk quota exceeded; 1 of 3 runs done; the same call goes on"
+    assert (result.exit_code, result.output) == (3, f"{BEGINNING}Error: {told}\n")
+    assert CampaignTable.read(Path("c")).column("run").tolist() == ["000_r0000"]
+
+
+def test_words_of_a_full_disk_stop_nothing(monkeypatch: pytest.MonkeyPatch):
+    result = sweep(monkeypatch, OwnCrew(lambda _order: f"its camera says: {FULL}"))
+    assert result.exit_code == 3
+    assert "3 lost" in result.output
+    assert "cannot be written" not in result.output
+
+
+@pytest.mark.parametrize(("number", "full"), [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EACCES, False)])
+def test_a_run_server_without_room_for_what_a_run_prints_answers(
+    number: int, full: bool, here: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def refuse(**_options: Any) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    order = RunOrder(name="r", scenario="none", parameters=(), seed=0, fmus={}, runs=str(here), options=MasterOptions())
+    orders, answers = io.BytesIO(pickle.dumps((order, here / ".r"))), io.BytesIO()
+    monkeypatch.setattr(supervisor, "can_supervise", lambda: False)
+    RunServer(orders, answers).serve()
+    said = os.strerror(number)
+    told = RunAnswer(name="r", lost=f"{here} cannot be written: {said}", no_room=said if full else "")
+    assert pickle.loads(answers.getvalue()) == told
+
+
+def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
+    replace = os.replace
+
+    def refuse(source: str | Path, target: str | Path) -> None:
+        if Path(target).name == "runs.parquet":
+            raise OSError(errno.ENOSPC, FULL)
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", refuse)
+    result = sweep(monkeypatch, OwnCrew())
+    assert (result.exit_code, result.output) == (
+        3,
+        f"{BEGINNING}Error: c/runs.parquet cannot be written: No space left on device; "
+        "1 of 3 runs done; the same call goes on\n",
+    )
+    assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]
