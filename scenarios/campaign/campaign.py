@@ -83,14 +83,13 @@ class _Work:
         """Take the rows of those runs that are done, and remove what cannot be read of a run; return how many."""
         kept: list[RunRow] = []
         for run in runs:
-            if not self.folder.is_done(run):
-                continue
-            row = row_of(run, self.folder.runs / run.name)
-            if row is None:
-                with told_if_not_written(self.folder.runs):
-                    shutil.rmtree(self.folder.runs / run.name)
-            else:
+            left = self.folder.runs / run.name
+            row = row_of(run, left) if self.folder.is_done(run) else None
+            if row is not None:
                 kept.append(row)
+            elif left.exists():
+                with told_if_not_written(self.folder.runs):
+                    shutil.rmtree(left)
         self.table.keep(kept)
         self._count = Counter(row.status for row in self.table.rows)
         return len(kept)

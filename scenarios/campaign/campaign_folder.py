@@ -86,6 +86,7 @@ class CampaignFolder:
         differ = differences(self.read(), identity_of(plan, fmus))
         if differ:
             raise BadRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
+        self._check_names(plan)
 
     def check_free(self) -> None:
         """Check that no other command is at work on it, if it is there.
@@ -127,8 +128,8 @@ class CampaignFolder:
             yield copies
 
     def is_done(self, run: PlannedRun) -> bool:
-        """Return whether a run has left its folder; it has its name only when it is complete."""
-        return (self.runs / run.name).is_dir()
+        """Return whether a run has left its folder, which has its name only when it is complete, with its summary."""
+        return (self.runs / run.name / "summary.json").is_file()
 
     def has_all(self, plan: CampaignPlan) -> bool:
         """Return whether all runs of a campaign are done."""
@@ -146,6 +147,14 @@ class CampaignFolder:
         if self.path.exists() and not self.path.is_dir():
             raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
         check_place(self.path)
+
+    def _check_names(self, plan: CampaignPlan) -> None:
+        """Check that no folder stands where a file is to be, and no file where a folder."""
+        folders = [p for p in (self.table, self.report) if p.is_dir()]
+        files = [p for p in (self.runs, *(self.runs / run.name for run in plan.runs())) if p.is_file()]
+        if folders or files:
+            place, form, right = (folders[0], "folder", "file") if folders else (files[0], "file", "folder")
+            raise BadRunFolder(self.path, f"{place.relative_to(self.path)} is a {form}, not a {right}; remove it")
 
     @contextlib.contextmanager
     def _made(self) -> Generator[None, None, None]:

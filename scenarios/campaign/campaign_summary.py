@@ -31,7 +31,7 @@ def print_campaign(results: CampaignResults, tally: Tally, folder: CampaignFolde
         console.print(f"  and {left} points more")
     _print_reasons(console, results.table)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
-    if folder.report.exists():
+    if folder.is_reported:
         console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
 
 

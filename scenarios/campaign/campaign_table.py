@@ -38,7 +38,8 @@ class CampaignTable:
         except FileNotFoundError as e:
             raise BadRunFolder(file.parent, f"it has no {file.name}") from e
         except (OSError, pa.ArrowException) as e:
-            raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}") from e
+            fault = f"its {file.name} is damaged: {one_line(e)}; the call that began the campaign writes it anew"
+            raise BadRunFolder(file.parent, fault) from e
 
     def __len__(self) -> int:
         """Return the number of rows."""

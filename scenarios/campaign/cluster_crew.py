@@ -42,11 +42,11 @@ class ClusterCrew:
 
     Args:
         client: connected to the cluster's scheduler.
-        address: the scheduler's.
+        name: what the cluster is called where something is wrong with it.
     """
 
-    def __init__(self, client: Client, address: str) -> None:
-        self._client, self._address = client, address
+    def __init__(self, client: Client, name: str) -> None:
+        self._client, self._name = client, name
         self._batch = uuid.uuid4().hex
         self._versions = versions()
 
@@ -122,11 +122,11 @@ class ClusterCrew:
             if self.workers:
                 there = time.monotonic()
             elif time.monotonic() - there > _WITHOUT:
-                raise CrewLost(f"the cluster at {self._address} has had no worker for {_WITHOUT:g} s")
+                raise CrewLost(f"{self._name} has had no worker for {_WITHOUT:g} s")
 
     def _answer(self, order: RunOrder, future: "Future[RunAnswer]") -> RunAnswer:
         if future.cancelled():
-            raise CrewLost(f"the scheduler at {self._address} is gone")
+            raise CrewLost(f"the scheduler of {self._name} is gone")
         error = cast("BaseException | None", future.exception())
         if error is None:
             return future.result()
@@ -151,7 +151,7 @@ class ClusterCrew:
         asking.join(_BOUND)
         if failed or asking.is_alive():
             fault = one_line(failed[0]) if failed else f"no answer within {_BOUND:g} s"
-            raise BadCrew(f"the workers of the cluster at {self._address} do not answer: {fault}")
+            raise BadCrew(f"the workers of {self._name} do not answer: {fault}")
         return {f"worker {worker}": answer for worker, answer in told.items()}
 
     def _refuse(self, faults: Mapping[str, str]) -> None:
@@ -159,7 +159,7 @@ class ClusterCrew:
         bad = [f"{worker} {fault}" for worker, fault in faults.items() if fault]
         if bad:
             more = f"; and {len(bad) - _MOST_TOLD} workers more" if len(bad) > _MOST_TOLD else ""
-            raise BadCrew(f"the cluster at {self._address} cannot be used: {'; '.join(bad[:_MOST_TOLD])}{more}")
+            raise BadCrew(f"{self._name} cannot be used: {'; '.join(bad[:_MOST_TOLD])}{more}")
 
 
 def _difference(here: Mapping[str, str], there: Any) -> str:

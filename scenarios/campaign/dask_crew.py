@@ -67,7 +67,7 @@ def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
                 client = opened.enter_context(Client(cluster, set_as_default=False))
         except (OSError, RuntimeError) as e:
             raise BadCrew(f"no workers can be started on this machine: {one_line(e)}") from e
-        crew = ClusterCrew(client, "127.0.0.1")
+        crew = ClusterCrew(client, "the cluster on this machine")
         opened.callback(crew.end)
         yield crew
 
@@ -88,7 +88,7 @@ def crew_at(address: str) -> Generator[ClusterCrew, None, None]:
             client.wait_for_workers(1, timeout=_WORKERS)
         except TimeoutError as e:
             raise BadCrew(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
-        crew = ClusterCrew(client, address)
+        crew = ClusterCrew(client, f"the cluster at {address}")
         opened.callback(crew.end)
         yield crew
 

@@ -111,6 +111,6 @@ def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:
     if len(digits) > len(str(MOST_RUNS)) or int(digits) > MOST_RUNS:
         return [], f"{text!r} has too many values: at most {MOST_RUNS:,} runs can be planned"
     if start == stop:
-        return [], f"{text!r} begins where it ends, at {start:g}"
+        return [], f"{text!r} begins where it ends; for one value write {parts[0]!r}"
     between = [f"{x:.12g}" for x in np.linspace(start, stop, int(parts[2])).tolist()]
     return [parts[0], *between[1:-1], parts[1]], None

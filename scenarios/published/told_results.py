@@ -34,7 +34,7 @@ def print_results(experiment: PublishedExperiment, results: PaperResults, folder
             console.print(f"{heading}: " + ", ".join(f"{n} {words}" for n, _, words in counts))
     console.print(f"claims: {folder.path / 'claims.json'}", markup=False, soft_wrap=True)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
-    if folder.report.exists():
+    if folder.is_reported:
         console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
 
 

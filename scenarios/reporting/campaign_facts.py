@@ -46,4 +46,5 @@ def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
     try:
         return [Claim.from_data(entry) for entry in cast(list[Mapping[str, Any]], json.loads(file.read_bytes()))]
     except (KeyError, TypeError, ValueError) as e:
-        raise BadRunFolder(folder.path, f"its {file.name} is damaged: {one_line(e)}") from e
+        fault = f"its {file.name} is damaged: {one_line(e)}; the same `handover paper` call writes it anew"
+        raise BadRunFolder(folder.path, fault) from e

@@ -132,6 +132,17 @@ def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[s
     assert told in refusal(folder, PLAN, fmus)
 
 
+def test_files_in_place_of_folders_and_folders_in_place_of_files_are_refused(
+    folder: CampaignFolder, fmus: dict[str, Path]
+):
+    run = next(iter(PLAN.runs())).name
+    (folder.runs / run).touch()
+    assert refusal(folder, PLAN, fmus) == f"{Path('runs', run)} is a file, not a folder; remove it"
+    (folder.runs / run).unlink()
+    folder.table.mkdir()
+    assert refusal(folder, PLAN, fmus) == "runs.parquet is a folder, not a file; remove it"
+
+
 def test_a_folder_of_something_else_is_refused(tmp_path: Path, fmus: dict[str, Path]):
     other = CampaignFolder(tmp_path / "built")
     assert "it is not empty and has no campaign.json" in refusal(other, PLAN, fmus)
@@ -187,4 +198,7 @@ def test_without_a_folder_the_newest_incomplete_campaign_of_the_plan_goes_on(
     assert place_of(PLAN, fmus).path == newest.path
     for run in PLAN.runs():
         (newest.runs / run.name).mkdir()
+        assert not newest.is_done(run)
+        (newest.runs / run.name / "summary.json").touch()
+    assert newest.has_all(PLAN)
     assert not place_of(PLAN, fmus).path.exists()

@@ -84,7 +84,7 @@ def test_arrays_stand_between_semicolons():
         ),
         ("alpha=0.1:1:200000", "alpha: '0.1:1:200000' has too many values: at most 100,000 runs can be planned"),
         ("alpha=0:1:1000000000", "alpha: '0:1:1000000000' has too many values: at most 100,000 runs can be planned"),
-        ("alpha=1:1:3", "alpha: '1:1:3' begins where it ends, at 1"),
+        ("alpha=1:1:3", "alpha: '1:1:3' begins where it ends; for one value write '1'"),
         ("alpha=0.1,2", "alpha: 2.0 is out of range: from 0.01 to 1"),
         ("alpha=0.1,nan", "alpha: nan is not finite, from 0.01 to 1"),
         ("alpha=0.1,0.10", "alpha: 0.10 is given twice"),

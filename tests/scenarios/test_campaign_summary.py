@@ -1,5 +1,6 @@
 """What the end of a campaign prints: at most a screen."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,17 @@ def test_of_many_points_and_reasons_the_first_are_told(capsys: pytest.CaptureFix
     assert "10 failed: the hand broke 3 times" in told
     assert "and 5 reasons more, in the table" in told
     assert len(told.splitlines()) <= 24
+
+
+def test_a_page_that_is_older_than_the_table_is_not_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    plan, folder = CampaignPlan(scenario="ir_grasp", points=[{}]), CampaignFolder(tmp_path)
+    results = CampaignResults({"scenario": "ir_grasp", "points": [{}]}, CampaignTable(table_of(plan, [])))
+    for file in (folder.table, folder.report):
+        file.touch()
+    for age, told in ((-1, True), (1, False)):
+        os.utime(folder.table, (0, folder.report.stat().st_mtime + age))
+        print_campaign(results, Tally(total=1, ended=1), folder)
+        assert ("report: " in capsys.readouterr().out) == told
 
 
 def test_a_campaign_that_varies_nothing_has_one_row(capsys: pytest.CaptureFixture[str]):
