@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from failing_systems import IN_TERMINAL, failing_ssp, start, wait_until
+from living import lives, until
 
 from scenarios.record import Record
 
@@ -33,12 +34,6 @@ def begun(going: "subprocess.Popen[str]", folder: Path) -> int:
     return int(child)
 
 
-def lives(process: int) -> bool:
-    with contextlib.suppress(ProcessLookupError, FileNotFoundError):
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    return False
-
-
 def test_a_child_that_is_killed_leaves_a_whole_record(arguments: tuple[str | Path, ...], tmp_path: Path):
     going = start(tmp_path, *arguments)
     os.kill(begun(going, tmp_path), signal.SIGKILL)
@@ -55,8 +50,8 @@ def test_a_parent_that_is_killed_takes_its_child_with_it(arguments: tuple[str | 
     going = start(tmp_path, *arguments)
     child = begun(going, tmp_path)
     going.kill()
-    going.communicate(timeout=60)  # until nobody holds its pipes
-    assert not lives(child)
+    going.communicate(timeout=60)
+    until(lambda: not lives(child))  # it lets go of the pipes before it is gone
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
