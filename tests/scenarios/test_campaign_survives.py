@@ -11,7 +11,8 @@ from scenarios.campaign.campaign_table import CampaignTable
 
 pytestmark = pytest.mark.slow
 
-CALL = ["helix_handover", "alpha=0.1:0.4:6", "--repeat", "10", "--seed", "7", "-p", "patience=1", "--no-report"]
+OF_EACH = ["helix_handover", "alpha=0.1:0.4:6", "--seed", "7", "-p", "patience=1", "--no-report", "--repeat"]
+CALL = [*OF_EACH, "10"]
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +35,17 @@ def worker_killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_worker_that_is_killed_costs_no_run(worker_killed: Path):
+def test_a_worker_that_is_killed_costs_no_run(worker_killed: Path, tmp_path: Path):
     table = CampaignTable.read(worker_killed)
     assert len(table) == len(set(table.column("run"))) == len(set(table.column("seed"))) == 60
     assert set(table.column("status")) == {"done"}
     assert set(runs_in(worker_killed)) == set(table.column("run"))
     assert list((worker_killed / "runs").glob(".*")) == []
+    with sweeping(*OF_EACH, "2", "--workers", "2", "--out", tmp_path / "undisturbed") as going:
+        status, _, errors = ended(going)
+    assert status == 0, errors
+    first = [row for row in without_times(worker_killed) if row["repetition"] < 2]
+    assert without_times(tmp_path / "undisturbed") == first
 
 
 def test_a_command_that_is_killed_goes_on_with_the_same_call(worker_killed: Path, tmp_path: Path):
@@ -52,6 +58,8 @@ def test_a_command_that_is_killed_goes_on_with_the_same_call(worker_killed: Path
     assert 25 <= len(before) < 60
     assert len(CampaignTable.read(out)) <= len(before)
     with sweeping(*CALL, "--workers", "2", "--out", out) as going:
+        wait_for(lambda: len(runs_in(out)) >= 40, going)
+        workers_of(going.pid)[0].kill()
         status, told, errors = ended(going)
     assert status == 0, errors
     assert "60 of 60 runs done" in told

@@ -18,6 +18,7 @@ from living import lives, parent, servers, until
 
 from scenarios.campaign.bad_crew import BadCrew
 from scenarios.campaign.dask_crew import crew_at
+from scenarios.campaign.scheduler_address import scheduler_address
 
 pytestmark = [
     pytest.mark.slow,
@@ -36,7 +37,7 @@ def test_threads_of_a_worker_carry_out_runs_side_by_side(address: str, tmp_path:
     orders = [order(runs, f"run_{i}", seed=i) for i in range(4)]
     orders.append(bad_order(runs, "Crashes", tmp_path))
     with worker(tmp_path, address, threads=2) as process:
-        with crew_at(address) as crew:
+        with crew_at(scheduler_address(address.removeprefix("tcp://"))) as crew:
             assert crew.workers == 2
             crew.check(runs)
             answers = [(answer.name, answer.lost) for answer in crew.carry_out(orders)]

@@ -55,6 +55,7 @@ def test_all_are_answered_and_one_that_fails_ends_no_other(crew: Crew, runs: Pat
     assert [answer.name for answer in told if answer.lost] == ["killed"]
     assert "was killed" in told[1].lost
     assert sorted(p.name for p in runs.iterdir()) == ["bad", *(f"run_{i}" for i in range(5))]
+    assert len(servers(os.getpid())) == 2  # each worker has had a run
 
 
 def test_a_killed_worker_is_replaced_and_its_run_begun_anew(crew: Crew, runs: Path):
