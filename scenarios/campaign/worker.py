@@ -87,9 +87,15 @@ def fault_of_folder(folder: str, file: str, content: str) -> str:
 
 
 def _server_of(batch: str) -> ServerProcess:
-    """Return this thread's server, started unless it lives."""
+    """Return this thread's server, started unless it lives.
+
+    Raises:
+        NotWanted: the batch is ended: orders that waited here come until the scheduler has taken them back.
+    """
     key = batch, threading.get_ident()
     with _lock:
+        if batch in _ended:
+            raise NotWanted
         server = _servers.get(key)
         if server is None or not server.lives:
             server = _servers[key] = ServerProcess()

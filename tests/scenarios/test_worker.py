@@ -1,0 +1,41 @@
+"""A worker of a cluster carries out what is wanted only."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from crew_orders import order
+from distributed import Client
+
+from scenarios.campaign import worker
+from scenarios.campaign.server_process import ServerProcess
+from scenarios.run_folder import versions
+
+
+def test_an_order_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The scheduler takes orders back later than the worker is asked to end them."""
+    started: list[ServerProcess] = []
+
+    def started_server() -> ServerProcess:
+        started.append(ServerProcess())
+        return started[-1]
+
+    def lost(client: Client, batch: str) -> str:
+        arguments: list[Any] = [order(tmp_path / "runs"), batch, versions()]
+        return client.submit(worker.carry_out_run, *arguments, pure=False).result(timeout=60).lost
+
+    monkeypatch.setattr(worker, "ServerProcess", started_server)
+    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+        client.run(worker.end_runs, "ended")
+        assert lost(client, "ended") == "it was ended, as nobody waited for it"
+        assert started == []
+        assert lost(client, "wanted") == ""
+        client.run(worker.end_runs, "wanted")
+        assert [server.lives for server in started] == [False]
+        assert lost(client, "wanted") == "it was ended, as nobody waited for it"
+        assert len(started) == 1
+    assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
