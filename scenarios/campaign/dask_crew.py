@@ -44,7 +44,7 @@ _STILL = {
 def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
     """Start workers on this machine, a process each; by default one for each core that this process may use.
 
-    They hear of no Ctrl-C, and end with this process, however it ends.
+    They hear of no Ctrl-C, end with this process, however it ends, and listen on the loopback interface alone.
 
     Raises:
         BadCrew: they cannot be started.
@@ -59,7 +59,7 @@ def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
                     n_workers=workers or cores(),
                     threads_per_worker=1,
                     host="127.0.0.1",
-                    dashboard_address="",
+                    dashboard_address="127.0.0.1:0",  # by default it answers to the whole network
                     memory_limit=0,
                     silence_logs=_SILENT,
                 )

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Generator, Sequence
 from pathlib import Path
 
+import psutil
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -85,6 +86,13 @@ def test_an_iteration_that_is_left_ends_its_runs(crew: Crew, runs: Path, tmp_pat
     answers.close()
     assert servers(os.getpid()) == []
     assert [p.name for p in runs.iterdir()] == ["run"]
+
+
+def test_only_this_machine_can_speak_to_it(crew: Crew):  # noqa: ARG001 (it is there)
+    processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    connections = [c for process in processes for c in process.net_connections(kind="inet")]
+    heard = {c.laddr.ip for c in connections if c.status == psutil.CONN_LISTEN}
+    assert heard == {"127.0.0.1"}
 
 
 def test_by_default_there_is_a_worker_for_each_core():
