@@ -3,7 +3,6 @@
 import contextlib
 import itertools
 import queue
-import threading
 import time
 import uuid
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -13,6 +12,7 @@ from typing import Any, cast
 from distributed import Client, Future, KilledWorker
 
 from cosim.exceptions import one_line
+from scenarios.campaign.asked_aside import asked_aside
 from scenarios.campaign.bad_crew import BadCrew, CrewLost
 from scenarios.campaign.run_order import RunAnswer, RunOrder
 from scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
@@ -137,21 +137,14 @@ class ClusterCrew:
 
     def _ask(self, function: Callable[..., Any], *arguments: str) -> dict[str, Any]:
         """Return what each worker answers, by its address."""
-        told: dict[str, Any] = {}
-        failed: list[Exception] = []
 
-        def ask() -> None:
-            try:
-                told.update(cast("dict[str, Any]", self._client.run(function, *arguments, on_error="return")))
-            except Exception as e:  # told where it is waited for
-                failed.append(e)
+        def ask() -> dict[str, Any]:
+            return cast("dict[str, Any]", self._client.run(function, *arguments, on_error="return"))
 
-        asking = threading.Thread(target=ask, daemon=True)  # of workers some may not answer at all
-        asking.start()
-        asking.join(_BOUND)
-        if failed or asking.is_alive():
-            fault = one_line(failed[0]) if failed else f"no answer within {_BOUND:g} s"
-            raise BadCrew(f"the workers of {self._name} do not answer: {fault}")
+        try:
+            told = asked_aside(ask, _BOUND)
+        except Exception as e:  # what a cluster's end leads to
+            raise BadCrew(f"the workers of {self._name} do not answer: {one_line(e)}") from e
         return {f"worker {worker}": answer for worker, answer in told.items()}
 
     def _refuse(self, faults: Mapping[str, str]) -> None:

@@ -7,6 +7,8 @@ from distributed.comm.registry import backends
 from distributed.core import rpc
 from distributed.security import Security
 
+from scenarios.campaign.asked_aside import asked_aside
+
 PROTOCOLS = tuple(p for p in backends if p != "inproc")
 """Those that Dask has here."""
 
@@ -22,7 +24,7 @@ def kind_at(address: str, connect: float, answer: float) -> str:
     Raises:
         TimeoutError, asyncio.TimeoutError, OSError: it cannot be reached, or does not answer.
     """
-    return asyncio.run(asyncio.wait_for(_kind(address, connect), answer))
+    return asked_aside(lambda: asyncio.run(asyncio.wait_for(_kind(address, connect), answer)), connect + answer)
 
 
 async def _kind(address: str, connect: float) -> str:

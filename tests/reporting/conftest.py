@@ -19,9 +19,9 @@ _FLAGS = (
 """No network, no screen; space is drawn by software."""
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Generator[Browser, None, None]:
-    """Return a browser, one for all tests of a process."""
+    """Return a browser for a file's tests: as long as it is there, an event loop runs in the tests' thread."""
     chromium = shutil.which("chromium")
     if chromium is None:
         assert "CI" not in os.environ, "there is no chromium to look at pages with"

@@ -1,5 +1,6 @@
 """Schedulers that cannot be used are refused in one line, before anything is sent to them."""
 
+import asyncio
 import socket
 import sys
 import threading
@@ -10,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from clusters import closed_port
+from clusters import closed_port, scheduler
 
 from scenarios.campaign.bad_crew import BadCrew
 from scenarios.campaign.scheduler_address import scheduler_address
@@ -73,3 +74,14 @@ def test_an_address_where_nothing_is_is_refused():
 @pytest.mark.slow
 def test_a_server_that_is_no_scheduler_is_refused(other_server: str):
     assert refused(other_server).startswith(f"{other_server} ")
+
+
+@pytest.mark.slow
+def test_a_scheduler_is_found_from_where_an_event_loop_runs(tmp_path: Path):
+    """As it does in a notebook."""
+
+    async def ask(told: str) -> str:
+        return scheduler_address(told)
+
+    with scheduler(tmp_path) as address:
+        assert asyncio.run(ask(address.removeprefix("tcp://"))) == address

@@ -29,7 +29,7 @@ def test_an_order_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path
         return client.submit(worker.carry_out_run, *arguments, pure=False).result(timeout=60).lost
 
     monkeypatch.setattr(worker, "ServerProcess", started_server)
-    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:
         client.run(worker.end_runs, "ended")
         assert lost(client, "ended") == "it was ended, as nobody waited for it"
         assert started == []

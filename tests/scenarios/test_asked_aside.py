@@ -1,0 +1,33 @@
+"""Who does not answer is waited for no longer than told."""
+
+import threading
+from collections.abc import Generator
+
+import pytest
+
+from scenarios.campaign.asked_aside import asked_aside
+
+
+@pytest.fixture
+def never() -> Generator[threading.Event, None, None]:
+    """Gives what is not set until the end of the test."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+def test_the_answer_is_that_of_another_thread():
+    assert asked_aside(threading.get_ident, 60.0) != threading.get_ident()
+
+
+def test_what_it_raises_is_raised_here():
+    def ask() -> None:
+        raise ValueError("no such worker")
+
+    with pytest.raises(ValueError, match="no such worker"):
+        asked_aside(ask, 60.0)
+
+
+def test_who_does_not_answer_is_left(never: threading.Event):
+    with pytest.raises(TimeoutError, match=r"^no answer within 0\.1 s$"):
+        asked_aside(lambda: never.wait(60.0), 0.1)
