@@ -11,7 +11,8 @@ from scenarios.run_folder import RunFolder, check_place
 _HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
 
 DIR is the folder of a run or of a campaign. The page is made of what is in it, also of a run that was interrupted,
-killed, or that another version left: its record is completed first, and the page holds what there is.
+killed, or that another version left: a run's record, or a campaign's table, is completed first, and the page holds what
+there is.
 """
 
 
@@ -43,8 +44,10 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
 
 
 def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> None:
+    from scenarios.campaign.left_table import complete_table
     from scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report  # they take long to load
 
+    complete_table(campaign)
     (write_campaign_report if figures else write_campaign_page)(campaign, page)
 
 

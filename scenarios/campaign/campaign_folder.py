@@ -95,7 +95,7 @@ class CampaignFolder:
             BadRunFolder: one is.
         """
         if self.path.is_dir():
-            with self._held():
+            with self.held():
                 pass
 
     @contextlib.contextmanager
@@ -116,7 +116,7 @@ class CampaignFolder:
         """
         with contextlib.ExitStack() as held:
             with self._made():
-                held.enter_context(self._held())
+                held.enter_context(self.held())
                 self.check(plan, fmus)
                 with self._written(plan, fmus):
                     check(self.path)
@@ -173,7 +173,12 @@ class CampaignFolder:
                     folder.rmdir()
             raise
 
-    def _held(self) -> contextlib.AbstractContextManager[None]:
+    def held(self) -> contextlib.AbstractContextManager[None]:
+        """Keep other commands from it in a block.
+
+        Raises:
+            BadRunFolder: one is at work on it.
+        """
         return folder_held(self.path, "another command carries this campaign out")
 
     def _counts(self, entry: Path) -> bool:

@@ -81,7 +81,7 @@ def _both(what: str, there: Any, called: Any) -> str:
 
 
 def _told(value: Any) -> str:
-    if value is None or value == "":
+    if value is None or value == "" or value == []:
         return "not given"
     if isinstance(value, dict) and "sha256" in value:
         fmu = cast(dict[str, str], value)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from cosim.exceptions import nearest, one_line
 from scenarios.run_folder import BadRunFolder
 
+_ANEW = "the call that began the campaign writes it anew"
+
 
 class CampaignTable:
     """Reads `runs.parquet`.
@@ -36,10 +38,9 @@ class CampaignTable:
         try:
             return cls(pq.read_table(file))
         except FileNotFoundError as e:
-            raise BadRunFolder(file.parent, f"it has no {file.name}") from e
+            raise BadRunFolder(file.parent, f"it has no {file.name}; {_ANEW}") from e
         except (OSError, pa.ArrowException) as e:
-            fault = f"its {file.name} is damaged: {one_line(e)}; the call that began the campaign writes it anew"
-            raise BadRunFolder(file.parent, fault) from e
+            raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_ANEW}") from e
 
     def __len__(self) -> int:
         """Return the number of rows."""

@@ -1,0 +1,106 @@
+"""The table that a killed campaign has left is completed from its runs' folders."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+from own_crew import OwnCrew
+
+from scenarios.campaign.campaign import carry_out_campaign
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.left_table import complete_table
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.plan_check import prepared
+from scenarios.command import main
+
+PLAN = CampaignPlan(
+    scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}
+)
+FIRST, SECOND = (run.name for run in PLAN.runs())
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("campaign") / "done"
+    carry_out_campaign(prepared(PLAN), CampaignFolder(path), OwnCrew(), lambda _tally: None)
+    return path
+
+
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path) -> CampaignFolder:
+    shutil.copytree(finished, tmp_path / "c")
+    return CampaignFolder(tmp_path / "c")
+
+
+def cut(folder: CampaignFolder, rows: int) -> bytes:
+    """Leave the first rows of the table only."""
+    pq.write_table(CampaignTable.read(folder.table).table.slice(0, rows), folder.table)
+    return folder.table.read_bytes()
+
+
+@pytest.mark.parametrize("left", ["nothing", "no row", "a row", "damaged"])
+def test_it_is_as_the_campaign_itself_writes_it(left: str, finished: Path, folder: CampaignFolder):
+    if left == "nothing":
+        folder.table.unlink()
+    elif left == "damaged":
+        folder.table.write_bytes(b"PAR1")
+    else:
+        cut(folder, rows=int(left == "a row"))
+    complete_table(folder)
+    expected = CampaignTable.read(finished).table
+    assert CampaignTable.read(folder.table).table.equals(expected, check_metadata=True)
+
+
+def test_a_whole_one_is_not_written_again(folder: CampaignFolder):
+    before = folder.table.stat()
+    complete_table(folder)
+    assert folder.table.stat().st_mtime_ns == before.st_mtime_ns
+    assert folder.table.stat().st_ino == before.st_ino
+
+
+def test_a_lost_run_stays_lost(tmp_path: Path):
+    lost = CampaignFolder(tmp_path / "lost")
+    crew = OwnCrew(lambda order: "its worker went away" if order.name == FIRST else "")
+    carry_out_campaign(prepared(PLAN), lost, crew, lambda _tally: None)
+    cut(lost, rows=1)
+    complete_table(lost)
+    table = CampaignTable.read(lost.table)
+    assert table.column("run").tolist() == [FIRST, SECOND]
+    assert table.column("status").tolist() == ["lost", "done"]
+    assert table.column("reason")[0] == "its worker went away"
+
+
+def test_it_is_left_to_the_command_that_is_at_work(folder: CampaignFolder):
+    before = cut(folder, rows=1)
+    with folder.held():
+        complete_table(folder)
+    assert folder.table.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "change", [{"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}, {"points": 3}, {"points": [3]}]
+)
+def test_what_another_version_has_left_or_is_damaged_is_left(change: dict[str, object], folder: CampaignFolder):
+    before = cut(folder, rows=1)
+    file = folder.path / "campaign.json"
+    file.write_text(json.dumps({**json.loads(file.read_text(encoding="utf-8")), **change}), encoding="utf-8")
+    complete_table(folder)
+    assert folder.table.read_bytes() == before
+
+
+def test_the_page_tells_of_all_runs_that_are_done(folder: CampaignFolder):
+    cut(folder, rows=1)
+    with folder.held():  # as a command that is at work holds it
+        assert "1 of 2 runs so far" in page_of(folder)
+    assert "so far" not in page_of(folder)
+
+
+def page_of(folder: CampaignFolder) -> str:
+    """Return what `handover report` writes."""
+    done = CliRunner().invoke(main, ["report", str(folder.path)])
+    assert done.exit_code == 0, done.output
+    return folder.report.read_text(encoding="utf-8").replace("\u00a0", " ")
