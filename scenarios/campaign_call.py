@@ -110,7 +110,7 @@ def _carry_out(
     try:
         with contextlib.ExitStack() as opened, progress:
             start = partial(_started, workers, interruption)
-            return carry_out_campaign(ready, folder, LateCrew(start, opened), progress)
+            return carry_out_campaign(ready, folder, LateCrew(start, opened), progress, interruption.held_back)
     except (RecordNotWritten, CrewLost) as e:
         if progress.tally is None:
             raise
@@ -120,10 +120,15 @@ def _carry_out(
 
 @contextlib.contextmanager
 def _started(workers: Workforce, interruption: CampaignInterruption) -> Generator[Crew, None, None]:
-    with contextlib.ExitStack() as opened:
+    """Give workers; neither their start nor their end is interrupted."""
+    opened = contextlib.ExitStack()
+    try:
         with interruption.held_back():
             crew = opened.enter_context(workers.start())
         yield crew
+    finally:
+        with interruption.held_back():
+            opened.close()
 
 
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:

@@ -3,7 +3,7 @@
 import contextlib
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from cosim.exceptions import RecordNotWritten
@@ -19,11 +19,18 @@ from scenarios.campaign.tally import OnTally, Tally
 from scenarios.run_folder import told_if_not_written
 
 
-def carry_out_campaign(ready: PreparedPlan, folder: CampaignFolder, crew: Crew, progress: OnTally) -> CampaignTable:
+def carry_out_campaign(
+    ready: PreparedPlan,
+    folder: CampaignFolder,
+    crew: Crew,
+    progress: OnTally,
+    settling: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
+) -> CampaignTable:
     """Carry out the runs of a campaign that are not done yet, and return the table of all.
 
     Whatever ends it, what was done stays, and the same call goes on: a run is done when it has left its folder,
-    also if a unit failed in it. Lost runs are tried again by the next call.
+    also if a unit failed in it. Lost runs are tried again by the next call. The table is completed in a block of
+    `settling`, which can keep an interruption from it.
 
     Raises:
         BadRunFolder, BadCrew: before anything was written.
@@ -37,7 +44,8 @@ def carry_out_campaign(ready: PreparedPlan, folder: CampaignFolder, crew: Crew, 
         try:
             work.give_to(crew, fmus)
         finally:
-            work.end()
+            with settling():
+                work.end()
     return CampaignTable.read(folder.table)
 
 

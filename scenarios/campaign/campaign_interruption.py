@@ -50,10 +50,10 @@ class CampaignInterruption:
 
     @contextlib.contextmanager
     def held_back(self) -> Generator[None, None, None]:
-        """Let the first signal count at the end of the block, as what is half started cannot be put in order.
+        """Let the first signal count at the end of the block, as what is half started or ended is not in order.
 
         Raises:
-            KeyboardInterrupt: at the end, if there was one.
+            KeyboardInterrupt: at the end, if there has been one.
         """
         self._holds_back = True
         try:

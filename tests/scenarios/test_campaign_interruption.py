@@ -1,0 +1,81 @@
+"""Ctrl-C as a campaign comes to its end: the table is complete, the workers are ended, and it counts nonetheless."""
+
+import contextlib
+import os
+import signal
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from own_crew import OwnCrew
+
+from scenarios.campaign.campaign import carry_out_campaign
+from scenarios.campaign.campaign_folder import CampaignFolder
+from scenarios.campaign.campaign_interruption import CampaignInterruption
+from scenarios.campaign.campaign_table import CampaignTable
+from scenarios.campaign.plan import CampaignPlan
+from scenarios.campaign.plan_check import prepared
+from scenarios.campaign.run_order import RunAnswer, RunOrder
+from scenarios.campaign.tally import Tally
+from scenarios.campaign_call import call_campaign
+
+PLAN = CampaignPlan(
+    scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}
+)
+NAMES = [run.name for run in PLAN.runs()]
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no SIGINT for one process")
+
+
+def interrupt() -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+class MuteCrew(OwnCrew):
+    """Carries runs out and answers for none, as one that was lost just then."""
+
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+        for _ in super().carry_out(orders):
+            pass
+        yield from ()
+
+
+class InterruptedEnd:
+    """Workers of this process whose end takes long enough to be interrupted."""
+
+    def __init__(self) -> None:
+        self.ended = False
+
+    def __str__(self) -> str:
+        return "this process"
+
+    def check(self) -> None:
+        pass
+
+    @contextlib.contextmanager
+    def start(self) -> Generator[OwnCrew, None, None]:
+        yield OwnCrew()
+        interrupt()
+        self.ended = True
+
+
+def test_as_the_table_is_completed(tmp_path: Path):
+    def progress(tally: Tally) -> None:
+        if tally.ended == len(NAMES):  # told as the runs are found that have ended without an answer
+            interrupt()
+
+    folder = CampaignFolder(tmp_path / "c")
+    with CampaignInterruption() as interruption, pytest.raises(KeyboardInterrupt):
+        carry_out_campaign(prepared(PLAN), folder, MuteCrew(), progress, interruption.held_back)
+    assert CampaignTable.read(folder.table).column("run").tolist() == NAMES
+
+
+def test_as_the_workers_are_ended(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    workers: Any = InterruptedEnd()
+    with pytest.raises(SystemExit) as caught:
+        call_campaign(PLAN, tmp_path / "c", workers, lambda _folder, _table: None)
+    assert caught.value.code == 1
+    assert workers.ended
+    assert capsys.readouterr().err.splitlines()[-1] == f"2 of 2 runs done in {tmp_path / 'c'}; the same call goes on"
+    assert CampaignTable.read(tmp_path / "c").column("run").tolist() == NAMES
