@@ -15,9 +15,9 @@ from setuptools.errors import CompileError, OptionError
 
 sys.path.insert(0, str(Path(__file__).parent))  # a build frontend leaves it out
 
-from cosim.native_libraries import CompilationError, host_platform
-from cosim.plan.compile import compile_plan
-from fmus.compile import UnknownPlatform, compile_runtime, wanted_platforms
+from handover.cosim.native_libraries import CompilationError, host_platform
+from handover.cosim.plan.compile import compile_plan
+from handover.fmus.compile import UnknownPlatform, compile_runtime, wanted_platforms
 
 
 def _wanted_platforms() -> tuple[str, ...]:
@@ -37,13 +37,13 @@ class BuildWithLibraries(build_py):
             compile_plan()
         except CompilationError as e:
             raise CompileError(str(e)) from e
-        for package in (("fmus", "runtime"), ("cosim", "plan")):
+        for package in (("handover", "fmus", "runtime"), ("handover", "cosim", "plan")):
             shutil.rmtree(Path(self.build_lib, *package, "bin"), ignore_errors=True)  # of a build before
         super().run()
 
     def find_data_files(self, package: str, src_dir: str) -> list[str]:
         """Leave out what a checkout has been compiled for besides."""
-        wanted = (host_platform(),) if package == "cosim.plan" else _wanted_platforms()
+        wanted = (host_platform(),) if package == "handover.cosim.plan" else _wanted_platforms()
         files = [Path(file) for file in super().find_data_files(package, src_dir)]
         return [str(file) for file in files if file.parent.parent.name != "bin" or file.parent.name in wanted]
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.ball_outline import BallOutline
-from controllers.normal_equations import covariance, least_squares
-from controllers.stereo_rig import StereoRig
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
+from handover.controllers.ball_outline import BallOutline
+from handover.controllers.normal_equations import covariance, least_squares
+from handover.controllers.stereo_rig import StereoRig
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
 
 _ITERATIONS = 6
 _LARGEST_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from controllers.normal_equations import least_squares
-from controllers.region import Pixels, Region
-from cosim.ports import Floats
+from handover.controllers.normal_equations import least_squares
+from handover.controllers.region import Pixels, Region
+from handover.cosim.ports import Floats
 
 _GREEN_FROM = (38, 60, 25)  # hue (180 a turn), saturation, value
 _GREEN_UNTIL = (85, 255, 255)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.sampled_loop import LinearPlant
-from cosim.ports import Floats
+from handover.controllers.sampled_loop import LinearPlant
+from handover.cosim.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.flyer_behaviour import Behaviour
-from controllers.flyer_body import FlyerBody, positive_definite
-from controllers.sampled_loop import LinearController, without_memory
-from cosim.ports import Floats
+from handover.controllers.flyer_behaviour import Behaviour
+from handover.controllers.flyer_body import FlyerBody, positive_definite
+from handover.controllers.sampled_loop import LinearController, without_memory
+from handover.cosim.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

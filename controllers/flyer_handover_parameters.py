@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.flyer_astrobee import ARM
-from controllers.flyer_behaviour import Behaviour
-from controllers.flyer_rotation import rows_of, unit_quaternion
-from cosim.plain_rotation import triple, turned
-from cosim.ports import Floats, Vector3, Vector4, parameter
-from cosim.refusal import Refusal
-from cosim.units import Metre, MetrePerSecond, Number, Radian, Second
+from handover.controllers.flyer_astrobee import ARM
+from handover.controllers.flyer_behaviour import Behaviour
+from handover.controllers.flyer_rotation import rows_of, unit_quaternion
+from handover.cosim.plain_rotation import triple, turned
+from handover.cosim.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import Metre, MetrePerSecond, Number, Radian, Second
 
 NAME = "HandoverStateMachine"
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.flyer_body import FlyerBody
-from controllers.sampled_loop import LinearController
-from cosim.ports import Floats
+from handover.controllers.flyer_body import FlyerBody
+from handover.controllers.sampled_loop import LinearController
+from handover.cosim.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable
 
-from controllers.flyer_body import FlyerBody
-from controllers.sampled_loop import LinearController, SampledLoop, largest_stable
-from cosim.refusal import Refusal
+from handover.controllers.flyer_body import FlyerBody
+from handover.controllers.sampled_loop import LinearController, SampledLoop, largest_stable
+from handover.cosim.refusal import Refusal
 
 _LONGEST_DELAY = 0.5  # s, up to which a stable one is looked for
 

@@ -8,17 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from controllers.ball_fit import BallFit, BallPosition
-from controllers.ball_outline import BallFinder, BallOutline
-from controllers.marker_reader import MarkerReader
-from controllers.marker_ring import MarkerRing
-from controllers.normal_equations import covariance
-from controllers.region import Pixels, Region
-from controllers.ring_fit import RingFit, RingPose
-from controllers.stereo_rig import StereoRig
-from cosim.geometry import looking_at, quaternion_of
-from cosim.pinhole import Pinhole
-from cosim.ports import (
+from handover.controllers.ball_fit import BallFit, BallPosition
+from handover.controllers.ball_outline import BallFinder, BallOutline
+from handover.controllers.marker_reader import MarkerReader
+from handover.controllers.marker_ring import MarkerRing
+from handover.controllers.normal_equations import covariance
+from handover.controllers.region import Pixels, Region
+from handover.controllers.ring_fit import RingFit, RingPose
+from handover.controllers.stereo_rig import StereoRig
+from handover.cosim.geometry import looking_at, quaternion_of
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import (
     BLACK_1280X720,
     Floats,
     Matrix3,
@@ -30,7 +30,7 @@ from cosim.ports import (
     parameter,
     port,
 )
-from cosim.units import Metre, Number, Pixel, SquareMetre
+from handover.cosim.units import Metre, Number, Pixel, SquareMetre
 
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
 _P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])

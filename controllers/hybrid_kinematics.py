@@ -11,12 +11,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from controllers.vsl_default_model import DEFAULT_MODEL
-from controllers.vsl_kinematics import Elbow, VslKinematics
-from controllers.vsl_model import VslModel
-from controllers.vsl_model_text import UnusableModel, parse_model, read_model
-from cosim.ports import Floats, Vector2, Vector3, output, parameter, port
-from cosim.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
+from handover.controllers.vsl_default_model import DEFAULT_MODEL
+from handover.controllers.vsl_kinematics import Elbow, VslKinematics
+from handover.controllers.vsl_model import VslModel
+from handover.controllers.vsl_model_text import UnusableModel, parse_model, read_model
+from handover.cosim.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "HybridKinematics", "Inputs", "Method", "Outputs", "Params", "UnusableModel"]
 

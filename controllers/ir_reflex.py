@@ -10,14 +10,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from controllers.reflex_descent import Descent, Verdict
-from controllers.reflex_move import Move, Reading, X
-from controllers.reflex_parameters import Params, Strategy, UnusableReflex
-from controllers.reflex_probing import Probing
-from controllers.reflex_visibility import Recovery, Visibility, displaced
-from cosim.ports import Floats, Vector2, Vector3, output, port
-from cosim.refusal import Refusal
-from cosim.units import Metre, Number, Radian, SquareMetre, Tick
+from handover.controllers.reflex_descent import Descent, Verdict
+from handover.controllers.reflex_move import Move, Reading, X
+from handover.controllers.reflex_parameters import Params, Strategy, UnusableReflex
+from handover.controllers.reflex_probing import Probing
+from handover.controllers.reflex_visibility import Recovery, Visibility, displaced
+from handover.cosim.ports import Floats, Vector2, Vector3, output, port
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import Metre, Number, Radian, SquareMetre, Tick
 
 __all__ = [
     "Inputs",

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.constant_curvature import linearise
-from cosim.ports import Floats
+from handover.controllers.constant_curvature import linearise
+from handover.cosim.ports import Floats
 
 _STIFFENING = 100.0
 _RANK_TOLERANCE = 1e-9

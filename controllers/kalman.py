@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 
 class UnusableMeasurement(ValueError):

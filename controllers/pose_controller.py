@@ -8,17 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from controllers.flyer_astrobee import ARM, INERTIA, MASS
-from controllers.flyer_body import FlyerBody
-from controllers.flyer_control_ports import Inputs, Outputs
-from controllers.flyer_pid import PidGains, pid_law
-from controllers.flyer_profile import Bounds, Profile, Reference, profile_between
-from controllers.flyer_rotation import angle_between, rotation_vector, rows_of, seen_from, unit_quaternion
-from controllers.flyer_stability import UnusableController, stability_faults
-from controllers.sampled_loop import SampledLoop
-from cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, norm, rows, triple, turned, turned_back
-from cosim.ports import Matrix3, Vector3, parameter
-from cosim.units import (
+from handover.controllers.flyer_astrobee import ARM, INERTIA, MASS
+from handover.controllers.flyer_body import FlyerBody
+from handover.controllers.flyer_control_ports import Inputs, Outputs
+from handover.controllers.flyer_pid import PidGains, pid_law
+from handover.controllers.flyer_profile import Bounds, Profile, Reference, profile_between
+from handover.controllers.flyer_rotation import angle_between, rotation_vector, rows_of, seen_from, unit_quaternion
+from handover.controllers.flyer_stability import UnusableController, stability_faults
+from handover.controllers.sampled_loop import SampledLoop
+from handover.cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, norm, rows, triple, turned, turned_back
+from handover.cosim.ports import Matrix3, Vector3, parameter
+from handover.cosim.units import (
     Kilogram,
     KilogramMetre2,
     Metre,

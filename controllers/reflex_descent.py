@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 
-from controllers.reflex_gauss_newton import bounded_step, broyden_update, cost
-from controllers.reflex_move import X
-from controllers.reflex_parameters import Params
-from cosim.ports import Floats
+from handover.controllers.reflex_gauss_newton import bounded_step, broyden_update, cost
+from handover.controllers.reflex_move import X
+from handover.controllers.reflex_parameters import Params
+from handover.cosim.ports import Floats
 
 
 class Verdict(enum.Enum):

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.reflex_calibration import Calibration
-from cosim.ports import Vector2, Vector3, Vector4, parameter
-from cosim.refusal import Refusal
-from cosim.start_values import parameter_faults
-from cosim.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
+from handover.controllers.reflex_calibration import Calibration
+from handover.cosim.ports import Vector2, Vector3, Vector4, parameter
+from handover.cosim.refusal import Refusal
+from handover.cosim.start_values import parameter_faults
+from handover.cosim.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
 
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from controllers.reflex_move import X
-from cosim.ports import Floats
+from handover.controllers.reflex_move import X
+from handover.cosim.ports import Floats
 
 
 class Probing:

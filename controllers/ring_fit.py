@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from controllers.marker_reader import Markers
-from controllers.marker_ring import MarkerRing
-from controllers.normal_equations import least_squares
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
+from handover.controllers.marker_reader import Markers
+from handover.controllers.marker_ring import MarkerRing
+from handover.controllers.normal_equations import least_squares
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
 
 _ITERATIONS = 12
 _SETTLED = 1e-7  # m and rad

@@ -9,7 +9,7 @@ from typing import Any
 import control as untyped_control
 import numpy as np
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 control: Any = untyped_control
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
 
 
 @dataclass(frozen=True)

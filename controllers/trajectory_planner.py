@@ -10,12 +10,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics, place
-from controllers.vsl_path import Path, Segment, segments_of
-from cosim.ports import Floats, Vector2, Vector3, output, parameter, port
-from cosim.refusal import Refusal
-from cosim.start_values import parameter_faults
-from cosim.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
+from handover.controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics, place
+from handover.controllers.vsl_path import Path, Segment, segments_of
+from handover.cosim.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.refusal import Refusal
+from handover.cosim.start_values import parameter_faults
+from handover.cosim.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "Inputs", "Outputs", "Params", "Path", "TrajectoryPlanner", "UnusablePath"]
 

@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from controllers.constant_curvature import tendon_lengths
-from controllers.jacobian_control import Limits, blend, control_step
-from controllers.kalman import PositionFilter
-from controllers.servo_parameters import Params, UnusableParameters
-from controllers.state_optimization import optimise_state
-from cosim.ports import Floats, Matrix3, Vector3, Vector9, output, port
-from cosim.units import Metre, Number, SquareMetre
+from handover.controllers.constant_curvature import tendon_lengths
+from handover.controllers.jacobian_control import Limits, blend, control_step
+from handover.controllers.kalman import PositionFilter
+from handover.controllers.servo_parameters import Params, UnusableParameters
+from handover.controllers.state_optimization import optimise_state
+from handover.cosim.ports import Floats, Matrix3, Vector3, Vector9, output, port
+from handover.cosim.units import Metre, Number, SquareMetre
 
 __all__ = ["Inputs", "Outputs", "Params", "Phase", "UnusableParameters", "VisualServo"]
 

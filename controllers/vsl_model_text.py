@@ -8,10 +8,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from controllers.vsl_cubic import DEGREE, Cubic, hull_directions
-from controllers.vsl_kinematics import Elbow, VslKinematics
-from controllers.vsl_model import FORWARD_INPUTS, INVERSE_INPUTS, VALUES, VslModel
-from cosim.ports import Floats
+from handover.controllers.vsl_cubic import DEGREE, Cubic, hull_directions
+from handover.controllers.vsl_kinematics import Elbow, VslKinematics
+from handover.controllers.vsl_model import FORWARD_INPUTS, INVERSE_INPUTS, VALUES, VslModel
+from handover.cosim.ports import Floats
 
 FORMAT, VERSION = "handover-vsl-model", 1
 

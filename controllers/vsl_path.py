@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 
 class Path(enum.IntEnum):

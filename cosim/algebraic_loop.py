@@ -4,8 +4,8 @@ from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from cosim.ordering import strongly_connected
-from cosim.system import Connection, PortName, System
+from handover.cosim.ordering import strongly_connected
+from handover.cosim.system import Connection, PortName, System
 
 
 @dataclass(frozen=True)

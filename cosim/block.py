@@ -1,7 +1,7 @@
 """What a plant or a controller is.
 
 A block is a plain class with three dataclasses of declared fields (`Params`, `Inputs`, `Outputs`); they are found by
-the annotations of `__init__` and `step`, and read by `cosim.block_description.describe`.
+the annotations of `__init__` and `step`, and read by `handover.cosim.block_description.describe`.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Protocol
 class Block(Protocol):
     """A plant or a controller with declared ports, advanced in steps.
 
-    What a block may offer besides: `cosim.eventful_block.EventfulBlock`,
-    `cosim.differentiable_block.DifferentiableBlock`.
+    What a block may offer besides: `handover.cosim.eventful_block.EventfulBlock`,
+    `handover.cosim.differentiable_block.DifferentiableBlock`.
 
     Class attributes: `feedthrough` names, by output, the inputs that act on it at once (within the same communication
     point); `period` is the sampling period of a block that is sampled, in seconds, else None.

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from cosim.block_form import check_form
-from cosim.declared_fields import DeclarationError, declared_variables
-from cosim.variable import Causality, Variable
+from handover.cosim.block_form import check_form
+from handover.cosim.declared_fields import DeclarationError, declared_variables
+from handover.cosim.variable import Causality, Variable
 
 _EVENT_METHODS = ("advance", "handle_event", "next_event")
 
@@ -97,7 +97,9 @@ def _has_events(block: type[Any]) -> bool:
     present = [name for name in _EVENT_METHODS if hasattr(block, name)]
     for name in _EVENT_METHODS:
         if present and name not in present:
-            fault = f"a block that has {present[0]} has this method too; see cosim.eventful_block.EventfulBlock"
+            fault = (
+                f"a block that has {present[0]} has this method too; see handover.cosim.eventful_block.EventfulBlock"
+            )
             raise DeclarationError(block.__name__, name, fault)
     if present and block.period is not None:
         raise DeclarationError(block.__name__, "period", "a block with events is not sampled: its period is None")

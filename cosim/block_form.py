@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, cast
 
-from cosim.declared_fields import DeclarationError
+from handover.cosim.declared_fields import DeclarationError
 
 _ATTRIBUTES = ("feedthrough", "period")
 _METHODS = ("outputs", "step", "get_state", "set_state")
@@ -20,7 +20,7 @@ def check_form(block: type[Any]) -> None:
     missing += [name for name in _METHODS if not callable(getattr(block, name, None))]
     if missing:
         what = "a block has these" if len(missing) > 1 else "a block has this"
-        raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see cosim.block.Block")
+        raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see handover.cosim.block.Block")
     for name, fault in (("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))):
         if fault:
             raise DeclarationError(block.__name__, name, fault)

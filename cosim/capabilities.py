@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cosim.fmu_xml import XmlElement
+from handover.cosim.fmu_xml import XmlElement
 
 
 @dataclass(frozen=True, kw_only=True)

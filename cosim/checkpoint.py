@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import CosimError, one_line
-from cosim.master import Master
-from cosim.system import System
+from handover.cosim.exceptions import CosimError, one_line
+from handover.cosim.master import Master
+from handover.cosim.system import System
 
 _FORMAT = 1
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
-from cosim.checkpoint import take_checkpoint, write_checkpoint
-from cosim.master import Master
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
+from handover.cosim.checkpoint import take_checkpoint, write_checkpoint
+from handover.cosim.master import Master
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
 
 _log = logging.getLogger(__name__)
 

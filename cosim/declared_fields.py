@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.declared_values import bounds_fault, start_fault
-from cosim.ports import Declaration, Raster, Shape
-from cosim.units import Unit
-from cosim.variable import Causality, Kind, Variable
-from cosim.width import Width
+from handover.cosim.declared_values import bounds_fault, start_fault
+from handover.cosim.ports import Declaration, Raster, Shape
+from handover.cosim.units import Unit
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.width import Width
 
 
 class DeclarationError(TypeError):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.variable import Kind, Variable
+from handover.cosim.variable import Kind, Variable
 
 _TYPES: dict[Kind, tuple[tuple[type[Any], ...], str]] = {
     Kind.REAL: ((numbers.Real,), "a number, such as 0.0"),

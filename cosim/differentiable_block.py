@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block import Block
+from handover.cosim.block import Block
 
 
 class DifferentiableBlock(Block, Protocol):

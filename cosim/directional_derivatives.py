@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.fmu_description import FmuDescription, FmuPort
-from cosim.iterating.magnitudes import Floats
-from cosim.state_calls import Call
+from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.state_calls import Call
 
 
 def derivatives_along(

@@ -9,19 +9,19 @@ from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from cosim.endings import Endings
-from cosim.exceptions import CosimError
-from cosim.finite_check import FiniteCheck
-from cosim.fmpy_edge import unpack
-from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.instance import Instance
-from cosim.saved_states import SavedStates
-from cosim.schedule import Slot
-from cosim.signals import Signals
-from cosim.state_calls import State
-from cosim.stepping.linear_inputs import LinearInputs
-from cosim.system import System
-from cosim.wiring import Feeding, feedings, finite_checks
+from handover.cosim.endings import Endings
+from handover.cosim.exceptions import CosimError
+from handover.cosim.finite_check import FiniteCheck
+from handover.cosim.fmpy_edge import unpack
+from handover.cosim.heartbeat import Abandoned, Heartbeat
+from handover.cosim.instance import Instance
+from handover.cosim.saved_states import SavedStates
+from handover.cosim.schedule import Slot
+from handover.cosim.signals import Signals
+from handover.cosim.state_calls import State
+from handover.cosim.stepping.linear_inputs import LinearInputs
+from handover.cosim.system import System
+from handover.cosim.wiring import Feeding, feedings, finite_checks
 
 
 class Ensemble:

@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-from cosim.block import Block
+from handover.cosim.block import Block
 
 MOST_EVENTS = 1000
 """Most events in a row at one instant."""

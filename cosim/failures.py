@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import UnitFailure
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 """The standards' names of what calls answer, by number; Pending is FMI 2's alone."""

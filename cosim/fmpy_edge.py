@@ -1,4 +1,7 @@
-"""The typed edge to FMPy: reading model descriptions, and unpacking. FMUs are loaded in `cosim.fmpy_loading`."""
+"""The typed edge to FMPy: reading model descriptions, and unpacking.
+
+FMUs are loaded in `handover.cosim.fmpy_loading`.
+"""
 
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -9,10 +12,10 @@ import fmpy.fmi3
 from fmpy.model_description import ValidationError
 from fmpy.validation import validate_model_description
 
-from cosim.exceptions import InvalidFmu, one_line
-from cosim.fmu_archive import DESCRIPTION, FmuArchive
-from cosim.fmu_xml import UnsafeXml, XmlElement, check_xml, parse_xml
-from cosim.library_format import HEAD, shortage
+from handover.cosim.exceptions import InvalidFmu, one_line
+from handover.cosim.fmu_archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu_xml import UnsafeXml, XmlElement, check_xml, parse_xml
+from handover.cosim.library_format import HEAD, shortage
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
 

@@ -12,8 +12,8 @@ from typing import Any
 import fmpy
 import fmpy.fmi2
 
-from cosim.exceptions import InvalidFmu, one_line
-from cosim.fmpy_units import FMU2Unit, FMU3Unit
+from handover.cosim.exceptions import InvalidFmu, one_line
+from handover.cosim.fmpy_units import FMU2Unit, FMU3Unit
 
 Logger = Callable[[int, str], None]
 """Takes an FMI status and a message."""

@@ -5,8 +5,8 @@ import zlib
 from pathlib import Path
 from typing import ClassVar
 
-from cosim.archive_faults import STANDARD_METHODS, archive_faults, listed
-from cosim.exceptions import InvalidFmu, one_line
+from handover.cosim.archive_faults import STANDARD_METHODS, archive_faults, listed
+from handover.cosim.exceptions import InvalidFmu, one_line
 
 DESCRIPTION = "modelDescription.xml"
 NO_FILE_FAULT = "not a regular file"

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from cosim.capabilities import Capabilities, capabilities_of
-from cosim.events.fmu_clock import FmuClock, clocks_of, without_clocks
-from cosim.exceptions import InvalidFmu
-from cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
-from cosim.fmu_xml import XmlElement
-from cosim.units import UNKNOWN, BaseExponents, Unit
-from cosim.variable import Causality, Declared, Kind
-from cosim.width import Width
+from handover.cosim.capabilities import Capabilities, capabilities_of
+from handover.cosim.events.fmu_clock import FmuClock, clocks_of, without_clocks
+from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
+from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.units import UNKNOWN, BaseExponents, Unit
+from handover.cosim.variable import Causality, Declared, Kind
+from handover.cosim.width import Width
 
 _KINDS = {
     "Real": Kind.REAL,
@@ -162,7 +162,7 @@ def _unit(u: Any) -> Unit:
 
 def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = _KINDS.get(v.type)
-    if kind is None:  # clocks, see `cosim.events.fmu_clock`, and whatever later standards bring
+    if kind is None:  # clocks, see `handover.cosim.events.fmu_clock`, and whatever later standards bring
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)

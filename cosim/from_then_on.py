@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cosim.signals import Signals
+from handover.cosim.signals import Signals
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 FRAMES: Final = {
     "W": "world: right-handed, z up; origin at the middle of the Helix's mount, at the foot of the VSL arm, near the "

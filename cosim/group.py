@@ -4,9 +4,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.algebraic_loop import AlgebraicLoop
-from cosim.ordering import Needs, Told, ordered, strongly_connected
-from cosim.system import Connection, System
+from handover.cosim.algebraic_loop import AlgebraicLoop
+from handover.cosim.ordering import Needs, Told, ordered, strongly_connected
+from handover.cosim.system import Connection, System
 
 
 @dataclass(frozen=True)

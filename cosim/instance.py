@@ -6,22 +6,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.directional_derivatives import derivatives_along
-from cosim.events.discarded_step import discarded_step
-from cosim.events.event_failures import StepDiscarded
-from cosim.events.step_end import StepEnd
-from cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from cosim.failures import STATUS, UnitEnded, failure_of
-from cosim.fmpy_loading import load_fmi2, load_fmi3
-from cosim.fmu_description import FmuDescription, FmuPort
-from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.iterating.magnitudes import Floats
-from cosim.native_step import NativeStep
-from cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
-from cosim.start_values import numbers_of
-from cosim.state_calls import State, StateCalls
-from cosim.stepping.rate_buffer import RateBuffer
-from cosim.variable import Kind
+from handover.cosim.directional_derivatives import derivatives_along
+from handover.cosim.events.discarded_step import discarded_step
+from handover.cosim.events.event_failures import StepDiscarded
+from handover.cosim.events.step_end import StepEnd
+from handover.cosim.exceptions import InvalidFmu, UnitFailure, last_line
+from handover.cosim.failures import STATUS, UnitEnded, failure_of
+from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
+from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.heartbeat import Abandoned, Heartbeat
+from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.native_step import NativeStep
+from handover.cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
+from handover.cosim.start_values import numbers_of
+from handover.cosim.state_calls import State, StateCalls
+from handover.cosim.stepping.rate_buffer import RateBuffer
+from handover.cosim.variable import Kind
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from cosim.algebraic_loop import AlgebraicLoop
-from cosim.exceptions import ScheduleError
-from cosim.group import Group
-from cosim.system import System
-from cosim.variable import Kind
+from handover.cosim.algebraic_loop import AlgebraicLoop
+from handover.cosim.exceptions import ScheduleError
+from handover.cosim.group import Group
+from handover.cosim.system import System
+from handover.cosim.variable import Kind
 
 _CURE = (
     "what would help: units that save their state (canGetAndSetFMUState) in their place, the algorithm jacobi, in "

@@ -6,25 +6,25 @@ from fractions import Fraction
 from types import TracebackType
 from typing import TypeVar
 
-from cosim.endings import Endings
-from cosim.ensemble import Ensemble
-from cosim.exceptions import UnitFailure, UnitRefused
-from cosim.failures import UnitHung
-from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.iterating.iteration_count import IterationCount
-from cosim.master_options import MasterOptions
-from cosim.method import Method
-from cosim.observer import Observer
-from cosim.plan.plan_stepper import PlanStepper
-from cosim.signals import Signals
-from cosim.stepping.adaptive_stepper import AdaptiveStepper
-from cosim.stepping.coupling import Coupling
-from cosim.stepping.gauss_seidel import GaussSeidel
-from cosim.stepping.pacing import Pacer
-from cosim.stepping.step_statistics import StepStatistics
-from cosim.stepping.stepper import Stepper
-from cosim.system import System
-from cosim.watchdog import Watchdog
+from handover.cosim.endings import Endings
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.exceptions import UnitFailure, UnitRefused
+from handover.cosim.failures import UnitHung
+from handover.cosim.heartbeat import Abandoned, Heartbeat
+from handover.cosim.iterating.iteration_count import IterationCount
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.method import Method
+from handover.cosim.observer import Observer
+from handover.cosim.plan.plan_stepper import PlanStepper
+from handover.cosim.signals import Signals
+from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
+from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.gauss_seidel import GaussSeidel
+from handover.cosim.stepping.pacing import Pacer
+from handover.cosim.stepping.step_statistics import StepStatistics
+from handover.cosim.stepping.stepper import Stepper
+from handover.cosim.system import System
+from handover.cosim.watchdog import Watchdog
 
 T = TypeVar("T")
 

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass, fields
 from fractions import Fraction
 from typing import Any
 
-from cosim.exceptions import BadOptions
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.exceptions import BadOptions
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.extrapolation import Extrapolation
 
 
 class Algorithm(enum.Enum):

@@ -2,30 +2,30 @@
 
 from collections.abc import Sequence
 
-from cosim.endings import Endings
-from cosim.ensemble import Ensemble
-from cosim.events.event_ensemble import EventEnsemble
-from cosim.events.event_options import has_events, refuse_off_grid
-from cosim.events.event_stepper import EventStepper
-from cosim.group import Group, groups_of_data_flow
-from cosim.heartbeat import Heartbeat
-from cosim.iterating.fixed_point import FixedPoint
-from cosim.iterating.initial_values import InitialValues
-from cosim.iterating.interface import Interface
-from cosim.iterating.interface_newton import InterfaceNewton
-from cosim.iterating.interface_solver import InterfaceSolver
-from cosim.loop_refusal import refuse_circles, refuse_loops
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.plan.choice import plan_stepper, tell_general_path
-from cosim.schedule import Schedule
-from cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
-from cosim.stepping.coupling import Coupling
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.stepping.gauss_seidel import GaussSeidel
-from cosim.stepping.grid_stepper import GridStepper
-from cosim.stepping.jacobi import Jacobi
-from cosim.stepping.stepper import Stepper
-from cosim.system import System
+from handover.cosim.endings import Endings
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.events.event_ensemble import EventEnsemble
+from handover.cosim.events.event_options import has_events, refuse_off_grid
+from handover.cosim.events.event_stepper import EventStepper
+from handover.cosim.group import Group, groups_of_data_flow
+from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.iterating.fixed_point import FixedPoint
+from handover.cosim.iterating.initial_values import InitialValues
+from handover.cosim.iterating.interface import Interface
+from handover.cosim.iterating.interface_newton import InterfaceNewton
+from handover.cosim.iterating.interface_solver import InterfaceSolver
+from handover.cosim.loop_refusal import refuse_circles, refuse_loops
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.plan.choice import plan_stepper, tell_general_path
+from handover.cosim.schedule import Schedule
+from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
+from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.gauss_seidel import GaussSeidel
+from handover.cosim.stepping.grid_stepper import GridStepper
+from handover.cosim.stepping.jacobi import Jacobi
+from handover.cosim.stepping.stepper import Stepper
+from handover.cosim.system import System
 
 
 class Method:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from cosim.signals import Signals
+from handover.cosim.signals import Signals
 
 Observer = Callable[[float, Signals], None]
 """Called at every communication point with the time in seconds and the signals that hold at that time."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cosim.geometry import rotation_of
-from cosim.ports import Floats
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats
 
 _UNIT_TOLERANCE = 1e-6
 _NEAR = 0.02  # m; what is nearer to the lens, or behind it, has no picture

@@ -1,8 +1,8 @@
 """Kinds of port and parameter, as types and dataclass fields.
 
-A scalar port is a float with a unit (`cosim.units`), an int, a bool, a str or an `enum.IntEnum`. An array is one of the
-shapes below with the unit of its entries, as in `Vector3[Metre]`; `Polyline25[Metre]` holds 25 points in space. A
-camera picture is `Picture1280x720`.
+A scalar port is a float with a unit (`handover.cosim.units`), an int, a bool, a str or an `enum.IntEnum`. An array is
+one of the shapes below with the unit of its entries, as in `Vector3[Metre]`; `Polyline25[Metre]` holds 25 points in
+space. A camera picture is `Picture1280x720`.
 
 Outside, reals have 64 bits and integers too. A block that wants others says so by type: `Single[Metre]` and
 `Single[Vector3[Metre]]` are reals of 32 bits, `Int8` ... `UInt64` integers. For the block they are float, array and int
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
-from cosim.width import Width
+from handover.cosim.width import Width
 
 U = TypeVar("U")
 T = TypeVar("T")

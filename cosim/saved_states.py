@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from cosim.state_calls import State
-from cosim.stepping.linear_inputs import Memory
+from handover.cosim.state_calls import State
+from handover.cosim.stepping.linear_inputs import Memory
 
 
 class SavedStates(dict[str, State]):

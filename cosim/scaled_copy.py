@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.linear import Linear
+from handover.cosim.linear import Linear
 
 
 class ScaledCopy:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.fmu_description import FmuPort
+from handover.cosim.fmu_description import FmuPort
 
 _POINTER: Callable[[Any], Any] = ctypes.POINTER
 

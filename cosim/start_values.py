@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.declared_fields import declared_variables
-from cosim.variable import Causality, Declared, Kind
+from handover.cosim.declared_fields import declared_variables
+from handover.cosim.variable import Causality, Declared, Kind
 
 
 def fault_of(port: Declared, value: Any) -> str | None:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from cosim.heartbeat import Heartbeat
+from handover.cosim.heartbeat import Heartbeat
 
 
 class Stillness:

@@ -5,9 +5,9 @@ import enum
 import math
 from typing import Any
 
-from cosim.ports import Raster
-from cosim.units import ONE, Unit
-from cosim.width import Width
+from handover.cosim.ports import Raster
+from handover.cosim.units import ONE, Unit
+from handover.cosim.width import Width
 
 
 class Kind(enum.Enum):

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from cosim.failures import UnitHung
-from cosim.heartbeat import Call, Heartbeat
-from cosim.stillness import Stillness
+from handover.cosim.failures import UnitHung
+from handover.cosim.heartbeat import Call, Heartbeat
+from handover.cosim.stillness import Stillness
 
 T = TypeVar("T")
 

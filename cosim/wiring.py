@@ -4,14 +4,14 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from cosim.finite_check import FiniteCheck
-from cosim.fmu_description import FmuPort
-from cosim.instance import Instance
-from cosim.linear import Linear
-from cosim.narrowing import Narrowing, narrows
-from cosim.scaled_copy import ScaledCopy
-from cosim.signal_buffer import Copy, joined
-from cosim.system import PortName, System
+from handover.cosim.finite_check import FiniteCheck
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.instance import Instance
+from handover.cosim.linear import Linear
+from handover.cosim.narrowing import Narrowing, narrows
+from handover.cosim.scaled_copy import ScaledCopy
+from handover.cosim.signal_buffer import Copy, joined
+from handover.cosim.system import PortName, System
 
 _log = logging.getLogger(__name__)
 

@@ -2,8 +2,16 @@
 
 from collections.abc import Sequence
 
-from fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, library, named_platforms, wanted_platforms
-from fmus.universal import universal
+from handover.fmus.compile import (
+    TARGETS,
+    compile_runtime,
+    has_compiler,
+    is_current,
+    library,
+    named_platforms,
+    wanted_platforms,
+)
+from handover.fmus.universal import universal
 
 FMI2_FOLDERS = {
     "x86_64-linux": "linux64",
@@ -40,7 +48,8 @@ def binaries(name: str, fmi: int, platforms: Sequence[str] | None = None) -> dic
     Args:
         name: the FMU's name.
         fmi: 2 or 3.
-        platforms: those to have, as `fmus.compile.named_platforms` takes them; without it all that are compiled.
+        platforms: those to have, as `handover.fmus.compile.named_platforms` takes them; without it all that are
+            compiled.
 
     Raises:
         UnknownPlatform: a platform is not known.

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Floats, Raster
-from cosim.variable import Causality, Variable
-from fmus.layout import Buffer, Layout, Slot, capacity
+from handover.cosim.ports import Floats, Raster
+from handover.cosim.variable import Causality, Variable
+from handover.fmus.layout import Buffer, Layout, Slot, capacity
 
 ALIGNMENT = 64
 """Bytes: arrays begin at multiples of a cache line in their memory."""

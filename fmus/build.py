@@ -14,18 +14,18 @@ from numbers import Rational
 from pathlib import Path
 from typing import Any
 
-from cosim.block_description import describe
-from cosim.zip_writing import write_archive
-from fmus import interpreter
-from fmus.binaries import binaries
-from fmus.catalog import Entry, find_unit
-from fmus.compile import cache_folder
-from fmus.documentation import page
-from fmus.fmi2_description import fmi2_description
-from fmus.fmi3_description import fmi3_description
-from fmus.layout import Form, Layout
-from fmus.model_description import Model
-from fmus.sources import Carried, UnknownBlock, closure
+from handover.cosim.block_description import describe
+from handover.cosim.zip_writing import write_archive
+from handover.fmus import interpreter
+from handover.fmus.binaries import binaries
+from handover.fmus.catalog import Entry, find_unit
+from handover.fmus.compile import cache_folder
+from handover.fmus.documentation import page
+from handover.fmus.fmi2_description import fmi2_description
+from handover.fmus.fmi3_description import fmi3_description
+from handover.fmus.layout import Form, Layout
+from handover.fmus.model_description import Model
+from handover.fmus.sources import Carried, UnknownBlock, closure
 
 
 class UnknownVersion(ValueError):
@@ -183,7 +183,7 @@ def _model(entry: Entry, form: Form, token: str) -> Model:
 
 
 def import_block(path: str) -> type[Any]:
-    """Return the class that a path such as `plants.tendon_arm:TendonArm` names.
+    """Return the class that a path such as `handover.plants.tendon_arm:TendonArm` names.
 
     Raises:
         UnknownBlock: the module has no such class.

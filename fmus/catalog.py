@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest
 
 
 class UnknownUnit(LookupError):
@@ -36,48 +36,74 @@ class Entry:
 
 
 _ENTRIES = (
-    Entry("TendonArm", "plants.tendon_arm:TendonArm", Fraction(1, 50), "tendon-driven soft arm with a gripper"),
-    Entry("HandoverPartner", "plants.handover_partner:HandoverPartner", Fraction(1, 50), "hand that offers a ball"),
-    Entry("StereoCamera", "plants.stereo_camera:StereoCamera", Fraction(1, 30), "pictures of two cameras"),
-    Entry("HandoverVision", "controllers.handover_vision:HandoverVision", Fraction(1, 30), "finds ball and markers"),
-    Entry("VisualServo", "controllers.visual_servo:VisualServo", Fraction(1, 2), "moves the arm by what vision sees"),
-    Entry("VslArm", "plants.vsl_arm:VslArm", Fraction(1, 50), "arm with links whose stiffness follows their pressure"),
+    Entry(
+        "TendonArm", "handover.plants.tendon_arm:TendonArm", Fraction(1, 50), "tendon-driven soft arm with a gripper"
+    ),
+    Entry(
+        "HandoverPartner",
+        "handover.plants.handover_partner:HandoverPartner",
+        Fraction(1, 50),
+        "hand that offers a ball",
+    ),
+    Entry("StereoCamera", "handover.plants.stereo_camera:StereoCamera", Fraction(1, 30), "pictures of two cameras"),
+    Entry(
+        "HandoverVision",
+        "handover.controllers.handover_vision:HandoverVision",
+        Fraction(1, 30),
+        "finds ball and markers",
+    ),
+    Entry(
+        "VisualServo",
+        "handover.controllers.visual_servo:VisualServo",
+        Fraction(1, 2),
+        "moves the arm by what vision sees",
+    ),
+    Entry(
+        "VslArm",
+        "handover.plants.vsl_arm:VslArm",
+        Fraction(1, 50),
+        "arm with links whose stiffness follows their pressure",
+    ),
     Entry(
         "TrajectoryPlanner",
-        "controllers.trajectory_planner:TrajectoryPlanner",
+        "handover.controllers.trajectory_planner:TrajectoryPlanner",
         Fraction(1, 50),
         "lines, arcs and squares for a three-joint arm",
     ),
     Entry(
         "HybridKinematics",
-        "controllers.hybrid_kinematics:HybridKinematics",
+        "handover.controllers.hybrid_kinematics:HybridKinematics",
         Fraction(1, 50),
         "rigid-link kinematics, corrected by what was learned",
     ),
-    Entry("FreeFlyer", "plants.free_flyer:FreeFlyer", Fraction(2, 125), "free-flying robot with a fixed arm"),
-    Entry("Thrusters", "plants.thrusters:Thrusters", Fraction(2, 125), "its propulsion, with limits and lag"),
-    Entry("Push", "plants.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"),
+    Entry("FreeFlyer", "handover.plants.free_flyer:FreeFlyer", Fraction(2, 125), "free-flying robot with a fixed arm"),
+    Entry("Thrusters", "handover.plants.thrusters:Thrusters", Fraction(2, 125), "its propulsion, with limits and lag"),
+    Entry("Push", "handover.plants.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"),
     Entry(
         "HandAndObject",
-        "plants.hand_and_object:HandAndObject",
+        "handover.plants.hand_and_object:HandAndObject",
         Fraction(2, 125),
         "hand that takes and gives an object in microgravity",
     ),
     Entry(
         "ImpedanceController",
-        "controllers.impedance_controller:ImpedanceController",
+        "handover.controllers.impedance_controller:ImpedanceController",
         Fraction(2, 125),
         "makes the gripper yield like a spring and damper",
     ),
-    Entry("PoseController", "controllers.pose_controller:PoseController", Fraction(2, 125), "flies to a pose"),
+    Entry("PoseController", "handover.controllers.pose_controller:PoseController", Fraction(2, 125), "flies to a pose"),
     Entry(
         "HandoverStateMachine",
-        "controllers.handover_state_machine:HandoverStateMachine",
+        "handover.controllers.handover_state_machine:HandoverStateMachine",
         Fraction(2, 125),
         "decides when to fly, yield, signal, hold and let go",
     ),
-    Entry("GraspScene", "plants.grasp_scene:GraspScene", Fraction(3, 200), "soft hand, object, table, IR sensors"),
-    Entry("IrReflex", "controllers.ir_reflex:IrReflex", Fraction(3, 200), "corrects a grasp by infrared reflexes"),
+    Entry(
+        "GraspScene", "handover.plants.grasp_scene:GraspScene", Fraction(3, 200), "soft hand, object, table, IR sensors"
+    ),
+    Entry(
+        "IrReflex", "handover.controllers.ir_reflex:IrReflex", Fraction(3, 200), "corrects a grasp by infrared reflexes"
+    ),
 )
 
 UNITS: Mapping[str, Entry] = {entry.name: entry for entry in _ENTRIES}

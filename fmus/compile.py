@@ -1,7 +1,8 @@
 """Compiles the FMI runtime: `fmus/runtime/*.c` to one shared library per standard and platform, with `zig cc`.
 
 Used by `setup.py` while the package is built, where nothing but the standard library and ziglang is installed, and by
-`fmus.binaries` for what is missing or out of date. `python -m fmus.compile [PLATFORM...]` compiles by hand.
+`handover.fmus.binaries` for what is missing or out of date. `python -m handover.fmus.compile [PLATFORM...]` compiles by
+hand.
 """
 
 import argparse
@@ -9,7 +10,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from cosim.native_libraries import (
+from handover.cosim.native_libraries import (
     STAMP,
     TARGETS,
     CompilationError,

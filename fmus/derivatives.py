@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.variable import Causality
-from fmus.buffers import Buffers
-from fmus.layout import Buffer, Slot
+from handover.cosim.variable import Causality
+from handover.fmus.buffers import Buffers
+from handover.fmus.layout import Buffer, Slot
 
 Derivative = float | NDArray[np.float64]
 

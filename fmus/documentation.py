@@ -11,12 +11,12 @@ import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
-from cosim.variable import Causality, Kind, Variable
-from fmus.docstring import parse
-from fmus.layout import SAMPLE_CLOCK, Form
-from fmus.model_description import Model, enumerations
-from fmus.papers import cited
-from fmus.sources import Package
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.fmus.docstring import parse
+from handover.fmus.layout import SAMPLE_CLOCK, Form
+from handover.fmus.model_description import Model, enumerations
+from handover.fmus.papers import cited
+from handover.fmus.sources import Package
 
 _FORMS = {
     Form.FMI2: "FMI 2.0 for co-simulation",

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Raster
-from cosim.variable import Causality, Variable
-from cosim.width import Width
-from fmus.buffers import Buffers, to_signed
-from fmus.layout import Buffer, Slot, capacity
-from fmus.parameters import read_value
+from handover.cosim.ports import Raster
+from handover.cosim.variable import Causality, Variable
+from handover.cosim.width import Width
+from handover.fmus.buffers import Buffers, to_signed
+from handover.fmus.layout import Buffer, Slot, capacity
+from handover.fmus.parameters import read_value
 
 NOT_REAL = (Buffer.INT64, Buffer.BOOLEAN, Buffer.STRING, Buffer.BINARY)
 

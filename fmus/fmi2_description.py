@@ -5,10 +5,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cosim.variable import Causality, Kind, Variable
-from cosim.width import Width
-from fmus.layout import Form, HostVariable
-from fmus.model_description import (
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.width import Width
+from handover.fmus.layout import Form, HostVariable
+from handover.fmus.model_description import (
     GENERATOR,
     Model,
     add_default_experiment,

@@ -9,9 +9,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from cosim.variable import Causality, Kind, Variable
-from fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
-from fmus.model_description import (
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
+from handover.fmus.model_description import (
     GENERATOR,
     Model,
     add_default_experiment,

@@ -10,9 +10,9 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cosim.block_description import Description
-from cosim.variable import Causality, Kind, Variable
-from cosim.width import Width
+from handover.cosim.block_description import Description
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.width import Width
 
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""

@@ -35,7 +35,7 @@ class Refusal(Exception):
 
 
 def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = None) -> Any:
-    """Make an instance's Python side, a `fmus.slave.Slave`.
+    """Make an instance's Python side, a `handover.fmus.slave.Slave`.
 
     Args:
         resources: the FMU's folder of that name, unpacked.
@@ -55,7 +55,7 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
-    return modules.load("fmus.slave").Slave(getattr(modules.load(module), name), unit["form"], memory)
+    return modules.load("handover.fmus.slave").Slave(getattr(modules.load(module), name), unit["form"], memory)
 
 
 def warning(resources: str) -> str:

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.block_description import Description
-from cosim.units import Unit
-from cosim.variable import Kind, Variable
-from fmus.layout import Form, Layout
+from handover.cosim.block_description import Description
+from handover.cosim.units import Unit
+from handover.cosim.variable import Kind, Variable
+from handover.fmus.layout import Form, Layout
 
 GENERATOR = "handover-cosim"
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.start_values import fault_of
-from cosim.variable import Variable
-from cosim.width import Width
-from fmus.buffers import Buffers, to_unsigned
-from fmus.layout import Buffer, Slot
+from handover.cosim.start_values import fault_of
+from handover.cosim.variable import Variable
+from handover.cosim.width import Width
+from handover.fmus.buffers import Buffers, to_unsigned
+from handover.fmus.layout import Buffer, Slot
 
 
 class ParameterOutOfRange(ValueError):

@@ -117,7 +117,9 @@ class Server:
 
     def _start(self, wanted: bytes) -> bytes:
         token, _, resources = wanted.decode(errors="surrogateescape").partition("\n")
-        loader = runpy.run_path(os.path.join(resources, "sources", "fmus", "loader.py"), run_name="fmu_loader")
+        loader = runpy.run_path(
+            os.path.join(resources, "sources", "handover", "fmus", "loader.py"), run_name="fmu_loader"
+        )
         self._explain = loader["explain"]
         self._slave = loader["start"](resources, token, self._share)
         warning: bytes = loader["warning"](resources).encode()

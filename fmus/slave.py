@@ -4,14 +4,14 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from cosim.block_description import describe
-from cosim.eventful_block import UnfitAdvance
-from fmus.buffers import Buffers, UnfitState, join, split
-from fmus.derivatives import derivative_reader
-from fmus.exchange import input_reader, output_writer
-from fmus.layout import Form, Layout
-from fmus.parameters import read_parameters
-from fmus.table import table
+from handover.cosim.block_description import describe
+from handover.cosim.eventful_block import UnfitAdvance
+from handover.fmus.buffers import Buffers, UnfitState, join, split
+from handover.fmus.derivatives import derivative_reader
+from handover.fmus.exchange import input_reader, output_writer
+from handover.fmus.layout import Form, Layout
+from handover.fmus.parameters import read_parameters
+from handover.fmus.table import table
 
 
 class Slave:
@@ -25,7 +25,7 @@ class Slave:
         memory: where the variables lie, see `Buffers`.
     """
 
-    _block: Any  # a cosim.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
+    _block: Any  # a handover.cosim.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
 
     def __init__(self, block: type[Any], form: str, memory: Callable[[int], Any] | None = None) -> None:
         self._type = block

@@ -13,10 +13,10 @@ from importlib import metadata
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
-HOUSE = ("cosim", "plants", "controllers", "fmus")
-"""Packages that every FMU carries as sources."""
+HOUSE = "handover"
+"""The package of which every FMU carries sources."""
 
-SLAVE_SIDE = ("fmus.slave", "fmus.loader", "fmus.server", "fmus.interpreter")
+SLAVE_SIDE = ("handover.fmus.slave", "handover.fmus.loader", "handover.fmus.server", "handover.fmus.interpreter")
 """Modules that every FMU carries, whatever its block imports."""
 
 
@@ -24,7 +24,9 @@ class UnknownBlock(LookupError):
     """There is no such block class; the message says what of its path is missing."""
 
     def __init__(self, path: str, fault: str) -> None:
-        super().__init__(f"{path!r} is not the path of a block, such as 'plants.tendon_arm:TendonArm': {fault}")
+        super().__init__(
+            f"{path!r} is not the path of a block, such as 'handover.plants.tendon_arm:TendonArm': {fault}"
+        )
         self.path, self.fault = path, fault
 
 
@@ -42,7 +44,7 @@ class Carried:
     """What goes into an FMU.
 
     Attributes:
-        files: sources by their path in the FMU, such as `plants/tendon_arm.py`.
+        files: sources by their path in the FMU, such as `handover/plants/tendon_arm.py`.
         modules: top-level modules of the environment that they import, sorted.
     """
 
@@ -70,7 +72,7 @@ def closure(block: str) -> Carried:
     """Follow the imports of a block's module.
 
     Args:
-        block: path of the block's class, such as `plants.tendon_arm:TendonArm`.
+        block: path of the block's class, such as `handover.plants.tendon_arm:TendonArm`.
 
     Raises:
         UnknownBlock: its module cannot be found, or is not Python source.
@@ -80,7 +82,7 @@ def closure(block: str) -> Carried:
         raise UnknownBlock(block, "there is no ':' between module and class")
     if not _is_source(_spec(module)):
         raise UnknownBlock(block, f"module {module!r} cannot be found as Python source")
-    carried_tops = {*HOUSE, module.partition(".")[0]}
+    carried_tops = {HOUSE, module.partition(".")[0]}
     files: dict[str, Path] = {}
     environment: set[str] = set()
     waiting = [module, *SLAVE_SIDE]

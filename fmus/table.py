@@ -5,9 +5,9 @@ A header, then the binary buffers, the variables by value reference, and their n
 
 import struct
 
-from cosim.variable import Causality
-from fmus.buffers import Buffers
-from fmus.layout import TIME, Buffer, Form, Type, type_of
+from handover.cosim.variable import Causality
+from handover.fmus.buffers import Buffers
+from handover.fmus.layout import TIME, Buffer, Form, Type, type_of
 
 HEADER = struct.Struct("=14Q")
 BINARY_BUFFER = struct.Struct("=3Q")

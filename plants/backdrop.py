@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from plants.sketch import Pixels
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.plants.sketch import Pixels
 
 _WALL = 1.7  # m; x of a wall opposite the cameras
 _FLOOR = -1.35  # m; its z

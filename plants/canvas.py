@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Floats
-from plants.backdrop import Backdrop
-from plants.sketch import Decal, Pixels, Sketch
+from handover.cosim.ports import Floats
+from handover.plants.backdrop import Backdrop
+from handover.plants.sketch import Decal, Pixels, Sketch
 
 _FINE = 2  # canvas pixels a picture pixel, each way: with the blur, edges come out smooth
 _SHIFT = 4  # fractional bits of polygon corners

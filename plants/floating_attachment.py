@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, inverse, product, turned, turned_back
-from plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
+from handover.cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, inverse, product, turned, turned_back
+from handover.plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
 
 
 class Frame:

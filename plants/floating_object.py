@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.plain_rotation import ZERO, Rows, Triple, cross, norm, product, turned, turned_back
-from cosim.ports import Floats
-from plants.floating_attachment import Attachment, Frame, Palm
-from plants.floating_rotation import along, matrix_of, turn_by, unit
-from plants.rigid_body import RigidBody
+from handover.cosim.plain_rotation import ZERO, Rows, Triple, cross, norm, product, turned, turned_back
+from handover.cosim.ports import Floats
+from handover.plants.floating_attachment import Attachment, Frame, Palm
+from handover.plants.floating_rotation import along, matrix_of, turn_by, unit
+from handover.plants.rigid_body import RigidBody
 
 Six = tuple[float, float, float, float, float, float]
 Wrench = tuple[Triple, Triple]

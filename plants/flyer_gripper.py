@@ -1,10 +1,10 @@
 """The gripper of a free-flyer: two fingers that close along z of G around an object, and a palm behind them."""
 
-from cosim.plain_rotation import Rows, Triple, cross, inverse, product, turned, turned_back
-from plants.floating_attachment import Attachment, Frame, Palm, Stiffness
-from plants.floating_rotation import matrix_of, minus, plus
-from plants.flyer_hand_parameters import Params
-from plants.rigid_body import RigidBody
+from handover.cosim.plain_rotation import Rows, Triple, cross, inverse, product, turned, turned_back
+from handover.plants.floating_attachment import Attachment, Frame, Palm, Stiffness
+from handover.plants.floating_rotation import matrix_of, minus, plus
+from handover.plants.flyer_hand_parameters import Params
+from handover.plants.rigid_body import RigidBody
 
 _NEAR = 0.02
 """Metres in front of the palm within which an object may come to touch it in a step."""

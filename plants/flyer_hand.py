@@ -2,12 +2,23 @@
 
 import pickle
 
-from cosim.plain_rotation import ZERO, Quaternion, Triple, cross, inverse, norm, product, triple, turned, turned_back
-from plants.floating_attachment import Attachment, Frame, Stiffness
-from plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
-from plants.flyer_hand_parameters import Params
-from plants.hand_tremor import HandTremor
-from plants.rigid_body import RigidBody
+from handover.cosim.plain_rotation import (
+    ZERO,
+    Quaternion,
+    Triple,
+    cross,
+    inverse,
+    norm,
+    product,
+    triple,
+    turned,
+    turned_back,
+)
+from handover.plants.floating_attachment import Attachment, Frame, Stiffness
+from handover.plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
+from handover.plants.flyer_hand_parameters import Params
+from handover.plants.hand_tremor import HandTremor
+from handover.plants.rigid_body import RigidBody
 
 _SPARE = 0.1
 """Metres beyond its reach at which an arm loses what the hand holds."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats, Vector3, Vector4, parameter
-from cosim.refusal import Refusal
-from cosim.units import (
+from handover.cosim.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import (
     Hertz,
     Kilogram,
     Metre,
@@ -23,7 +23,7 @@ from cosim.units import (
     RadianPerSecond,
     Second,
 )
-from plants.rigid_body import unit_faults
+from handover.plants.rigid_body import unit_faults
 
 LEAST_ROOM = 0.05
 """Metres that must lie between the gripper's and the hand's place on an object for both to hold it."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.plain_rotation import Quaternion, Triple, norm, product, triple, turned
-from plants.floating_attachment import Frame
-from plants.floating_rotation import along, between, minus, plus, quaternion
-from plants.flyer_hand_parameters import Motion, Params, StartHolder
+from handover.cosim.plain_rotation import Quaternion, Triple, norm, product, triple, turned
+from handover.plants.floating_attachment import Frame
+from handover.plants.floating_rotation import along, between, minus, plus, quaternion
+from handover.plants.flyer_hand_parameters import Motion, Params, StartHolder
 
 _PEAK = 1.875
 """Highest speed of a minimum-jerk course over its mean speed."""

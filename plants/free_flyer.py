@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.plain_rotation import Triple, triple, turned
-from cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
-from cosim.refusal import Refusal
-from cosim.units import (
+from handover.cosim.plain_rotation import Triple, triple, turned
+from handover.cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import (
     Kilogram,
     KilogramMetre2,
     Metre,
@@ -24,8 +24,8 @@ from cosim.units import (
     RadianPerSecond,
     Second,
 )
-from plants.floating_rotation import matrix_of, quaternion
-from plants.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
+from handover.plants.floating_rotation import matrix_of, quaternion
+from handover.plants.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
 
 _HALF_A_TURN = math.pi
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats, Vector2, parameter
-from cosim.refusal import Refusal
-from cosim.start_values import parameter_faults
-from cosim.units import (
+from handover.cosim.ports import Floats, Vector2, parameter
+from handover.cosim.refusal import Refusal
+from handover.cosim.start_values import parameter_faults
+from handover.cosim.units import (
     Kilogram,
     Metre,
     MetrePerSecond,
@@ -24,8 +24,8 @@ from cosim.units import (
     Second,
     Tick,
 )
-from plants.grasp_objects import SOLIDS, Solid, Thing, outlines
-from plants.infrared_sensor import InfraredSensor, UnusableSensor
+from handover.plants.grasp_objects import SOLIDS, Solid, Thing, outlines
+from handover.plants.infrared_sensor import InfraredSensor, UnusableSensor
 
 _LIGHTEST = 1e-3
 """Least mass of an object, kg: contacts with much heavier phalanges fling away what is lighter."""
@@ -43,7 +43,7 @@ class Params:
 
     [Luberto] states the operating range of the sensors, their converter (sec. V-B) and the form of their
     characteristic, eq. (11). All else is assumed, the characteristic's coefficients too; the shapes are in
-    `plants.grasp_hand` and `plants.grasp_objects`.
+    `handover.plants.grasp_hand` and `handover.plants.grasp_objects`.
     """
 
     thing: Thing = parameter(Thing.CYLINDER, "what stands on the table, in which reference pose")

@@ -9,12 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.ports import Vector2, Vector3, Vector8, output, port
-from cosim.refusal import Refusal
-from cosim.units import Metre, Newton, Number, Radian, Tick
-from plants.grasp_hand import FINGERS
-from plants.grasp_parameters import Params, UnusableScene
-from plants.grasp_world import DT, Command, GraspWorld, beginning
+from handover.cosim.ports import Vector2, Vector3, Vector8, output, port
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import Metre, Newton, Number, Radian, Tick
+from handover.plants.grasp_hand import FINGERS
+from handover.plants.grasp_parameters import Params, UnusableScene
+from handover.plants.grasp_world import DT, Command, GraspWorld, beginning
 
 SEES_NOTHING = 0.2
 """Value of the output `range` where a sensor's ray meets no object, in m."""

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from cosim.ports import Floats
-from plants.grasp_hand import FINGERS, HIGHEST, LOWEST
+from handover.cosim.ports import Floats
+from handover.plants.grasp_hand import FINGERS, HIGHEST, LOWEST
 
 PULLEYS: Final = np.array([r for f in FINGERS for r in f.pulleys])
 """Radii r at which the tendon passes the joints, (8,), in m."""

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from typing import Final
 
-from cosim.ports import Floats
-from plants.grasp_hand import FINGERS, HIGHEST, LOWEST, PALM, SENSOR_PLACE, Finger, finger_points
-from plants.grasp_objects import Disc
-from plants.grasp_parameters import Params
-from plants.grasp_tendon import GEARS, resting_posture, taken_up
-from plants.grasp_wrist import follow
-from plants.pymunk_edge import Motion, PymunkBody, PymunkEdge
+from handover.cosim.ports import Floats
+from handover.plants.grasp_hand import FINGERS, HIGHEST, LOWEST, PALM, SENSOR_PLACE, Finger, finger_points
+from handover.plants.grasp_objects import Disc
+from handover.plants.grasp_parameters import Params
+from handover.plants.grasp_tendon import GEARS, resting_posture, taken_up
+from handover.plants.grasp_wrist import follow
+from handover.plants.pymunk_edge import Motion, PymunkBody, PymunkEdge
 
 DT: Final = 1e-3
 """Internal time step, in s."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from plants.limb import Limb, rod
+from handover.cosim.ports import Floats
+from handover.plants.limb import Limb, rod
 
 _METAL = (86.0, 82.0, 78.0)
 _FINGER = (52.0, 50.0, 50.0)

@@ -10,16 +10,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.plain_rotation import ZERO, Triple, cross, norm, triple, turned
-from cosim.ports import Floats, Vector3, Vector4, Vector14, output, port
-from cosim.units import Metre, MetrePerSecond, Newton, NewtonMetre, Number, Radian, RadianPerSecond
-from plants.floating_attachment import Attachment, Frame
-from plants.floating_object import FloatingObject
-from plants.floating_rotation import along, between, matrix_of, minus, plus, quaternion, unit
-from plants.flyer_gripper import FlyerGripper
-from plants.flyer_hand import FlyerHand
-from plants.flyer_hand_parameters import Motion, Params, StartHolder, UnusableHand
-from plants.flyer_person import Activity, FlyerPerson, Seen, minimum_jerk
+from handover.cosim.plain_rotation import ZERO, Triple, cross, norm, triple, turned
+from handover.cosim.ports import Floats, Vector3, Vector4, Vector14, output, port
+from handover.cosim.units import Metre, MetrePerSecond, Newton, NewtonMetre, Number, Radian, RadianPerSecond
+from handover.plants.floating_attachment import Attachment, Frame
+from handover.plants.floating_object import FloatingObject
+from handover.plants.floating_rotation import along, between, matrix_of, minus, plus, quaternion, unit
+from handover.plants.flyer_gripper import FlyerGripper
+from handover.plants.flyer_hand import FlyerHand
+from handover.plants.flyer_hand_parameters import Motion, Params, StartHolder, UnusableHand
+from handover.plants.flyer_person import Activity, FlyerPerson, Seen, minimum_jerk
 
 __all__ = [
     "Activity",

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from plants.limb import Limb, rod
+from handover.cosim.ports import Floats
+from handover.plants.limb import Limb, rod
 
 _SKIN = (138.0, 164.0, 212.0)
 _SLEEVE = (112.0, 84.0, 62.0)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 
 class _Step(NamedTuple):

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.geometry import rotation_of
-from cosim.ports import Floats, Vector3, Vector4, output, parameter, port
-from cosim.refusal import Refusal
-from cosim.units import (
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats, Vector3, Vector4, output, parameter, port
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import (
     Hertz,
     Kilogram,
     Metre,
@@ -23,7 +23,7 @@ from cosim.units import (
     Number,
     Second,
 )
-from plants.hand_tremor import HandTremor
+from handover.plants.hand_tremor import HandTremor
 
 
 class UnusablePartner(Refusal):

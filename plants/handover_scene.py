@@ -4,17 +4,17 @@ from typing import Protocol
 
 import numpy as np
 
-from cosim.geometry import rotation_of
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from plants.gripper_figure import gripper
-from plants.hand_figure import hand
-from plants.light import Light
-from plants.limb import sketched
-from plants.marker_collar import MarkerCollar
-from plants.shaded_ball import ShadedBall
-from plants.sketch import Decal, Sketch
-from plants.soft_tube import tube
+from handover.cosim.geometry import rotation_of
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.plants.gripper_figure import gripper
+from handover.plants.hand_figure import hand
+from handover.plants.light import Light
+from handover.plants.limb import sketched
+from handover.plants.marker_collar import MarkerCollar
+from handover.plants.shaded_ball import ShadedBall
+from handover.plants.sketch import Decal, Sketch
+from handover.plants.soft_tube import tube
 
 
 class Postures(Protocol):

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 
 @dataclass(frozen=True)

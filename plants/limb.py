@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from plants.light import Light
-from plants.sketch import Sketch
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.plants.light import Light
+from handover.plants.sketch import Sketch
 
 _ARC = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)
 _OFFSETS = np.linspace(0.0, 0.9, 6)  # where the shade changes, from the silhouette to the brightest line

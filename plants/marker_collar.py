@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from plants.light import Light
-from plants.sketch import Decal, Pixels, Sketch
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.plants.light import Light
+from handover.plants.sketch import Decal, Pixels, Sketch
 
 _SIDES = 8
 _CELL = 8  # texture px a marker cell

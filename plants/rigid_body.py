@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from cosim.plain_rotation import ZERO, Quaternion, Triple, rows, turned, turned_back
-from cosim.ports import Floats
-from plants.floating_rotation import matrix_of
+from handover.cosim.plain_rotation import ZERO, Quaternion, Triple, rows, turned, turned_back
+from handover.cosim.ports import Floats
+from handover.plants.floating_rotation import matrix_of
 
 UNIT_TOLERANCE = 1e-6
 """How far the norm of a quaternion that is given may be from 1."""

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.random import Generator
 
-from plants.sketch import Pixels
+from handover.plants.sketch import Pixels
 
 _SPARE = 1 << 20  # offsets to choose from
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from plants.light import Light
-from plants.sketch import Decal, Pixels
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.plants.light import Light
+from handover.plants.sketch import Decal, Pixels
 
 _RADIUS = 48.0  # texture px; about the ball's size on the canvas, so that warping it does not alias
 _HALF = 52  # half the texture's side

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from plants.light import Light
-from plants.sketch import Sketch
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.plants.light import Light
+from handover.plants.sketch import Sketch
 
 _RIB_LENGTH = 0.008  # m; ribs and gaps alternate
 _STRIPS = 7  # across the visible half, each of one shade

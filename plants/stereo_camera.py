@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.geometry import looking_at, quaternion_of
-from cosim.pinhole import Pinhole
-from cosim.ports import (
+from handover.cosim.geometry import looking_at, quaternion_of
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import (
     Picture1280x720,
     Polyline25,
     Vector3,
@@ -20,13 +20,13 @@ from cosim.ports import (
     parameter,
     port,
 )
-from cosim.units import Levels, Metre, Number, Pixel, Second
-from plants.backdrop import Backdrop
-from plants.canvas import Canvas
-from plants.handover_scene import HandoverScene
-from plants.marker_collar import MarkerCollar
-from plants.sensor_noise import SensorNoise
-from plants.sketch import Pixels
+from handover.cosim.units import Levels, Metre, Number, Pixel, Second
+from handover.plants.backdrop import Backdrop
+from handover.plants.canvas import Canvas
+from handover.plants.handover_scene import HandoverScene
+from handover.plants.marker_collar import MarkerCollar
+from handover.plants.sensor_noise import SensorNoise
+from handover.plants.sketch import Pixels
 
 _WIDTH, _HEIGHT = 1280, 720
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])

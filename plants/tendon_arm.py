@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
-from cosim.units import Metre, Newton, Number
-from plants.tendon_chain import TendonChain
-from plants.tendon_design import TendonDesign
-from plants.tendon_parameters import Params
+from handover.cosim.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
+from handover.cosim.units import Metre, Newton, Number
+from handover.plants.tendon_chain import TendonChain
+from handover.plants.tendon_design import TendonDesign
+from handover.plants.tendon_parameters import Params
 
 _R_WB = np.diag([1.0, -1.0, -1.0])
 _POINTS = 25

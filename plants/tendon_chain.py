@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from plants.exudyn_edge import ExudynEdge
-from plants.tendon_design import TendonDesign
-from plants.tendon_tangent import TendonTangent
+from handover.cosim.ports import Floats
+from handover.plants.exudyn_edge import ExudynEdge
+from handover.plants.tendon_design import TendonDesign
+from handover.plants.tendon_tangent import TendonTangent
 
 _DOWN = np.array([0.0, 0.0, 1.0])
 

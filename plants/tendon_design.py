@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from plants.tendon_parameters import Params, UnusableArm
+from handover.cosim.ports import Floats
+from handover.plants.tendon_parameters import Params, UnusableArm
 
 _MOTOR_MASS = 1e3  # kg: a servo that a tendon's pull hardly moves (5 N: 8 um)
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Vector3, parameter
-from cosim.refusal import Refusal
-from cosim.start_values import parameter_faults
-from cosim.units import (
+from handover.cosim.ports import Vector3, parameter
+from handover.cosim.refusal import Refusal
+from handover.cosim.start_values import parameter_faults
+from handover.cosim.units import (
     Hertz,
     Kilogram,
     Metre,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from plants.tendon_design import TendonDesign
+from handover.cosim.ports import Floats
+from handover.plants.tendon_design import TendonDesign
 
 _I = np.eye(3)
 

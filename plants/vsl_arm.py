@@ -9,15 +9,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.ports import Floats, Polyline25, Vector2, Vector3, output, port
-from cosim.refusal import Refusal
-from cosim.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
-from plants.vsl_chain import Complexes, VslChain
-from plants.vsl_dynamics import NoConvergence, VslDynamics
-from plants.vsl_parameters import HIGHEST_PRESSURE, TURN, Link, Motion, Params, UnusableVslArm
-from plants.vsl_pressure import PressureLine
-from plants.vsl_servo import VslServo
-from plants.vsl_statics import NoEquilibrium, VslStatics
+from handover.cosim.ports import Floats, Polyline25, Vector2, Vector3, output, port
+from handover.cosim.refusal import Refusal
+from handover.cosim.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
+from handover.plants.vsl_chain import Complexes, VslChain
+from handover.plants.vsl_dynamics import NoConvergence, VslDynamics
+from handover.plants.vsl_parameters import HIGHEST_PRESSURE, TURN, Link, Motion, Params, UnusableVslArm
+from handover.plants.vsl_pressure import PressureLine
+from handover.plants.vsl_servo import VslServo
+from handover.plants.vsl_statics import NoEquilibrium, VslStatics
 
 __all__ = ["Inputs", "Link", "Motion", "Outputs", "Params", "UnusableInput", "UnusableVslArm", "VslArm"]
 

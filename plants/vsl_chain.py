@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Floats
-from plants.vsl_parameters import Link, Params
+from handover.cosim.ports import Floats
+from handover.plants.vsl_parameters import Link, Params
 
 Complexes = NDArray[np.complex128]
 

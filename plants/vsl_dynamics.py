@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosim.ports import Floats
-from plants.vsl_chain import Complexes, Pose, VslChain
-from plants.vsl_parameters import Params
-from plants.vsl_statics import VslStatics
+from handover.cosim.ports import Floats
+from handover.plants.vsl_chain import Complexes, Pose, VslChain
+from handover.plants.vsl_parameters import Params
+from handover.plants.vsl_statics import VslStatics
 
 _TOLERANCE = 1e-10
 _ITERATIONS = 8

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plants.vsl_chain import Pose, VslChain
+from handover.plants.vsl_chain import Pose, VslChain
 
 _TOLERANCE = 1e-12
 _ITERATIONS = 12

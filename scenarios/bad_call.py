@@ -5,13 +5,13 @@ from contextlib import contextmanager
 
 import click
 
-from cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
-from fmus.binaries import NotCompiled
-from fmus.compile import CompilationError, UnknownPlatform
-from scenarios.campaign.bad_crew import BadCrew, CrewLost
-from scenarios.exit_status import BAD_CALL, UNIT_FAILED
-from scenarios.parameters import BadParameter
-from scenarios.run_folder import BadRunFolder
+from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
+from handover.fmus.binaries import NotCompiled
+from handover.fmus.compile import CompilationError, UnknownPlatform
+from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
+from handover.scenarios.exit_status import BAD_CALL, UNIT_FAILED
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.run_folder import BadRunFolder
 
 
 class BadCall(click.ClickException):

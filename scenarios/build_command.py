@@ -6,18 +6,18 @@ from pathlib import Path
 
 import click
 
-from cosim.exceptions import nearest
-from fmus.binaries import NotCompiled
-from fmus.build import UnusableName, UnusableStep, build
-from fmus.catalog import UNITS, Entry
-from fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
-from fmus.fmi2_description import NoFmi2Form
-from fmus.layout import DuplicateName
-from fmus.model_description import AmbiguousName, UnusableText
-from scenarios.bad_call import BadCall, told_in_one_line
-from scenarios.interruption import Interruption
-from scenarios.own_unit import own_unit
-from scenarios.run_folder import BadRunFolder, check_place
+from handover.cosim.exceptions import nearest
+from handover.fmus.binaries import NotCompiled
+from handover.fmus.build import UnusableName, UnusableStep, build
+from handover.fmus.catalog import UNITS, Entry
+from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
+from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.layout import DuplicateName
+from handover.fmus.model_description import AmbiguousName, UnusableText
+from handover.scenarios.bad_call import BadCall, told_in_one_line
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.own_unit import own_unit
+from handover.scenarios.run_folder import BadRunFolder, check_place
 
 _HELP = """Build UNITs (all by default) as FMUs for other tools. A unit of your own is named MODULE:CLASS, such as
 spring:Spring for the class Spring in spring.py; modules are looked for in the working directory first.

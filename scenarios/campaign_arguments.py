@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from scenarios.headed_options import HeadedOption
+from handover.scenarios.headed_options import HeadedOption
 
 _worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
 

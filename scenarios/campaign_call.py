@@ -10,22 +10,22 @@ from typing import NoReturn
 
 import click
 
-from cosim.exceptions import RecordNotWritten
-from scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
-from scenarios.campaign.bad_crew import CrewLost
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_interruption import CampaignInterruption
-from scenarios.campaign.campaign_place import place_of
-from scenarios.campaign.campaign_progress import CampaignProgress, told_done
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.crew import Crew
-from scenarios.campaign.late_crew import LateCrew
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import PreparedPlan, prepared
-from scenarios.campaign.tally import Tally
-from scenarios.campaign.workforce import Workforce
-from scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
+from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
+from handover.scenarios.campaign.bad_crew import CrewLost
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
+from handover.scenarios.campaign.campaign_place import place_of
+from handover.scenarios.campaign.campaign_progress import CampaignProgress, told_done
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.late_crew import LateCrew
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import PreparedPlan, prepared
+from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.campaign.workforce import Workforce
+from handover.scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
 
 Finish = Callable[[CampaignFolder, CampaignTable], None]
 """Writes what is made of a campaign that has come to its end."""

@@ -4,16 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scenarios.experiment import Experiment
-from scenarios.free_flyer.collaborative import Collaborative
-from scenarios.free_flyer.failed_reception import FailedReception
-from scenarios.free_flyer.flyer_impedance import FlyerImpedance
-from scenarios.free_flyer.human_to_robot import HumanToRobot
-from scenarios.free_flyer.robot_to_human import RobotToHuman
-from scenarios.helix_handover.helix_handover import HelixHandover
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.vsl.vsl_hybrid import VslHybrid
-from scenarios.vsl.vsl_model_based import VslModelBased
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.free_flyer.collaborative import Collaborative
+from handover.scenarios.free_flyer.failed_reception import FailedReception
+from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
+from handover.scenarios.free_flyer.human_to_robot import HumanToRobot
+from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
+from handover.scenarios.helix_handover.helix_handover import HelixHandover
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.vsl.vsl_hybrid import VslHybrid
+from handover.scenarios.vsl.vsl_model_based import VslModelBased
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from cosim.check.check_fmu import check_fmu
-from cosim.check.check_report import CheckReport, Section
-from cosim.check.finding import Finding, Level
-from cosim.fmu_archive import NO_FILE_FAULT, folder_fault
-from scenarios.bad_call import BadCall
-from scenarios.console import open_console
+from handover.cosim.check.check_fmu import check_fmu
+from handover.cosim.check.check_report import CheckReport, Section
+from handover.cosim.check.finding import Finding, Level
+from handover.cosim.fmu_archive import NO_FILE_FAULT, folder_fault
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.console import open_console
 
 _FAULTS = 1
 _MOST_FINDINGS = 20  # of one level in one section

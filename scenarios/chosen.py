@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import nearest
-from fmus.catalog import UNITS
-from scenarios.bad_call import BadCall
-from scenarios.catalog import SCENARIOS
-from scenarios.experiment import Experiment
+from handover.cosim.exceptions import nearest
+from handover.fmus.catalog import UNITS
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment import Experiment
 
 
 def scenario_named(name: str) -> type[Experiment[Any]]:

@@ -2,20 +2,20 @@
 
 import click
 
-from cosim.exceptions import nearest
-from fmus.catalog import UNITS
-from scenarios.bad_call import BadCall
-from scenarios.build_command import build_command
-from scenarios.catalog import SCENARIOS
-from scenarios.check_command import check
-from scenarios.export_command import export_command
-from scenarios.listing import print_catalog, print_scenario, print_unit
-from scenarios.paper_command import paper
-from scenarios.report_command import report
-from scenarios.resume_command import resume
-from scenarios.run_command import run
-from scenarios.sweep_command import sweep
-from scenarios.vsl_train_command import vsl_train
+from handover.cosim.exceptions import nearest
+from handover.fmus.catalog import UNITS
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.build_command import build_command
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.check_command import check
+from handover.scenarios.export_command import export_command
+from handover.scenarios.listing import print_catalog, print_scenario, print_unit
+from handover.scenarios.paper_command import paper
+from handover.scenarios.report_command import report
+from handover.scenarios.resume_command import resume
+from handover.scenarios.run_command import run
+from handover.scenarios.sweep_command import sweep
+from handover.scenarios.vsl_train_command import vsl_train
 
 _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
 

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.linear import Linear
-from cosim.system import System
+from handover.cosim.linear import Linear
+from handover.cosim.system import System
 
 
 def conversions_of(system: System) -> list[dict[str, Any]]:

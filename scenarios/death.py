@@ -5,16 +5,16 @@ import signal
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import UnitFailure
-from cosim.failures import UnitCrashed, UnitHung
-from cosim.heartbeat import Call, Heartbeat
-from cosim.record.complete_record import complete_record
-from scenarios.ended import Ended
-from scenarios.experiment import Outcome
-from scenarios.forked_child import ChildEnd
-from scenarios.record import Record
-from scenarios.run_folder import RunFolder, told_if_not_written
-from scenarios.run_summary import unit_data
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.failures import UnitCrashed, UnitHung
+from handover.cosim.heartbeat import Call, Heartbeat
+from handover.cosim.record.complete_record import complete_record
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Outcome
+from handover.scenarios.forked_child import ChildEnd
+from handover.scenarios.record import Record
+from handover.scenarios.run_folder import RunFolder, told_if_not_written
+from handover.scenarios.run_summary import unit_data
 
 
 class Death:

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.exceptions import UnitFailure
-from scenarios.experiment import Outcome
+from handover.cosim.exceptions import UnitFailure
+from handover.scenarios.experiment import Outcome
 
 
 @dataclass(frozen=True, kw_only=True)

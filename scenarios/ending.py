@@ -5,10 +5,10 @@ from typing import NoReturn
 
 import click
 
-from scenarios.ended import Ended
-from scenarios.exit_status import TASK_FAILED, UNIT_FAILED
-from scenarios.listing import print_summary
-from scenarios.task import Task
+from handover.scenarios.ended import Ended
+from handover.scenarios.exit_status import TASK_FAILED, UNIT_FAILED
+from handover.scenarios.listing import print_summary
+from handover.scenarios.task import Task
 
 
 def end_with(ended: Ended, task: Task) -> NoReturn:

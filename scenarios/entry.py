@@ -3,8 +3,8 @@
 import sys
 from typing import NoReturn
 
-from scenarios.exit_status import ABORTED
-from scenarios.standard_streams import open_standard_streams
+from handover.scenarios.exit_status import ABORTED
+from handover.scenarios.standard_streams import open_standard_streams
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may end the process that they are in."""
@@ -15,7 +15,7 @@ def main() -> None:
     open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
-            from scenarios.supervisor import can_supervise, run_to_end, supervise
+            from handover.scenarios.supervisor import can_supervise, run_to_end, supervise
 
             (supervise if can_supervise() else run_to_end)(_command)
         _command()
@@ -25,7 +25,7 @@ def main() -> None:
 
 def _command() -> None:
     try:
-        from scenarios.command import main as command
+        from handover.scenarios.command import main as command
     except KeyboardInterrupt:
         _abort()
     command()

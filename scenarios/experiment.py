@@ -7,15 +7,15 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from cosim.declared_fields import declared_variables
-from cosim.signals import Signals
-from cosim.system import System
-from cosim.variable import Causality, Variable
-from scenarios.record import Record
-from scenarios.reporting.camera_picture import CameraPicture
-from scenarios.reporting.published_value import PublishedValue
-from scenarios.reporting.replay import Replay
-from scenarios.reporting.time_plot import TimePlot
+from handover.cosim.declared_fields import declared_variables
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
+from handover.cosim.variable import Causality, Variable
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.camera_picture import CameraPicture
+from handover.scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.reporting.replay import Replay
+from handover.scenarios.reporting.time_plot import TimePlot
 
 FmuOf = Callable[[str], Path]
 """Gives a unit's FMU by the unit's name in the system."""

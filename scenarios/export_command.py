@@ -5,15 +5,15 @@ from pathlib import Path
 
 import click
 
-from cosim.ssp.writing import write_ssp
-from fmus.build import cached
-from fmus.fmi2_description import NoFmi2Form
-from scenarios.bad_call import BadCall, told_in_one_line
-from scenarios.chosen import fmus_of, replacements, scenario_named
-from scenarios.interruption import Interruption
-from scenarios.parameters import parse_parameters
-from scenarios.run_folder import check_place
-from scenarios.scenario_arguments import scenario_options
+from handover.cosim.ssp.writing import write_ssp
+from handover.fmus.build import cached
+from handover.fmus.fmi2_description import NoFmi2Form
+from handover.scenarios.bad_call import BadCall, told_in_one_line
+from handover.scenarios.chosen import fmus_of, replacements, scenario_named
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.run_folder import check_place
+from handover.scenarios.scenario_arguments import scenario_options
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 

@@ -11,8 +11,8 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple, NoReturn
 
-from cosim.heartbeat import Heartbeat
-from cosim.stillness import Stillness
+from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.stillness import Stillness
 
 _LOOK = 0.25  # s
 _GRACE = 5.0

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
-from scenarios.exit_status import ABORTED
-from scenarios.supervisor import leave
+from handover.scenarios.exit_status import ABORTED
+from handover.scenarios.supervisor import leave
 
 _ENDING = [n for n in (signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
 """Signals that end a run after its step, as of a batch system or of a terminal that is closed."""

@@ -6,17 +6,17 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
-from cosim.checkpoint import BadCheckpoint
-from cosim.exceptions import RecordNotWritten, nearest, one_line
-from cosim.record.complete_record import complete_record
-from cosim.record.file_lock import FileLocked
-from fmus.build import cached
-from scenarios.catalog import SCENARIOS
-from scenarios.experiment import Experiment
-from scenarios.resumption import Resumption, unpack
-from scenarios.run_folder import BadRunFolder, RunFolder, is_full, sha256_of, version_differences, versions
-from scenarios.ssp_call import open_experiment
-from scenarios.task import Task
+from handover.cosim.checkpoint import BadCheckpoint
+from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
+from handover.cosim.record.complete_record import complete_record
+from handover.cosim.record.file_lock import FileLocked
+from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.resumption import Resumption, unpack
+from handover.scenarios.run_folder import BadRunFolder, RunFolder, is_full, sha256_of, version_differences, versions
+from handover.scenarios.ssp_call import open_experiment
+from handover.scenarios.task import Task
 
 
 def complete_signals(folder: RunFolder) -> int:

@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from scenarios.finite_range import FiniteRange
-from scenarios.headed_options import HeadedOption
+from handover.scenarios.finite_range import FiniteRange
+from handover.scenarios.headed_options import HeadedOption
 
 CALL_LIMIT = 60.0
 """Seconds of wall time that a unit may take for one call where nothing else is said."""

@@ -9,19 +9,19 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from cosim.block_description import describe
-from cosim.start_values import range_of
-from cosim.variable import Causality, Kind, Variable
-from fmus.build import import_block
-from fmus.catalog import UNITS, Entry
-from scenarios.catalog import SCENARIOS, SYSTEMS
-from scenarios.console import open_console
-from scenarios.conversions import told_conversion
-from scenarios.ended import Ended
-from scenarios.experiment import Experiment
-from scenarios.master_rows import pace_rows
-from scenarios.reporting.told_metric import told
-from scenarios.run_folder import RunFolder
+from handover.cosim.block_description import describe
+from handover.cosim.start_values import range_of
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.fmus.build import import_block
+from handover.fmus.catalog import UNITS, Entry
+from handover.scenarios.catalog import SCENARIOS, SYSTEMS
+from handover.scenarios.console import open_console
+from handover.scenarios.conversions import told_conversion
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.master_rows import pace_rows
+from handover.scenarios.reporting.told_metric import told
+from handover.scenarios.run_folder import RunFolder
 
 _MOST_CONVERSIONS = 8
 """Conversions of units that the end of a run tells on the terminal."""

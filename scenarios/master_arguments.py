@@ -7,12 +7,12 @@ from typing import Any
 
 import click
 
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.extrapolation import Extrapolation
-from scenarios.bad_call import BadCall
-from scenarios.headed_options import HeadedOption
-from scenarios.seconds import Seconds
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.headed_options import HeadedOption
+from handover.scenarios.seconds import Seconds
 
 _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()

@@ -4,13 +4,13 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
-from cosim.block_description import describe
-from cosim.declared_fields import DeclarationError
-from cosim.exceptions import one_line
-from fmus.build import import_block
-from fmus.catalog import Entry
-from fmus.sources import UnknownBlock, closure
-from scenarios.bad_call import BadCall
+from handover.cosim.block_description import describe
+from handover.cosim.declared_fields import DeclarationError
+from handover.cosim.exceptions import one_line
+from handover.fmus.build import import_block
+from handover.fmus.catalog import Entry
+from handover.fmus.sources import UnknownBlock, closure
+from handover.scenarios.bad_call import BadCall
 
 _STEP = Fraction(1, 100)  # s, of a block that is not sampled
 

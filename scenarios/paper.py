@@ -23,4 +23,6 @@ def paper_entry(scenario: str, group: str, name: str) -> dict[str, Any]:
 
 @functools.lru_cache
 def _read(scenario: str) -> dict[str, Any]:
-    return tomli.loads(resources.files(f"scenarios.{scenario}").joinpath("paper.toml").read_text(encoding="utf-8"))
+    return tomli.loads(
+        resources.files(f"handover.scenarios.{scenario}").joinpath("paper.toml").read_text(encoding="utf-8")
+    )

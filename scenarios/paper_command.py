@@ -12,19 +12,19 @@ import click
 from rich.table import Table
 from rich.text import Text
 
-from cosim.exceptions import nearest
-from scenarios.bad_call import BadCall
-from scenarios.campaign_arguments import campaign_options
-from scenarios.campaign_call import call_campaign, workforce_of
-from scenarios.console import open_console
-from scenarios.headed_options import HeadedCommand
-from scenarios.run_folder import BadRunFolder
+from handover.cosim.exceptions import nearest
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.campaign_arguments import campaign_options
+from handover.scenarios.campaign_call import call_campaign, workforce_of
+from handover.scenarios.console import open_console
+from handover.scenarios.headed_options import HeadedCommand
+from handover.scenarios.run_folder import BadRunFolder
 
 if TYPE_CHECKING:
-    from scenarios.campaign.campaign_folder import CampaignFolder
-    from scenarios.campaign.campaign_table import CampaignTable
-    from scenarios.published.paper_results import PaperResults
-    from scenarios.published.published_experiment import PublishedExperiment
+    from handover.scenarios.campaign.campaign_folder import CampaignFolder
+    from handover.scenarios.campaign.campaign_table import CampaignTable
+    from handover.scenarios.published.paper_results import PaperResults
+    from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _HELP = """Carry out a paper's EXPERIMENT, and put what comes out beside what was published.
 
@@ -62,7 +62,7 @@ def paper(
     scheduler: str | None,
 ) -> None:
     """Carry out a paper's EXPERIMENT."""
-    from scenarios.published.catalog import EXPERIMENTS  # its statistics take long to load
+    from handover.scenarios.published.catalog import EXPERIMENTS  # its statistics take long to load
 
     if experiment is None:
         _list(EXPERIMENTS.values())
@@ -75,7 +75,7 @@ def paper(
     finish = _Finish(carried_out, report=not no_report)
     call = call_campaign(replace(plan, experiment=experiment), out, workforce_of(workers, scheduler), finish)
 
-    from scenarios.published.told_results import print_results
+    from handover.scenarios.published.told_results import print_results
 
     print_results(carried_out, finish.results, call.folder)
     sys.exit(call.status)
@@ -90,9 +90,9 @@ class _Finish:
         self._experiment, self._report = experiment, report
 
     def __call__(self, folder: CampaignFolder, table: CampaignTable) -> None:
-        from scenarios.published.paper_results import PaperResults
-        from scenarios.published.results import draw_figures, write_claims
-        from scenarios.reporting.campaign_page import write_campaign_report
+        from handover.scenarios.published.paper_results import PaperResults
+        from handover.scenarios.published.results import draw_figures, write_claims
+        from handover.scenarios.reporting.campaign_page import write_campaign_report
 
         try:
             self.results = PaperResults.of(self._experiment, table)

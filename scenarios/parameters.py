@@ -5,10 +5,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from cosim.exceptions import nearest
-from cosim.start_values import fault_of, range_of
-from cosim.variable import Kind, Variable
-from scenarios.experiment import Experiment
+from handover.cosim.exceptions import nearest
+from handover.cosim.start_values import fault_of, range_of
+from handover.cosim.variable import Kind, Variable
+from handover.scenarios.experiment import Experiment
 
 
 class BadParameter(ValueError):

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest
 
 _SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.signals import Signals
-from scenarios.record import Record
+from handover.cosim.signals import Signals
+from handover.scenarios.record import Record
 
 
 class RecordedSignals(Signals):

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import click
 
-from scenarios.bad_call import told_in_one_line
-from scenarios.ending import end_with
-from scenarios.interruption import Interruption
-from scenarios.left_run import LeftRun
-from scenarios.limit_arguments import limit_options, limits
-from scenarios.progress import progress_bar
-from scenarios.run_folder import RunFolder
-from scenarios.runner import carry_out
+from handover.scenarios.bad_call import told_in_one_line
+from handover.scenarios.ending import end_with
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.left_run import LeftRun
+from handover.scenarios.limit_arguments import limit_options, limits
+from handover.scenarios.progress import progress_bar
+from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.runner import carry_out
 
 _HELP = """Go on with a run that was interrupted, killed, or that failed, from its last checkpoint.
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
-from cosim.exceptions import one_line
-from cosim.master_options import MasterOptions
-from scenarios.experiment import Watch
+from handover.cosim.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
+from handover.cosim.exceptions import one_line
+from handover.cosim.master_options import MasterOptions
+from handover.scenarios.experiment import Watch
 
 
 @dataclass(frozen=True)

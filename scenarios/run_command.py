@@ -11,26 +11,26 @@ from typing import Any
 
 import click
 
-from cosim.master_options import MasterOptions
-from cosim.record.record_formats import RECORD_FORMATS
-from fmus.build import cached
-from scenarios.bad_call import BadCall, told_in_one_line
-from scenarios.chosen import fmus_of, replacements, scenario_named
-from scenarios.ending import end_with
-from scenarios.experiment import Experiment
-from scenarios.headed_options import HeadedCommand, HeadedOption
-from scenarios.interruption import Interruption
-from scenarios.limit_arguments import limit_options, limits
-from scenarios.master_arguments import coupling_of, master_options
-from scenarios.parameters import parse_parameters
-from scenarios.progress import progress_bar
-from scenarios.run_folder import RunFolder
-from scenarios.runner import carry_out
-from scenarios.scenario_arguments import scenario_options
-from scenarios.seconds import Seconds
-from scenarios.ssp_call import open_experiment, refuse_for_ssp, source_of, ssp_options
-from scenarios.ssp_run import NoParameters, is_ssp
-from scenarios.task import Task
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.record.record_formats import RECORD_FORMATS
+from handover.fmus.build import cached
+from handover.scenarios.bad_call import BadCall, told_in_one_line
+from handover.scenarios.chosen import fmus_of, replacements, scenario_named
+from handover.scenarios.ending import end_with
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.headed_options import HeadedCommand, HeadedOption
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.limit_arguments import limit_options, limits
+from handover.scenarios.master_arguments import coupling_of, master_options
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.progress import progress_bar
+from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.runner import carry_out
+from handover.scenarios.scenario_arguments import scenario_options
+from handover.scenarios.seconds import Seconds
+from handover.scenarios.ssp_call import open_experiment, refuse_for_ssp, source_of, ssp_options
+from handover.scenarios.ssp_run import NoParameters, is_ssp
+from handover.scenarios.task import Task
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 

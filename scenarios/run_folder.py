@@ -12,8 +12,8 @@ from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from cosim.exceptions import RecordNotWritten, one_line
-from cosim.record.file_lock import FileLocked, folder_locked, holder_of
+from handover.cosim.exceptions import RecordNotWritten, one_line
+from handover.cosim.record.file_lock import FileLocked, folder_locked, holder_of
 
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 

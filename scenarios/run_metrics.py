@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.iterating.iteration_count import IterationCount
-from cosim.master import Master
-from scenarios.experiment import Experiment, Metric
+from handover.cosim.iterating.iteration_count import IterationCount
+from handover.cosim.master import Master
+from handover.scenarios.experiment import Experiment, Metric
 
 
 def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from cosim.exceptions import UnitFailure
-from cosim.master import Master
-from scenarios.conversions import conversions_of
-from scenarios.experiment import Metric, Outcome
-from scenarios.resumption import Spent
-from scenarios.shown_unit import unit_symbol
-from scenarios.task import Task
-from scenarios.told_system import told_system
-from scenarios.told_value import told_value
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.master import Master
+from handover.scenarios.conversions import conversions_of
+from handover.scenarios.experiment import Metric, Outcome
+from handover.scenarios.resumption import Spent
+from handover.scenarios.shown_unit import unit_symbol
+from handover.scenarios.task import Task
+from handover.scenarios.told_system import told_system
+from handover.scenarios.told_value import told_value
 
 UnitRow = tuple[str, str, str, int | None, float | None]
 """Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""

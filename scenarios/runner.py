@@ -3,26 +3,26 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from cosim.checkpoint import check_states, remove_checkpoint
-from cosim.checkpointer import Checkpointer
-from cosim.exceptions import UnitFailure
-from cosim.failures import UnitHung
-from cosim.from_then_on import FromThenOn
-from cosim.master import Master
-from cosim.observer import Observer
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
-from scenarios.ended import Ended
-from scenarios.experiment import Outcome, Watch
-from scenarios.interruption import Interruption
-from scenarios.record import Record
-from scenarios.reporting.kept_pictures import write_pictures
-from scenarios.resumption import Resumption, Spent, pack
-from scenarios.run_folder import told_if_not_written
-from scenarios.run_metrics import run_metrics
-from scenarios.run_summary import configuration, files_and_forms, presentation, summary_of, unit_rows
-from scenarios.supervisor import heartbeat_of_run
-from scenarios.task import Task
+from handover.cosim.checkpoint import check_states, remove_checkpoint
+from handover.cosim.checkpointer import Checkpointer
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.failures import UnitHung
+from handover.cosim.from_then_on import FromThenOn
+from handover.cosim.master import Master
+from handover.cosim.observer import Observer
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Outcome, Watch
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.kept_pictures import write_pictures
+from handover.scenarios.resumption import Resumption, Spent, pack
+from handover.scenarios.run_folder import told_if_not_written
+from handover.scenarios.run_metrics import run_metrics
+from handover.scenarios.run_summary import configuration, files_and_forms, presentation, summary_of, unit_rows
+from handover.scenarios.supervisor import heartbeat_of_run
+from handover.scenarios.task import Task
 
 Progress = Callable[[float, float], None]
 """Told the simulated time and the time at which the run ends at the latest, in seconds."""
@@ -158,7 +158,7 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
 
 
 def _present(task: Task, watch: Watch) -> None:
-    from scenarios.reporting.run_page import write_run_page  # its plots take long to load
+    from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
 
     record = Record(task.folder.signals) if task.folder.signals.exists() else None
     if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time

@@ -9,14 +9,14 @@ from typing import Any
 
 import click
 
-from cosim.ssp.ssp_file import SspFile
-from scenarios import supervisor
-from scenarios.bad_call import BadCall
-from scenarios.experiment import Experiment
-from scenarios.headed_options import HeadedOption
-from scenarios.run_folder import sha256_of
-from scenarios.seconds import Seconds
-from scenarios.ssp_run import UntilStop, experiment_of
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.scenarios import supervisor
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.headed_options import HeadedOption
+from handover.scenarios.run_folder import sha256_of
+from handover.scenarios.seconds import Seconds
+from handover.scenarios.ssp_run import UntilStop, experiment_of
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
 _STOP = _option(

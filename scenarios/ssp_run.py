@@ -7,12 +7,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
-from cosim.signals import Signals
-from cosim.ssp.ssp_file import SspFile
-from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
-from scenarios.plotting import COLOURS, figure
-from scenarios.record import Record
+from handover.cosim.signals import Signals
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.system import System
+from handover.scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
+from handover.scenarios.plotting import COLOURS, figure
+from handover.scenarios.record import Record
 
 _MOST_SIGNALS = 6
 """Signals in one figure."""

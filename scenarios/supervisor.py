@@ -12,8 +12,8 @@ import time
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from cosim.heartbeat import Heartbeat
-from scenarios.forked_child import ChildEnd, ForkedChild
+from handover.cosim.heartbeat import Heartbeat
+from handover.scenarios.forked_child import ChildEnd, ForkedChild
 
 ORDERS = (
     () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
@@ -125,7 +125,7 @@ def _end_as(end: ChildEnd, wall: float) -> NoReturn:
         os.kill(os.getpid(), end.signal)
     if heartbeat.status is not None:
         sys.exit(heartbeat.status if end.signal is not None else end.status)
-    from scenarios.tell_death import tell_death  # what it loads is loaded by no other run
+    from handover.scenarios.tell_death import tell_death  # what it loads is loaded by no other run
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(tell_death(heartbeat, end, wall))

@@ -6,9 +6,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from cosim.master_options import MasterOptions
-from scenarios.experiment import Experiment
-from scenarios.run_folder import RunFolder
+from handover.cosim.master_options import MasterOptions
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.run_folder import RunFolder
 
 
 @dataclass(frozen=True, kw_only=True)

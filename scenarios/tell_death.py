@@ -2,14 +2,14 @@
 
 import sys
 
-from cosim.exceptions import RecordNotWritten
-from cosim.heartbeat import Heartbeat
-from scenarios.death import Death
-from scenarios.exit_status import UNIT_FAILED
-from scenarios.forked_child import ChildEnd
-from scenarios.listing import print_summary
-from scenarios.reporting.run_page import write_run_page
-from scenarios.run_folder import told_if_not_written
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.heartbeat import Heartbeat
+from handover.scenarios.death import Death
+from handover.scenarios.exit_status import UNIT_FAILED
+from handover.scenarios.forked_child import ChildEnd
+from handover.scenarios.listing import print_summary
+from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.run_folder import told_if_not_written
 
 _BY_SIGNAL = 128  # what shells add to a signal's number
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import click
 
-from controllers.hybrid_kinematics import Params
-from controllers.vsl_kinematics import Elbow, VslKinematics
-from cosim.exceptions import CosimError, UnitFailure
-from fmus.binaries import NotCompiled
-from fmus.build import cached
-from fmus.compile import CompilationError, UnknownPlatform
-from scenarios.bad_call import BadCall
-from scenarios.interruption import Interruption
-from scenarios.progress import progress_bar
-from scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
+from handover.controllers.hybrid_kinematics import Params
+from handover.controllers.vsl_kinematics import Elbow, VslKinematics
+from handover.cosim.exceptions import CosimError, UnitFailure
+from handover.fmus.binaries import NotCompiled
+from handover.fmus.build import cached
+from handover.fmus.compile import CompilationError, UnknownPlatform
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.progress import progress_bar
+from handover.scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
 
 _PATH = click.Path(path_type=Path)
 

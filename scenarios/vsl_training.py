@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.vsl_fit import Fit, fit_cubic
-from controllers.vsl_kinematics import Elbow, VslKinematics
-from controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, turned
-from controllers.vsl_model_text import model_text
-from cosim.fmu_description import FmuPort
-from cosim.ports import Floats
-from cosim.variable import Kind
-from scenarios.vsl_training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
+from handover.controllers.vsl_fit import Fit, fit_cubic
+from handover.controllers.vsl_kinematics import Elbow, VslKinematics
+from handover.controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, turned
+from handover.controllers.vsl_model_text import model_text
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.ports import Floats
+from handover.cosim.variable import Kind
+from handover.scenarios.vsl_training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
 
 SPLIT = (0.70, 0.15, 0.15)
 """Shares of training, validation and test points. [Gandarias2020] sec. IV-B"""
@@ -186,7 +186,7 @@ def content_key(fmu: Path) -> str:
     """
     digest = hashlib.sha256()
     with zipfile.ZipFile(fmu) as archive:
-        names = [n for n in archive.namelist() if n.startswith("resources/sources/plants/")]
+        names = [n for n in archive.namelist() if n.startswith("resources/sources/handover/plants/")]
         for name in sorted(names):
             content = archive.read(name)
             digest.update(f"{name}\0{len(content)}\0".encode() + content)

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from fmus import interpreter
-from fmus.build import cached
-from fmus.catalog import UNITS
-from fmus.compile import TARGETS
-from fmus.fmi2_description import NoFmi2Form
-from scenarios.catalog import SYSTEMS
+from handover.fmus import interpreter
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
+from handover.fmus.compile import TARGETS
+from handover.fmus.fmi2_description import NoFmi2Form
+from handover.scenarios.catalog import SYSTEMS
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -29,7 +29,7 @@ OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
 def handover(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     arguments = shlex.split(command)[1:]
-    call = [sys.executable, "-c", "from scenarios.command import main; main()", *arguments]
+    call = [sys.executable, "-c", "from handover.scenarios.command import main; main()", *arguments]
     return subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
 
 

@@ -5,19 +5,26 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from cosim.check.binary_checks import binary_findings, platforms_in
-from cosim.check.check_report import CheckReport, Section
-from cosim.check.described_variable import variables_of
-from cosim.check.finding import Finding, Level, fault, warning
-from cosim.check.interface_checks import default_start, default_step, interface_findings, says
-from cosim.check.standard_checks import standard_findings
-from cosim.check.structure_checks import structure_findings
-from cosim.check.variable_checks import variable_findings
-from cosim.check.watched_process import watch
-from cosim.exceptions import InvalidFmu
-from cosim.fmpy_edge import checked_xml, library_path, platform_folder, read_description, required_functions, version_of
-from cosim.fmu_archive import FmuArchive
-from cosim.fmu_xml import XmlElement
+from handover.cosim.check.binary_checks import binary_findings, platforms_in
+from handover.cosim.check.check_report import CheckReport, Section
+from handover.cosim.check.described_variable import variables_of
+from handover.cosim.check.finding import Finding, Level, fault, warning
+from handover.cosim.check.interface_checks import default_start, default_step, interface_findings, says
+from handover.cosim.check.standard_checks import standard_findings
+from handover.cosim.check.structure_checks import structure_findings
+from handover.cosim.check.variable_checks import variable_findings
+from handover.cosim.check.watched_process import watch
+from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmpy_edge import (
+    checked_xml,
+    library_path,
+    platform_folder,
+    read_description,
+    required_functions,
+    version_of,
+)
+from handover.cosim.fmu_archive import FmuArchive
+from handover.cosim.fmu_xml import XmlElement
 
 _STEP = 0.01  # seconds, where the FMU asks for none
 
@@ -111,7 +118,7 @@ class _Check:
         self.archive.unpack(self.folder)
         functions = required_functions(self.fmi)
         task = {"library": str(self.folder / library_path(self.fmi, self.identifier)), "functions": functions}
-        watched = watch("cosim.check.load_probe", task, self.scratch, self.timeout)
+        watched = watch("handover.cosim.check.load_probe", task, self.scratch, self.timeout)
         return f"{len(functions)} functions on {platform_folder(self.fmi)}", watched.findings
 
     def _run(self) -> tuple[str, list[Finding]]:
@@ -130,7 +137,7 @@ class _Check:
             "step": step,
             **capabilities,
         }
-        watched = watch("cosim.check.run_probe", task, self.scratch, self.timeout)
+        watched = watch("handover.cosim.check.run_probe", task, self.scratch, self.timeout)
         parts = [f"{watched.facts['steps']} steps of {step:g} s"] if "steps" in watched.facts else []
         if "ended" in watched.facts:
             done = ("state restored", capabilities["keeps_state"]), ("second instance", capabilities["allows_two"])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.check.finding import Finding, Level
+from handover.cosim.check.finding import Finding, Level
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ import math
 import re
 from collections.abc import Iterator
 
-from cosim.check.finding import Finding, fault, note, warning
-from cosim.fmu_xml import XmlElement
+from handover.cosim.check.finding import Finding, fault, note, warning
+from handover.cosim.fmu_xml import XmlElement
 
 _KINDS = {
     "ModelExchange": "model exchange",

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cosim.check.finding import Finding
+from handover.cosim.check.finding import Finding
 
 _MOST_OF_A_MESSAGE = 2000
 

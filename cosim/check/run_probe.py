@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cosim.check.journal import Journal
-from cosim.check.smoke_run import SmokeRun
-from cosim.fmu_description import describe_fmu
+from handover.cosim.check.journal import Journal
+from handover.cosim.check.smoke_run import SmokeRun
+from handover.cosim.fmu_description import describe_fmu
 
 
 def main(task: Mapping[str, Any]) -> None:

@@ -4,9 +4,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from cosim.check.finding import Finding, fault
-from cosim.fmpy_edge import problems_of
-from cosim.fmu_archive import DESCRIPTION
+from handover.cosim.check.finding import Finding, fault
+from handover.cosim.fmpy_edge import problems_of
+from handover.cosim.fmu_archive import DESCRIPTION
 
 _SCHEMA = re.compile(
     r"^(?:Fatal )?(?:ERROR|Error|WARNING) \(line (\d+), column \d+\): (.*)$", re.DOTALL | re.IGNORECASE

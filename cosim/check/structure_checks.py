@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Iterator, Sequence
 
-from cosim.check.described_variable import DescribedVariable
-from cosim.check.finding import Finding, fault
-from cosim.fmu_xml import XmlElement
+from handover.cosim.check.described_variable import DescribedVariable
+from handover.cosim.check.finding import Finding, fault
+from handover.cosim.fmu_xml import XmlElement
 
 _FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
 

@@ -5,9 +5,9 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from cosim.check.described_variable import REALS, DescribedVariable
-from cosim.check.finding import Finding, fault, warning
-from cosim.fmu_xml import XmlElement
+from handover.cosim.check.described_variable import REALS, DescribedVariable
+from handover.cosim.check.finding import Finding, fault, warning
+from handover.cosim.fmu_xml import XmlElement
 
 _CLASSES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from cosim.events.fmu_clock import FmuClock
+from handover.cosim.events.fmu_clock import FmuClock
 
 Call = Callable[..., None]
 """Calls a function of the standard by its name without `fmi3`, and raises `UnitFailure` where it does not answer OK."""

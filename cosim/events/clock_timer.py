@@ -2,8 +2,8 @@
 
 from fractions import Fraction
 
-from cosim.events.clock_calls import ClockCalls, Qualifier
-from cosim.events.fmu_clock import FmuClock
+from handover.cosim.events.clock_calls import ClockCalls, Qualifier
+from handover.cosim.events.fmu_clock import FmuClock
 
 
 class ClockTimer:

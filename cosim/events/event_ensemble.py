@@ -6,16 +6,16 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from cosim.endings import Endings
-from cosim.ensemble import Ensemble
-from cosim.events.event_instance import EventInstance
-from cosim.events.step_end import StepEnd
-from cosim.exceptions import CosimError
-from cosim.heartbeat import Heartbeat
-from cosim.instance import Instance
-from cosim.schedule import Slot
-from cosim.state_calls import State
-from cosim.system import PlacedUnit, System
+from handover.cosim.endings import Endings
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.events.event_instance import EventInstance
+from handover.cosim.events.step_end import StepEnd
+from handover.cosim.exceptions import CosimError
+from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.instance import Instance
+from handover.cosim.schedule import Slot
+from handover.cosim.state_calls import State
+from handover.cosim.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from cosim.exceptions import UnitFailure
-from cosim.failures import UnitDiscarded
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.failures import UnitDiscarded
 
 
 class StepDiscarded(UnitDiscarded):

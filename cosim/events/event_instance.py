@@ -8,16 +8,16 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from cosim.events.clock_calls import ClockCalls
-from cosim.events.clock_timer import ClockTimer
-from cosim.exceptions import UnitFailure
-from cosim.failures import UnitEnded
-from cosim.fmpy_loading import load_fmi3
-from cosim.fmu_description import FmuDescription, FmuPort
-from cosim.heartbeat import Heartbeat
-from cosim.instance import Instance
-from cosim.signal_buffer import SignalBuffer, Views
-from cosim.signal_content import content_of
+from handover.cosim.events.clock_calls import ClockCalls
+from handover.cosim.events.clock_timer import ClockTimer
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.failures import UnitEnded
+from handover.cosim.fmpy_loading import load_fmi3
+from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.instance import Instance
+from handover.cosim.signal_buffer import SignalBuffer, Views
+from handover.cosim.signal_content import content_of
 
 
 class EventInstance(Instance):

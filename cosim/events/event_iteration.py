@@ -3,10 +3,10 @@
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 
-from cosim.events.event_ensemble import EventEnsemble
-from cosim.events.event_failures import UnsettledEvents
-from cosim.events.event_instance import EventInstance
-from cosim.exceptions import UnitFailure
+from handover.cosim.events.event_ensemble import EventEnsemble
+from handover.cosim.events.event_failures import UnsettledEvents
+from handover.cosim.events.event_instance import EventInstance
+from handover.cosim.exceptions import UnitFailure
 
 MOST_ITERATIONS = 100
 """Most iterations at one instant, and most rounds of values within one."""

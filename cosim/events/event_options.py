@@ -1,9 +1,9 @@
 """What does not go together with steps that may end anywhere."""
 
-from cosim.exceptions import ScheduleError
-from cosim.master_options import MasterOptions
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.system import System
+from handover.cosim.exceptions import ScheduleError
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.system import System
 
 
 def has_events(system: System, options: MasterOptions) -> bool:

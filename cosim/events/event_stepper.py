@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from cosim.events.event_ensemble import EventEnsemble
-from cosim.events.event_failures import UnsettledEvents
-from cosim.events.event_iteration import MOST_ITERATIONS, EventIteration
-from cosim.schedule import Schedule, Slot
-from cosim.stepping.coupling import Coupling
+from handover.cosim.events.event_ensemble import EventEnsemble
+from handover.cosim.events.event_failures import UnsettledEvents
+from handover.cosim.events.event_iteration import MOST_ITERATIONS, EventIteration
+from handover.cosim.schedule import Schedule, Slot
+from handover.cosim.stepping.coupling import Coupling
 
 
 @dataclass

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.fmu_xml import XmlElement
+from handover.cosim.fmu_xml import XmlElement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -12,7 +12,8 @@ class FmuClock:
     """A clock of an FMU.
 
     `variability` is the standard's `intervalVariability`. A time-based clock ticks whenever `interval` seconds have
-    passed, first at `shift`; where `interval` is None the unit is asked for it, see `cosim.events.clock_timer`.
+    passed, first at `shift`; where `interval` is None the unit is asked for it, see
+    `handover.cosim.events.clock_timer`.
     """
 
     name: str

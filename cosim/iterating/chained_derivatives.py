@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.ensemble import Ensemble
-from cosim.group import Group
-from cosim.iterating.interface import Interface
-from cosim.iterating.magnitudes import Floats
-from cosim.system import Connection
-from cosim.variable import Kind
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.group import Group
+from handover.cosim.iterating.interface import Interface
+from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.system import Connection
+from handover.cosim.variable import Kind
 
 
 class ChainedDerivatives:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
-from cosim.iterating.magnitudes import Floats, Magnitudes
+from handover.cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
+from handover.cosim.iterating.magnitudes import Floats, Magnitudes
 
 
 class FixedPoint:

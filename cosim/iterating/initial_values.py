@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from cosim.ensemble import Ensemble
-from cosim.group import Group
-from cosim.iterating.chained_derivatives import ChainedDerivatives
-from cosim.iterating.group_stepping import MakeSolver
-from cosim.iterating.interface import Interface
-from cosim.iterating.interface_solver import Unsolved
-from cosim.iterating.magnitudes import Floats
-from cosim.iterating.not_converged import not_converged
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.group import Group
+from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
+from handover.cosim.iterating.group_stepping import MakeSolver
+from handover.cosim.iterating.interface import Interface
+from handover.cosim.iterating.interface_solver import Unsolved
+from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.iterating.not_converged import not_converged
 
 
 class InitialValues:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.ensemble import Ensemble
-from cosim.iterating.magnitudes import Floats, Magnitudes
-from cosim.system import Connection
-from cosim.variable import Kind
-from cosim.width import Width
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.iterating.magnitudes import Floats, Magnitudes
+from handover.cosim.system import Connection
+from handover.cosim.variable import Kind
+from handover.cosim.width import Width
 
 _SMALL = 1e-3
 """The least magnitude of a signal of which neither its nominal one nor any other value is known."""

@@ -3,14 +3,14 @@
 import time
 from collections.abc import Sequence
 
-from cosim.ensemble import Ensemble
-from cosim.iterating.interface import Interface
-from cosim.iterating.interface_solver import InterfaceSolver, Unsolved
-from cosim.iterating.iteration_count import IterationCount
-from cosim.iterating.magnitudes import Floats
-from cosim.iterating.not_converged import not_converged
-from cosim.schedule import Slot
-from cosim.state_calls import State
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.iterating.interface import Interface
+from handover.cosim.iterating.interface_solver import InterfaceSolver, Unsolved
+from handover.cosim.iterating.iteration_count import IterationCount
+from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.iterating.not_converged import not_converged
+from handover.cosim.schedule import Slot
+from handover.cosim.state_calls import State
 
 
 class IteratedStep:

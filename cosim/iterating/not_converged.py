@@ -5,10 +5,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cosim.exceptions import UnitFailure
-from cosim.iterating.interface import Interface
-from cosim.iterating.interface_solver import Unsolved
-from cosim.iterating.magnitudes import Magnitudes
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.iterating.interface import Interface
+from handover.cosim.iterating.interface_solver import Unsolved
+from handover.cosim.iterating.magnitudes import Magnitudes
 
 
 class NotConverged(UnitFailure):

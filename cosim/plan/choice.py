@@ -2,14 +2,14 @@
 
 import logging
 
-from cosim.ensemble import Ensemble
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.plan.memory import loop
-from cosim.plan.plan_maker import PlanMaker
-from cosim.plan.plan_stepper import PlanStepper
-from cosim.schedule import Schedule
-from cosim.stepping.coupling import Coupling
-from cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.plan.memory import loop
+from handover.cosim.plan.plan_maker import PlanMaker
+from handover.cosim.plan.plan_stepper import PlanStepper
+from handover.cosim.schedule import Schedule
+from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.extrapolation import Extrapolation
 
 _log = logging.getLogger(__name__)
 

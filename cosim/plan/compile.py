@@ -1,11 +1,13 @@
-"""Compiles the plan's loop, `cosim/plan/*.c`, for this machine; `python -m cosim.plan.compile` does it by hand.
+"""Compiles the plan's loop, `cosim/plan/*.c`, for this machine.
+
+`python -m handover.cosim.plan.compile` does it by hand.
 
 Used by `setup.py` while the package is built, where nothing but the standard library and ziglang is installed.
 """
 
 from pathlib import Path
 
-from cosim.native_libraries import TARGETS, NativeLibraries, has_compiler, host_platform, zig_cc
+from handover.cosim.native_libraries import TARGETS, NativeLibraries, has_compiler, host_platform, zig_cc
 
 FOLDER = Path(__file__).parent
 SOURCES = ("carry_out.c", "cpu_clock.c", "exact_time.c", "plan.c")

@@ -6,8 +6,8 @@ import logging
 import weakref
 from pathlib import Path
 
-from cosim.native_libraries import CompilationError
-from cosim.plan.compile import plan_library
+from handover.cosim.native_libraries import CompilationError
+from handover.cosim.plan.compile import plan_library
 
 _log = logging.getLogger(__name__)
 

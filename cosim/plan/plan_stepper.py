@@ -7,17 +7,17 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from cosim.ensemble import Ensemble
-from cosim.from_then_on import FromThenOn
-from cosim.heartbeat import Abandoned
-from cosim.observer import Observer
-from cosim.plan import memory
-from cosim.plan.plan_maker import PlanMaker
-from cosim.record.record_block import RecordBlock
-from cosim.record.recorder import Recorder
-from cosim.schedule import Schedule
-from cosim.signals import Signals
-from cosim.stepping.coupling import Coupling
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.from_then_on import FromThenOn
+from handover.cosim.heartbeat import Abandoned
+from handover.cosim.observer import Observer
+from handover.cosim.plan import memory
+from handover.cosim.plan.plan_maker import PlanMaker
+from handover.cosim.record.record_block import RecordBlock
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.schedule import Schedule
+from handover.cosim.signals import Signals
+from handover.cosim.stepping.coupling import Coupling
 
 _STRETCH = 0.05
 """Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""

@@ -7,10 +7,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from cosim.record.record_block import DamagedTail, RecordBlock
-from cosim.record.record_columns import RecordColumns
-from cosim.record.record_formats import RECORD_FORMATS
-from cosim.record.record_stream import RecordStream, stream_batches, stream_schema
+from handover.cosim.record.record_block import DamagedTail, RecordBlock
+from handover.cosim.record.record_columns import RecordColumns
+from handover.cosim.record.record_formats import RECORD_FORMATS
+from handover.cosim.record.record_stream import RecordStream, stream_batches, stream_schema
 
 Batches = Callable[[], Iterable["pa.RecordBatch"]]
 """Gives all rows of a record, each time from the first one on."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.record.file_lock import FileLocked, lock_file, unlock_file
+from handover.cosim.record.file_lock import FileLocked, lock_file, unlock_file
 
 _MAGIC = b"HANDOVER"
 _HEAD = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])

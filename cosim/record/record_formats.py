@@ -8,8 +8,8 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from cosim.record.record_columns import told_of
-from cosim.record.record_mat import write_mat
+from handover.cosim.record.record_columns import told_of
+from handover.cosim.record.record_mat import write_mat
 
 WriteRecord = Callable[[Path, "pa.Schema", Iterable["pa.RecordBatch"]], None]
 """Writes a file with these columns, whose first is `time`, and rows."""

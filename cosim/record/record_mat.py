@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from cosim.record.record_columns import told_of
+from handover.cosim.record.record_columns import told_of
 
 _DOUBLE, _INT32, _TEXT = 0, 20, 51  # type and kind of a matrix, little-endian
 _HEAD = struct.Struct("<5i")  # type, rows, columns, imaginary, bytes of the name

@@ -5,12 +5,12 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from cosim.exceptions import RecordNotWritten
-from cosim.record.complete_record import finish_record, rewind_stream, stream_of, tail_of
-from cosim.record.record_block import RecordBlock
-from cosim.record.record_columns import RecordColumns, record_columns
-from cosim.record.record_stream import RecordStream, stream_batches
-from cosim.signals import Signals
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.record.complete_record import finish_record, rewind_stream, stream_of, tail_of
+from handover.cosim.record.record_block import RecordBlock
+from handover.cosim.record.record_columns import RecordColumns, record_columns
+from handover.cosim.record.record_stream import RecordStream, stream_batches
+from handover.cosim.signals import Signals
 
 
 class Recorder:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import ClassVar
 from urllib.parse import unquote, urlsplit
 
-from cosim.exceptions import InvalidFmu, InvalidSsp, nearest
-from cosim.fmu_archive import FmuArchive
-from cosim.ssp.namespaces import STRUCTURE
+from handover.cosim.exceptions import InvalidFmu, InvalidSsp, nearest
+from handover.cosim.fmu_archive import FmuArchive
+from handover.cosim.ssp.namespaces import STRUCTURE
 
 
 class _Packed(FmuArchive):

@@ -4,16 +4,16 @@ import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from cosim.exceptions import nearest
-from cosim.fmu_description import FmuDescription
-from cosim.linear import Linear
-from cosim.ssp.changes import chained, converted
-from cosim.ssp.connected_ports import find_entry, ports_of, settable_names
-from cosim.ssp.connector_faults import GIVES, TAKES, connector_faults
-from cosim.ssp.given_values import Given
-from cosim.ssp.parameter_set import SspValue
-from cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
-from cosim.units import UNKNOWN, Unit
+from handover.cosim.exceptions import nearest
+from handover.cosim.fmu_description import FmuDescription
+from handover.cosim.linear import Linear
+from handover.cosim.ssp.changes import chained, converted
+from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names
+from handover.cosim.ssp.connector_faults import GIVES, TAKES, connector_faults
+from handover.cosim.ssp.given_values import Given
+from handover.cosim.ssp.parameter_set import SspValue
+from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
+from handover.cosim.units import UNKNOWN, Unit
 
 _log = logging.getLogger(__name__)
 

@@ -5,11 +5,11 @@ SSP 1.0 knows no arrays: `a.p[1]` feeds `b.p[1]`, `a.p[2]` feeds `b.p[2]`, and s
 
 from collections.abc import Mapping, Sequence
 
-from cosim.fmu_description import FmuDescription, FmuPort
-from cosim.linear import Linear
-from cosim.ssp.connected_ports import entry_names, find_entry
-from cosim.ssp.flattening import FlatConnection, Node
-from cosim.system import PortName
+from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.linear import Linear
+from handover.cosim.ssp.connected_ports import entry_names, find_entry
+from handover.cosim.ssp.flattening import FlatConnection, Node
+from handover.cosim.system import PortName
 
 Wire = tuple[PortName, PortName, Linear | None]
 

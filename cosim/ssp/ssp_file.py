@@ -6,15 +6,15 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
-from cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
-from cosim.fmu_description import FmuDescription, describe_fmu
-from cosim.ssp.archive import SspArchive
-from cosim.ssp.connected_ports import find_entry, taken_apart
-from cosim.ssp.flattening import FlatSystem, components_of, flatten
-from cosim.ssp.given_values import start_values
-from cosim.ssp.grouping import Grouping
-from cosim.ssp.structure_reading import read_structure
-from cosim.system import System
+from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
+from handover.cosim.fmu_description import FmuDescription, describe_fmu
+from handover.cosim.ssp.archive import SspArchive
+from handover.cosim.ssp.connected_ports import find_entry, taken_apart
+from handover.cosim.ssp.flattening import FlatSystem, components_of, flatten
+from handover.cosim.ssp.given_values import start_values
+from handover.cosim.ssp.grouping import Grouping
+from handover.cosim.ssp.structure_reading import read_structure
+from handover.cosim.system import System
 
 _MOST_DENOMINATOR = 10**6
 

@@ -4,10 +4,10 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
-from cosim.fmu_xml import XmlElement
-from cosim.ssp.archive import SspArchive
-from cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE, local, told
-from cosim.ssp.parameter_set import (
+from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.ssp.archive import SspArchive
+from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE, local, told
+from handover.cosim.ssp.parameter_set import (
     SspValue,
     mapped_values,
     read_linear,
@@ -16,8 +16,8 @@ from cosim.ssp.parameter_set import (
     read_units,
     unit_named,
 )
-from cosim.ssp.part import SspPart
-from cosim.ssp.structure import (
+from handover.cosim.ssp.part import SspPart
+from handover.cosim.ssp.structure import (
     SspComponent,
     SspConnection,
     SspConnector,
@@ -25,7 +25,7 @@ from cosim.ssp.structure import (
     SspNestedSystem,
     SspStructure,
 )
-from cosim.units import UNKNOWN, Unit
+from handover.cosim.units import UNKNOWN, Unit
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"

@@ -5,7 +5,7 @@ Elements have the standard's own prefixes in their names: libcosim knows element
 
 import xml.etree.ElementTree as ET
 
-from cosim.ssp.namespaces import NAMESPACES
+from handover.cosim.ssp.namespaces import NAMESPACES
 
 
 def root_element(name: str, version: str, called: str) -> ET.Element:

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.exceptions import BadOptions
+from handover.cosim.exceptions import BadOptions
 
 
 @dataclass(frozen=True, kw_only=True)

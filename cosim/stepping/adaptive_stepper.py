@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from cosim.ensemble import Ensemble
-from cosim.exceptions import ScheduleError, UnitFailure, nearest
-from cosim.failures import NotFinite, UnitDiscarded
-from cosim.iterating.not_converged import NotConverged
-from cosim.schedule import Schedule, Slot
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.coupling import Coupling
-from cosim.stepping.pi_controller import PiController
-from cosim.stepping.step_error import StepError, WorstSignal
-from cosim.stepping.step_statistics import StepStatistics
-from cosim.stepping.step_too_small import StepTooSmall
-from cosim.system import System
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.exceptions import ScheduleError, UnitFailure, nearest
+from handover.cosim.failures import NotFinite, UnitDiscarded
+from handover.cosim.iterating.not_converged import NotConverged
+from handover.cosim.schedule import Schedule, Slot
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.pi_controller import PiController
+from handover.cosim.stepping.step_error import StepError, WorstSignal
+from handover.cosim.stepping.step_statistics import StepStatistics
+from handover.cosim.stepping.step_too_small import StepTooSmall
+from handover.cosim.system import System
 
 _TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
 """What a shorter step may cure."""

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.ensemble import Ensemble
-from cosim.group import Group
-from cosim.iterating.group_stepping import GroupStepping, MakeSolver
-from cosim.iterating.iteration_count import IterationCount
-from cosim.schedule import Slot
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.group import Group
+from handover.cosim.iterating.group_stepping import GroupStepping, MakeSolver
+from handover.cosim.iterating.iteration_count import IterationCount
+from handover.cosim.schedule import Slot
 
 
 class GaussSeidel:

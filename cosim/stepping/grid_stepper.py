@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.schedule import Schedule
-from cosim.stepping.coupling import Coupling
-from cosim.stepping.linear_inputs import LinearInputs
+from handover.cosim.schedule import Schedule
+from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.linear_inputs import LinearInputs
 
 
 class GridStepper:

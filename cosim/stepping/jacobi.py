@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.ensemble import Ensemble
-from cosim.schedule import Slot
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.schedule import Slot
 
 
 class Jacobi:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.instance import Instance
-from cosim.linear import Linear
-from cosim.stepping.trace import Moments, Trace
-from cosim.system import Connection, PortName, System
+from handover.cosim.instance import Instance
+from handover.cosim.linear import Linear
+from handover.cosim.stepping.trace import Moments, Trace
+from handover.cosim.system import Connection, PortName, System
 
 Memory = Mapping[str, Any]
 """What is remembered of one unit: the tick at which it is, and its outputs' moments by port."""

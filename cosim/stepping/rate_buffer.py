@@ -4,8 +4,8 @@ import ctypes
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cosim.fmu_description import FmuPort
-from cosim.signal_buffer import SignalBuffer
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.signal_buffer import SignalBuffer
 
 
 class RateBuffer(SignalBuffer):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ensemble import Ensemble
-from cosim.signals import Column
-from cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.ensemble import Ensemble
+from handover.cosim.signals import Column
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
 
 Values = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import UnitFailure
 
 
 class StepTooSmall(UnitFailure):

@@ -94,7 +94,7 @@ static PyObject *loader_names(const char *source) {
 /* Runs the loader's source, unless an earlier instance has, and returns its global names. */
 static PyObject *run_loader(const Instance *instance, const char *function, const char *resources) {
     Text path = {0};
-    text_add(&path, "%s/sources/fmus/loader.py", resources);
+    text_add(&path, "%s/sources/handover/fmus/loader.py", resources);
     char *source = platform_read_file(text_of(&path));
     PyObject *names = source ? loader_names(source) : NULL;
     if (!source)

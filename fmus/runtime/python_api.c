@@ -231,7 +231,7 @@ static bool use_chosen(const char *interpreter, const char *script, Text *tried)
 static bool use_interpreter(const char *resources, Text *tried) {
     Text noted = {0}, script = {0};
     text_add(&noted, "%s/python.txt", resources);
-    text_add(&script, "%s/sources/fmus/interpreter.py", resources);
+    text_add(&script, "%s/sources/handover/fmus/interpreter.py", resources);
     char *chosen = platform_environment("FMU_PYTHON");
     text_add(tried, "\n  FMU_LIBPYTHON: not set");
     bool done = chosen ? use_chosen(chosen, text_of(&script), tried)

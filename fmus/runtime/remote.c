@@ -146,7 +146,7 @@ static bool take_over(Instance *instance, const char *function, const Answer *an
 static Start begin(Instance *instance, const char *function, Text *fault) {
     Remote *side = side_of(instance);
     Text script = {0}, wanted = {0};
-    text_add(&script, "%s/sources/fmus/server.py", side->resources);
+    text_add(&script, "%s/sources/handover/fmus/server.py", side->resources);
     const char *arguments[] = {"-E", "-u", "-X", "utf8", "-c", BEGINNING, text_of(&script), NULL};
     side->process = process_start(side->interpreter, arguments, &side->memory, fault);
     text_clear(&script);
@@ -248,7 +248,7 @@ static Start try(Instance *instance, const char *function, const char *from, cha
 
 static bool readable(const Instance *instance, const char *function, const char *resources, const char *source) {
     Text path = {0};
-    text_add(&path, "%s/sources/fmus/%s", resources, source);
+    text_add(&path, "%s/sources/handover/fmus/%s", resources, source);
     bool there = platform_exists(text_of(&path));
     if (!there) refuse_unreadable(instance, function, text_of(&path));
     text_clear(&path);

@@ -6,17 +6,17 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from cosim.exceptions import RecordNotWritten
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.crew import Crew
-from scenarios.campaign.plan import CampaignPlan, PlannedRun
-from scenarios.campaign.plan_check import PreparedPlan
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.campaign.run_row import RunRow, row_of
-from scenarios.campaign.table_writer import TableWriter
-from scenarios.campaign.tally import OnTally, Tally
-from scenarios.run_folder import told_if_not_written
+from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
+from handover.scenarios.campaign.plan_check import PreparedPlan
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.run_row import RunRow, row_of
+from handover.scenarios.campaign.table_writer import TableWriter
+from handover.scenarios.campaign.tally import OnTally, Tally
+from handover.scenarios.run_folder import told_if_not_written
 
 
 def carry_out_campaign(

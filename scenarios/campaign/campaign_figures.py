@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.ports import Floats
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.point_layout import PointLayout, layout_of
-from scenarios.campaign.statistics import Interval
-from scenarios.experiment import Figure
-from scenarios.plotting import COLOURS, figure
-from scenarios.shown_unit import ShownUnit, shown_unit
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.point_layout import PointLayout, layout_of
+from handover.scenarios.campaign.statistics import Interval
+from handover.scenarios.experiment import Figure
+from handover.scenarios.plotting import COLOURS, figure
+from handover.scenarios.shown_unit import ShownUnit, shown_unit
 
 _LINE = 0.24
 """Height of a point of a list, in inches."""

@@ -9,10 +9,10 @@ from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
 
-from scenarios.campaign.campaign_identity import differences, identity_of
-from scenarios.campaign.plan import CampaignPlan, PlannedRun
-from scenarios.catalog import SCENARIOS
-from scenarios.run_folder import (
+from handover.scenarios.campaign.campaign_identity import differences, identity_of
+from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.run_folder import (
     BadRunFolder,
     check_place,
     folder_held,

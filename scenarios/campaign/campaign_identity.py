@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.run_folder import sha256_of, versions
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.run_folder import sha256_of, versions
 
 _LONGEST = 60
 """Characters of a value that are told."""

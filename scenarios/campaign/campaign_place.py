@@ -4,10 +4,10 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_identity import identity_of
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.run_folder import BadRunFolder
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_identity import identity_of
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.run_folder import BadRunFolder
 
 PLACE = Path("campaigns")
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Floats
-from cosim.variable import Kind, Variable
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.statistics import Interval, success_interval, time_interval
-from scenarios.catalog import SCENARIOS
-from scenarios.shown_unit import shown_unit
+from handover.cosim.ports import Floats
+from handover.cosim.variable import Kind, Variable
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.shown_unit import shown_unit
 
 _MOST_METRICS = 4
 _MOST_INTERVALS = 150

@@ -7,13 +7,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_progress import told_done
-from scenarios.campaign.campaign_results import CampaignResults, PointResults
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.tally import Tally
-from scenarios.console import open_console
-from scenarios.shown_unit import shown_unit
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_progress import told_done
+from handover.scenarios.campaign.campaign_results import CampaignResults, PointResults
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.console import open_console
+from handover.scenarios.shown_unit import shown_unit
 
 _MOST_POINTS = 12
 _MOST_REASONS = 5

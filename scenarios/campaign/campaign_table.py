@@ -9,8 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from cosim.exceptions import nearest, one_line
-from scenarios.run_folder import BadRunFolder
+from handover.cosim.exceptions import nearest, one_line
+from handover.scenarios.run_folder import BadRunFolder
 
 _ANEW = "the call that began the campaign writes it anew"
 

@@ -11,12 +11,12 @@ from typing import Any, cast
 
 from distributed import Client, Future, KilledWorker
 
-from cosim.exceptions import one_line
-from scenarios.campaign.asked_aside import asked_aside
-from scenarios.campaign.bad_crew import BadCrew, CrewLost
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
-from scenarios.run_folder import told_if_not_written, versions
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.asked_aside import asked_aside
+from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
+from handover.scenarios.run_folder import told_if_not_written, versions
 
 _AHEAD = 2
 """Orders that the scheduler holds for each thread: one that is carried out and one that waits.

@@ -4,7 +4,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 
 
 class Crew(Protocol):

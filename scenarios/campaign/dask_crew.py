@@ -12,10 +12,10 @@ from multiprocessing import resource_tracker
 from dask import config
 from distributed import Client, LocalCluster
 
-from cosim.exceptions import one_line
-from scenarios.campaign.bad_crew import BadCrew
-from scenarios.campaign.cluster_crew import ClusterCrew
-from scenarios.campaign.workforce import cores
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.bad_crew import BadCrew
+from handover.scenarios.campaign.cluster_crew import ClusterCrew
+from handover.scenarios.campaign.workforce import cores
 
 _SILENT = logging.CRITICAL + 1
 _LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.variable import Kind, Variable
-from scenarios.campaign.plan import MOST_RUNS
-from scenarios.experiment import Experiment
-from scenarios.parameters import BadParameter, parse_value, text_of, texts_by_name
+from handover.cosim.variable import Kind, Variable
+from handover.scenarios.campaign.plan import MOST_RUNS
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.parameters import BadParameter, parse_value, text_of, texts_by_name
 
 
 def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[dict[str, str]]:

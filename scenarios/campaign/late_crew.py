@@ -4,8 +4,8 @@ import contextlib
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from scenarios.campaign.crew import Crew
-from scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 
 
 class LateCrew:

@@ -4,15 +4,15 @@ import contextlib
 from collections.abc import Mapping
 from typing import Any
 
-from scenarios.bad_call import BadCall
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import checked_plan
-from scenarios.campaign.run_row import RunRow, row_of
-from scenarios.campaign.table_writer import TableWriter
-from scenarios.parameters import BadParameter
-from scenarios.run_folder import BadRunFolder, check_place, versions
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.run_row import RunRow, row_of
+from handover.scenarios.campaign.table_writer import TableWriter
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.run_folder import BadRunFolder, check_place, versions
 
 _OF_PLAN = ("scenario", "points", "fixed", "repetitions", "seed", "paired", "scenes", "experiment")
 """What `campaign.json` tells of a plan, as far as the table follows from it."""

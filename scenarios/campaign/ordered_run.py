@@ -11,17 +11,17 @@ from typing import BinaryIO
 
 import click
 
-from cosim.exceptions import UnitFailure, one_line
-from scenarios.bad_call import told_in_one_line
-from scenarios.campaign.refused_run import REFUSALS, write_refused_run
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.chosen import scenario_named
-from scenarios.interruption import Interruption
-from scenarios.parameters import parse_parameters
-from scenarios.resumption import Spent
-from scenarios.run_folder import RunFolder, is_full
-from scenarios.runner import carry_out
-from scenarios.task import Task
+from handover.cosim.exceptions import UnitFailure, one_line
+from handover.scenarios.bad_call import told_in_one_line
+from handover.scenarios.campaign.refused_run import REFUSALS, write_refused_run
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.chosen import scenario_named
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.resumption import Spent
+from handover.scenarios.run_folder import RunFolder, is_full
+from handover.scenarios.runner import carry_out
+from handover.scenarios.task import Task
 
 
 def carry_out_order(order: RunOrder, folder: Path) -> None:

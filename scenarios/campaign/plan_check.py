@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cosim.master import Master
-from fmus.build import cached
-from scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
-from scenarios.chosen import fmus_of, replacements, scenario_named
-from scenarios.experiment import Experiment
-from scenarios.parameters import BadParameter, parse_parameters, text_of
+from handover.cosim.master import Master
+from handover.fmus.build import cached
+from handover.scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
+from handover.scenarios.chosen import fmus_of, replacements, scenario_named
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.parameters import BadParameter, parse_parameters, text_of
 
 _MOST_TOLD = 8
 """Faults that are told; there may be one a point."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.shown_unit import shown_unit
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.shown_unit import shown_unit
 
 _MOST_COLOURS = 6
 _MOST_NAMES = 10

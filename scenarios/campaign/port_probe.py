@@ -2,8 +2,8 @@
 
 import socket
 
-from cosim.exceptions import one_line
-from scenarios.campaign.bad_crew import BadCrew
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.bad_crew import BadCrew
 
 _CONNECT, _GREETING = 3.0, 3.0
 """How long a server gets to be connected, and to say something, s."""

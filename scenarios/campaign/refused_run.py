@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from cosim.exceptions import ScheduleError, UnitFailure, UnitRefused, WiringError, one_line
-from scenarios.resumption import Spent
-from scenarios.run_summary import configuration, files_and_forms, told_task
-from scenarios.task import Task
+from handover.cosim.exceptions import ScheduleError, UnitFailure, UnitRefused, WiringError, one_line
+from handover.scenarios.resumption import Spent
+from handover.scenarios.run_summary import configuration, files_and_forms, told_task
+from handover.scenarios.task import Task
 
 Refusal = UnitRefused | UnitFailure | WiringError | ScheduleError
 """Why a run cannot begin, where that follows from what it is and not from where it is carried out."""

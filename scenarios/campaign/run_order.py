@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cosim.master_options import MasterOptions
+from handover.cosim.master_options import MasterOptions
 
 
 @dataclass(frozen=True, kw_only=True)

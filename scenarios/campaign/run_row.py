@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from scenarios.campaign.plan import PlannedRun
-from scenarios.experiment import Metric
+from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.experiment import Metric
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,16 +20,23 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from cosim.heartbeat import Heartbeat
-from fmus.build import import_block
-from fmus.catalog import UNITS
-from scenarios import supervisor
-from scenarios.campaign.ordered_run import answer_of, carry_out_order, finish, lost_by, printing_to, refuse_order
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.catalog import SCENARIOS
-from scenarios.death import Death
-from scenarios.forked_child import ChildEnd, ForkedChild
-from scenarios.resumption import Spent
+from handover.cosim.heartbeat import Heartbeat
+from handover.fmus.build import import_block
+from handover.fmus.catalog import UNITS
+from handover.scenarios import supervisor
+from handover.scenarios.campaign.ordered_run import (
+    answer_of,
+    carry_out_order,
+    finish,
+    lost_by,
+    printing_to,
+    refuse_order,
+)
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.death import Death
+from handover.scenarios.forked_child import ChildEnd, ForkedChild
+from handover.scenarios.resumption import Spent
 
 IDLE = 60.0
 """Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""

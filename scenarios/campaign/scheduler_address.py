@@ -3,9 +3,9 @@
 import asyncio
 from urllib.parse import urlsplit
 
-from cosim.exceptions import one_line
-from scenarios.campaign.bad_crew import BadCrew
-from scenarios.campaign.port_probe import RIGHT, probe_port
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.bad_crew import BadCrew
+from handover.scenarios.campaign.port_probe import RIGHT, probe_port
 
 _CONNECT, _ANSWER = 4.0, 5.0
 """How long a scheduler gets to be connected, and until it has answered, s."""
@@ -20,7 +20,7 @@ def scheduler_address(told: str) -> str:
     address, host, port = _parts(told)
     if address.startswith("tcp:"):
         probe_port(address, host, port)
-    from scenarios.campaign.scheduler_kind import kind_at  # loads Dask
+    from handover.scenarios.campaign.scheduler_kind import kind_at  # loads Dask
 
     try:
         kind = kind_at(address, _CONNECT, _ANSWER)
@@ -51,7 +51,7 @@ def _parts(told: str) -> tuple[str, str, int]:
 
 
 def _check_protocol(told: str, address: str) -> None:
-    from scenarios.campaign.scheduler_kind import PROTOCOLS  # loads Dask
+    from handover.scenarios.campaign.scheduler_kind import PROTOCOLS  # loads Dask
 
     protocol = address.partition("://")[0].lower()
     if protocol not in PROTOCOLS:

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 
 _LOOK = 0.5
 """How often it is asked whether a run is still wanted, s."""
@@ -35,7 +35,7 @@ class NotWanted(Exception):
 
 
 class ServerProcess:
-    """A process of `scenarios.campaign.run_server`. It ends when this process does, however that ends.
+    """A process of `handover.scenarios.campaign.run_server`. It ends when this process does, however that ends.
 
     It hears of no Ctrl-C: whoever started the campaign does, and ends it.
     """
@@ -45,7 +45,7 @@ class ServerProcess:
         places = [p for p in sys.path if p]
         alike = {"PYTHONPATH": os.pathsep.join(places), "PYTHONSAFEPATH": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "scenarios.campaign.run_server"],
+            [sys.executable, "-m", "handover.scenarios.campaign.run_server"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,

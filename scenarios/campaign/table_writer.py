@@ -12,13 +12,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from cosim.variable import Kind, Variable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.run_row import RunRow
-from scenarios.chosen import scenario_named
-from scenarios.experiment import Metric
-from scenarios.parameters import parse_value
-from scenarios.run_folder import told_if_not_written
+from handover.cosim.variable import Kind, Variable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.run_row import RunRow
+from handover.scenarios.chosen import scenario_named
+from handover.scenarios.experiment import Metric
+from handover.scenarios.parameters import parse_value
+from handover.scenarios.run_folder import told_if_not_written
 
 _SHARE = 0.005
 """Part of the time that may go into writing tables before the last one."""

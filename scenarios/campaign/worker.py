@@ -11,9 +11,9 @@ from pathlib import Path
 
 from distributed import get_worker
 
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
-from scenarios.run_folder import version_differences, versions
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
+from handover.scenarios.run_folder import version_differences, versions
 
 _servers: dict[tuple[str, int], ServerProcess] = {}
 """By batch and thread."""

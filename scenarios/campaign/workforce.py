@@ -5,7 +5,7 @@ import functools
 import os
 from dataclasses import dataclass
 
-from scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.crew import Crew
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,14 @@ class Workforce:
         Raises:
             BadCrew: here or on entering, if they cannot be started or used.
         """
-        from scenarios.campaign.dask_crew import crew_at, embedded_crew
+        from handover.scenarios.campaign.dask_crew import crew_at, embedded_crew
 
         return embedded_crew(self.workers) if self.scheduler is None else crew_at(self._address)
 
     @functools.cached_property
     def _address(self) -> str:
         """The whole address of the scheduler, found out once."""
-        from scenarios.campaign.scheduler_address import scheduler_address
+        from handover.scenarios.campaign.scheduler_address import scheduler_address
 
         return scheduler_address(self.scheduler or "")
 

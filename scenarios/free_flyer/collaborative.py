@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from scenarios.free_flyer.flyer_handover import FlyerHandover
+from handover.scenarios.free_flyer.flyer_handover import FlyerHandover
 
 
 class Collaborative(FlyerHandover):

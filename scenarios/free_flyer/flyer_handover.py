@@ -7,20 +7,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cosim.ports import Floats
-from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf
-from scenarios.free_flyer.handover_figures import draw_handover
-from scenarios.free_flyer.handover_parameters import Parameters
-from scenarios.free_flyer.handover_plots import plot_handover
-from scenarios.free_flyer.handover_watch import HandoverWatch
-from scenarios.free_flyer.replay import replay_handover
-from scenarios.free_flyer.rig import arm, expected_lag, wire_handover
-from scenarios.paper import paper_values
-from scenarios.parameters import BadParameter
-from scenarios.record import Record
-from scenarios.reporting.replay import Replay
-from scenarios.reporting.time_plot import TimePlot
+from handover.cosim.ports import Floats
+from handover.cosim.system import System
+from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.free_flyer.handover_figures import draw_handover
+from handover.scenarios.free_flyer.handover_parameters import Parameters
+from handover.scenarios.free_flyer.handover_plots import plot_handover
+from handover.scenarios.free_flyer.handover_watch import HandoverWatch
+from handover.scenarios.free_flyer.replay import replay_handover
+from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_handover
+from handover.scenarios.paper import paper_values
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.replay import Replay
+from handover.scenarios.reporting.time_plot import TimePlot
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""

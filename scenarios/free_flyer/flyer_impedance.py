@@ -7,20 +7,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf
-from scenarios.free_flyer.impedance_figures import draw_push
-from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
-from scenarios.free_flyer.impedance_plots import plot_push
-from scenarios.free_flyer.impedance_watch import ImpedanceWatch
-from scenarios.free_flyer.published import published_of_push
-from scenarios.free_flyer.replay import replay_push
-from scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
-from scenarios.paper import paper_values
-from scenarios.record import Record
-from scenarios.reporting.published_value import PublishedValue
-from scenarios.reporting.replay import Replay
-from scenarios.reporting.time_plot import TimePlot
+from handover.cosim.system import System
+from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.free_flyer.impedance_figures import draw_push
+from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from handover.scenarios.free_flyer.impedance_plots import plot_push
+from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from handover.scenarios.free_flyer.published import published_of_push
+from handover.scenarios.free_flyer.replay import replay_push
+from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
+from handover.scenarios.paper import paper_values
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.reporting.replay import Replay
+from handover.scenarios.reporting.time_plot import TimePlot
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):

@@ -8,15 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from scenarios.experiment import Figure
-from scenarios.free_flyer.handover_parameters import Parameters
-from scenarios.free_flyer.handover_watch import HandoverWatch
-from scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
-from scenarios.free_flyer.thrust_figure import draw_thrust
-from scenarios.paper import paper_values
-from scenarios.plotting import COLOURS, figure, leave_room, shade_phases
-from scenarios.record import Record
+from handover.cosim.ports import Floats
+from handover.scenarios.experiment import Figure
+from handover.scenarios.free_flyer.handover_parameters import Parameters
+from handover.scenarios.free_flyer.handover_watch import HandoverWatch
+from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
+from handover.scenarios.free_flyer.thrust_figure import draw_thrust
+from handover.scenarios.paper import paper_values
+from handover.scenarios.plotting import COLOURS, figure, leave_room, shade_phases
+from handover.scenarios.record import Record
 
 _FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("person.{}_WO", "object", {"color": COLOURS[2], "lw": 4.5, "alpha": 0.4}),

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Vector3, parameter
-from cosim.units import Metre, Newton, Second
-from scenarios.free_flyer.behaviour import Behaviour
+from handover.cosim.ports import Vector3, parameter
+from handover.cosim.units import Metre, Newton, Second
+from handover.scenarios.free_flyer.behaviour import Behaviour
 
 
 @dataclass(frozen=True, kw_only=True)

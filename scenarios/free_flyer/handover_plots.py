@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenarios.free_flyer.handover_parameters import Parameters
-from scenarios.free_flyer.thrust_plots import plot_thrust
-from scenarios.paper import paper_values
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, Level, TimePlot
+from handover.scenarios.free_flyer.handover_parameters import Parameters
+from handover.scenarios.free_flyer.thrust_plots import plot_thrust
+from handover.scenarios.paper import paper_values
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 _PHASES = "decision.phase"
 _TOUCHES = {"HAND": "a pull", "GRIPPER": "a push"}

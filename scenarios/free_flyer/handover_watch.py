@@ -3,11 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from cosim.signals import Signals
-from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.free_flyer.handover_parameters import Parameters
-from scenarios.free_flyer.stability import stability_metrics
-from scenarios.free_flyer.transfer import Transfer
+from handover.cosim.signals import Signals
+from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.free_flyer.handover_parameters import Parameters
+from handover.scenarios.free_flyer.stability import stability_metrics
+from handover.scenarios.free_flyer.transfer import Transfer
 
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robot is done, s (assumed)."""

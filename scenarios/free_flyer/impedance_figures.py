@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from scenarios.experiment import Figure
-from scenarios.free_flyer.impedance_model import Errors
-from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
-from scenarios.free_flyer.impedance_watch import ImpedanceWatch
-from scenarios.free_flyer.scene import draw_scene, robot_at
-from scenarios.free_flyer.thrust_figure import draw_thrust
-from scenarios.plotting import COLOURS, figure
-from scenarios.record import Record
+from handover.scenarios.experiment import Figure
+from handover.scenarios.free_flyer.impedance_model import Errors
+from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from handover.scenarios.free_flyer.scene import draw_scene, robot_at
+from handover.scenarios.free_flyer.thrust_figure import draw_thrust
+from handover.scenarios.plotting import COLOURS, figure
+from handover.scenarios.record import Record
 
 _PUSH_COLOUR = "#fbe3cf"
 _CALCULATED = "calculated, [Fernandes2020] eq. (4.4)"

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from scenarios.free_flyer.behaviour import Behaviour
-from scenarios.paper import paper_values
+from handover.cosim.ports import Floats
+from handover.scenarios.free_flyer.behaviour import Behaviour
+from handover.scenarios.paper import paper_values
 
 MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
 """Signals of a push that make up a `Motion`, in the order of its fields after time."""

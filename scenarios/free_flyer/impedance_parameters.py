@@ -4,9 +4,9 @@ import enum
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cosim.ports import parameter
-from cosim.units import Newton, NewtonMetre, Second
-from scenarios.free_flyer.behaviour import Behaviour
+from handover.cosim.ports import parameter
+from handover.cosim.units import Newton, NewtonMetre, Second
+from handover.scenarios.free_flyer.behaviour import Behaviour
 
 
 class Axis(enum.IntEnum):

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Motion, errors_of
-from scenarios.free_flyer.impedance_parameters import Parameters, Wrench
-from scenarios.free_flyer.thrust_plots import plot_thrust
-from scenarios.paper import paper_values
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, TimePlot
+from handover.cosim.ports import Floats
+from handover.scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Motion, errors_of
+from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
+from handover.scenarios.free_flyer.thrust_plots import plot_thrust
+from handover.scenarios.paper import paper_values
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, TimePlot
 
 
 def plot_push(parameters: Parameters, record: Record) -> list[TimePlot]:

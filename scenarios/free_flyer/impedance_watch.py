@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from cosim.signals import Signals
-from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Errors, Motion, errors_of
-from scenarios.free_flyer.impedance_parameters import Parameters
-from scenarios.free_flyer.stability import stability_metrics
-from scenarios.paper import paper_values
+from handover.cosim.signals import Signals
+from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Errors, Motion, errors_of
+from handover.scenarios.free_flyer.impedance_parameters import Parameters
+from handover.scenarios.free_flyer.stability import stability_metrics
+from handover.scenarios.paper import paper_values
 
 _REST_POSITION, _REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cosim.geometry import rotation_of
-from cosim.ports import Floats
-from scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
-from scenarios.paper import paper_values
-from scenarios.record import Record
-from scenarios.reporting.meshes import Mesh, faceted, hull
-from scenarios.reporting.replay import Body, Line, Replay
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats
+from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
+from handover.scenarios.paper import paper_values
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.meshes import Mesh, faceted, hull
+from handover.scenarios.reporting.replay import Body, Line, Replay
 
 _PUSH, _TWIST, _WAY = "#d1602b", "#8357a8", "#b58a1b"
 _PER_NEWTON, _PER_NEWTON_METRE = 0.04, 0.08

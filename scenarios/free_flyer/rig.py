@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from cosim.system import PlacedUnit, System
-from scenarios.paper import paper_values
+from handover.cosim.ports import Floats
+from handover.cosim.system import PlacedUnit, System
+from handover.scenarios.paper import paper_values
 
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
-from cosim.geometry import rotation_of
-from cosim.ports import Floats
-from scenarios.experiment import Figure
-from scenarios.paper import paper_values
-from scenarios.plotting import figure
-from scenarios.record import Record
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats
+from handover.scenarios.experiment import Figure
+from handover.scenarios.paper import paper_values
+from handover.scenarios.plotting import figure
+from handover.scenarios.record import Record
 
 _CUBE, _ARM, _JAW, _SKIN, _THING = "#c9d3df", "#8793a3", "#2f6db5", "#e3b591", "#d1602b"
 

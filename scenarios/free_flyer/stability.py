@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from cosim.signals import Signals
-from scenarios.experiment import Metric
+from handover.cosim.signals import Signals
+from handover.scenarios.experiment import Metric
 
 _SLOWEST = {"pose": "the slowest mode, the integrator's"}
 _PERIOD = 2 / 125

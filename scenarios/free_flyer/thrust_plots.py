@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, TimePlot
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, TimePlot
 
 BEYOND = 2.0
 """How far plots reach beyond what the thrusters give at most: a command may be twenty times as much."""

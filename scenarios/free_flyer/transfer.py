@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from scenarios.experiment import Metric
+from handover.scenarios.experiment import Metric
 
 
 @dataclass

@@ -7,20 +7,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf
-from scenarios.helix_handover.figures import draw_handover
-from scenarios.helix_handover.parameters import Cover, Parameters
-from scenarios.helix_handover.plots import plot_handover
-from scenarios.helix_handover.published import published_of
-from scenarios.helix_handover.replay import replay_handover
-from scenarios.helix_handover.rig import calibration
-from scenarios.helix_handover.watch import HandoverWatch
-from scenarios.record import Record
-from scenarios.reporting.camera_picture import CameraPicture
-from scenarios.reporting.published_value import PublishedValue
-from scenarios.reporting.replay import Replay
-from scenarios.reporting.time_plot import TimePlot
+from handover.cosim.system import System
+from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.helix_handover.figures import draw_handover
+from handover.scenarios.helix_handover.parameters import Cover, Parameters
+from handover.scenarios.helix_handover.plots import plot_handover
+from handover.scenarios.helix_handover.published import published_of
+from handover.scenarios.helix_handover.replay import replay_handover
+from handover.scenarios.helix_handover.rig import calibration
+from handover.scenarios.helix_handover.watch import HandoverWatch
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.camera_picture import CameraPicture
+from handover.scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.reporting.replay import Replay
+from handover.scenarios.reporting.time_plot import TimePlot
 
 
 class HelixHandover(Experiment[HandoverWatch]):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.ports import Floats, parameter
-from cosim.units import Metre, Number, Second
-from scenarios.paper import paper_values
+from handover.cosim.ports import Floats, parameter
+from handover.cosim.units import Metre, Number, Second
+from handover.scenarios.paper import paper_values
 
 
 class Place(enum.IntEnum):

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.helix_handover.parameters import Parameters
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, Level, TimePlot
+from handover.cosim.ports import Floats
+from handover.scenarios.helix_handover.parameters import Parameters
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 _PHASES = "servo.phase"
 _FOLLOWED = (("gripper", "arm.p_WG", "servo.p_WG_est"), ("ball", "hand.p_WO", "servo.p_WO_est"))

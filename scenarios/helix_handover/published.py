@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenarios.helix_handover.parameters import Cover, Parameters, Tuning
-from scenarios.paper import paper_values
-from scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.helix_handover.parameters import Cover, Parameters, Tuning
+from handover.scenarios.paper import paper_values
+from handover.scenarios.reporting.published_value import PublishedValue
 
 _PAPER = "helix_handover"
 

@@ -5,17 +5,17 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.geometry import rotation_of
-from cosim.ports import Floats
-from plants.gripper_figure import gripper
-from plants.hand_figure import hand
-from plants.limb import Limb
-from plants.stereo_camera import Params as CameraParams
-from plants.tendon_parameters import Params as ArmParams
-from scenarios.helix_handover.rig import camera_of
-from scenarios.record import Record
-from scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
-from scenarios.reporting.replay import Body, Line, Replay
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats
+from handover.plants.gripper_figure import gripper
+from handover.plants.hand_figure import hand
+from handover.plants.limb import Limb
+from handover.plants.stereo_camera import Params as CameraParams
+from handover.plants.tendon_parameters import Params as ArmParams
+from handover.scenarios.helix_handover.rig import camera_of
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
+from handover.scenarios.reporting.replay import Body, Line, Replay
 
 _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
 _SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8357a8", "#d1602b"

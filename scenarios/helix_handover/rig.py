@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.geometry import looking_at, quaternion_of
-from cosim.pinhole import Pinhole
-from scenarios.paper import paper_values
+from handover.cosim.geometry import looking_at, quaternion_of
+from handover.cosim.pinhole import Pinhole
+from handover.scenarios.paper import paper_values
 
 
 def calibration() -> dict[str, Any]:

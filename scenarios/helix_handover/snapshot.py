@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 
-from controllers.handover_vision import Params as Vision
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
-from cosim.signals import Signals
-from scenarios.helix_handover.parameters import Cover, Parameters
-from scenarios.helix_handover.rig import camera_of
-from scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.controllers.handover_vision import Params as Vision
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
+from handover.cosim.signals import Signals
+from handover.scenarios.helix_handover.parameters import Cover, Parameters
+from handover.scenarios.helix_handover.rig import camera_of
+from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
 
 MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
 _PERIOD = Fraction(1, 30)

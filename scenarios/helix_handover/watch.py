@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.geometry import rotation_of
-from cosim.ports import Floats
-from cosim.signals import Signals
-from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
-from scenarios.helix_handover.parameters import Cover, Parameters
-from scenarios.helix_handover.snapshot import is_covered, take_pictures
-from scenarios.reporting.camera_picture import CameraPicture
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats
+from handover.cosim.signals import Signals
+from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
+from handover.scenarios.helix_handover.parameters import Cover, Parameters
+from handover.scenarios.helix_handover.snapshot import is_covered, take_pictures
+from handover.scenarios.reporting.camera_picture import CameraPicture
 
 _SETTLING = 1.0
 """How long the ball must stay in the closed gripper, s (assumed)."""

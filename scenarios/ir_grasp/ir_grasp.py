@@ -7,20 +7,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf
-from scenarios.ir_grasp.figures import draw_grasp
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.plots import plot_grasp
-from scenarios.ir_grasp.published import published_of
-from scenarios.ir_grasp.replay import replay_grasp
-from scenarios.ir_grasp.situation import Situation
-from scenarios.ir_grasp.watch import GraspWatch
-from scenarios.parameters import BadParameter
-from scenarios.record import Record
-from scenarios.reporting.published_value import PublishedValue
-from scenarios.reporting.replay import Replay
-from scenarios.reporting.time_plot import TimePlot
+from handover.cosim.system import System
+from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.ir_grasp.figures import draw_grasp
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.ir_grasp.plots import plot_grasp
+from handover.scenarios.ir_grasp.published import published_of
+from handover.scenarios.ir_grasp.replay import replay_grasp
+from handover.scenarios.ir_grasp.situation import Situation
+from handover.scenarios.ir_grasp.watch import GraspWatch
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.reporting.replay import Replay
+from handover.scenarios.reporting.time_plot import TimePlot
 
 
 class IrGrasp(Experiment[GraspWatch]):

@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from controllers.reflex_parameters import Strategy
-from cosim.ports import parameter
-from cosim.units import Metre, Radian
-from plants.grasp_objects import Thing
+from handover.controllers.reflex_parameters import Strategy
+from handover.cosim.ports import parameter
+from handover.cosim.units import Metre, Radian
+from handover.plants.grasp_objects import Thing
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from controllers.reflex_parameters import Params as ReflexParams
-from cosim.ports import Floats
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, Level, TimePlot
+from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.cosim.ports import Floats
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 FINGER_NAMES = ("thumb", "index", "ring")
 _PHASES = "reflex.phase"

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from controllers.reflex_parameters import Strategy
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.reporting.published_value import PublishedValue
+from handover.controllers.reflex_parameters import Strategy
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.reporting.published_value import PublishedValue
 
 FINGERS = ("thumb", "index", "ring")
 """As table II is kept in `paper.toml`."""

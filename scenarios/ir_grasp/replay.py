@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from controllers.reflex_parameters import Params as ReflexParams
-from cosim.ports import Floats
-from plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
-from plants.grasp_objects import outlines
-from scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.plots import FINGER_NAMES
-from scenarios.record import Record
-from scenarios.reporting.meshes import Mesh, merged, prism
-from scenarios.reporting.replay import Body, Line, Replay
+from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.cosim.ports import Floats
+from handover.plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
+from handover.plants.grasp_objects import outlines
+from handover.scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.ir_grasp.plots import FINGER_NAMES
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.meshes import Mesh, merged, prism
+from handover.scenarios.reporting.replay import Body, Line, Replay
 
 _BEAM = "#8357a8"
 _HEIGHT, _PALM_LOW, _PALM_HIGH, _THING_HIGH = 0.025, 0.012, 0.038, 0.055

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats
-from plants.grasp_hand import PALM
-from plants.grasp_objects import SOLIDS, Thing, outlines
-from scenarios.ir_grasp.parameters import Parameters
+from handover.cosim.ports import Floats
+from handover.plants.grasp_hand import PALM
+from handover.plants.grasp_objects import SOLIDS, Thing, outlines
+from handover.scenarios.ir_grasp.parameters import Parameters
 
 _PALM_FRONT = max(x for x, _ in PALM)
 

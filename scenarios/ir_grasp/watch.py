@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from controllers.reflex_parameters import Params as ReflexParams
-from cosim.ports import Floats
-from cosim.signals import Signals
-from plants.grasp_objects import SOLIDS
-from plants.grasp_scene import SEES_NOTHING
-from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.situation import asked_for
+from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.cosim.ports import Floats
+from handover.cosim.signals import Signals
+from handover.plants.grasp_objects import SOLIDS
+from handover.plants.grasp_scene import SEES_NOTHING
+from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.ir_grasp.situation import asked_for
 
 _SETTLING = 0.3
 """How long the hand rests after the shake, s (assumed)."""

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from scenarios.published.helix_1 import Helix1
-from scenarios.published.ir_table import IrTable
-from scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.helix_1 import Helix1
+from handover.scenarios.published.ir_table import IrTable
+from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _ALL: tuple[type[PublishedExperiment], ...] = (Helix1, IrTable)
 

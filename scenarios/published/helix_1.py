@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.experiment import Figure
-from scenarios.helix_handover.parameters import Place, Tuning
-from scenarios.paper import paper_values
-from scenarios.published.claim import Claim
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_claims import own_claims, thesis_claims
-from scenarios.published.helix_1_figures import draw_errors, draw_times
-from scenarios.published.helix_1_tables import by_place, fig_9, steps, table_1
-from scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.experiment import Figure
+from handover.scenarios.helix_handover.parameters import Place, Tuning
+from handover.scenarios.paper import paper_values
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.helix_1_arm import Helix1Arm
+from handover.scenarios.published.helix_1_claims import own_claims, thesis_claims
+from handover.scenarios.published.helix_1_figures import draw_errors, draw_times
+from handover.scenarios.published.helix_1_tables import by_place, fig_9, steps, table_1
+from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s: as long as the scenario allows; the longest published is 214.9."""

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.helix_handover.parameters import Tuning
-from scenarios.paper import paper_values
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.helix_handover.parameters import Tuning
+from handover.scenarios.paper import paper_values
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.campaign.statistics import FEWEST, success_interval, time_interval, two_proportions
-from scenarios.published.claim import Claim, Verdict
-from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import published, too_few
-from scenarios.published.helix_1_time_claims import time_claims
-from scenarios.published.ratio_interval import ratio_interval
-from scenarios.published.telling import told_p
+from handover.scenarios.campaign.statistics import FEWEST, success_interval, time_interval, two_proportions
+from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.published.helix_1_arm import Helix1Arm
+from handover.scenarios.published.helix_1_telling import published, too_few
+from handover.scenarios.published.helix_1_time_claims import time_claims
+from handover.scenarios.published.ratio_interval import ratio_interval
+from handover.scenarios.published.telling import told_p
 
 _READING = 0.01
 """What the lengths of fig. 9 are told to, m."""

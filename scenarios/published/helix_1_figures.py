@@ -9,13 +9,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from controllers.visual_servo import Phase
-from cosim.ports import Floats
-from scenarios.experiment import Figure
-from scenarios.plotting import COLOURS, figure
-from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import published
-from scenarios.record import Record
+from handover.controllers.visual_servo import Phase
+from handover.cosim.ports import Floats
+from handover.scenarios.experiment import Figure
+from handover.scenarios.plotting import COLOURS, figure
+from handover.scenarios.published.helix_1_arm import Helix1Arm
+from handover.scenarios.published.helix_1_telling import published
+from handover.scenarios.record import Record
 
 _TICKS = (10, 20, 50, 100, 200, 500)
 _PUBLISHED = COLOURS[5]

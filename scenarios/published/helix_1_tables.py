@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.campaign.statistics import Statistic
-from scenarios.helix_handover.parameters import Place, Tuning
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import published
-from scenarios.published.telling import told_median
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.statistics import Statistic
+from handover.scenarios.helix_handover.parameters import Place, Tuning
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.helix_1_arm import Helix1Arm
+from handover.scenarios.published.helix_1_telling import published
+from handover.scenarios.published.telling import told_median
 
 _ON_EQUAL_BOUNDS = (
     " The thesis's ε_pose,bound and ε_control are both 5 mm. One iteration of the Jacobian loop leaves about "

@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from scenarios.paper import paper_values
-from scenarios.published.claim import Claim
-from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.verdict_rules import nothing_measured
+from handover.scenarios.paper import paper_values
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.helix_1_arm import Helix1Arm
+from handover.scenarios.published.verdict_rules import nothing_measured
 
 
 def published() -> dict[str, Any]:

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
-from scenarios.campaign.statistics import FEWEST, LEVEL, time_interval
-from scenarios.paper import paper_values
-from scenarios.published.claim import Claim, Verdict
-from scenarios.published.helix_1_arm import Helix1Arm
-from scenarios.published.helix_1_telling import missing, published, too_few
-from scenarios.published.ratio_interval import ratio_interval
-from scenarios.published.telling import told_p
+from handover.scenarios.campaign.statistics import FEWEST, LEVEL, time_interval
+from handover.scenarios.paper import paper_values
+from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.published.helix_1_arm import Helix1Arm
+from handover.scenarios.published.helix_1_telling import missing, published, too_few
+from handover.scenarios.published.ratio_interval import ratio_interval
+from handover.scenarios.published.telling import told_p
 
 
 def time_claims(arm: Helix1Arm) -> list[Claim]:

@@ -4,19 +4,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from plants.grasp_objects import Thing
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.experiment import Figure
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.published.claim import Claim
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.ir_table_claims import closing_claims, further_claims, order_claims, rate_claims
-from scenarios.published.ir_table_distances import distance_claims
-from scenarios.published.ir_table_figures import draw_table
-from scenarios.published.ir_table_runs import ARMS, IrTableRuns
-from scenarios.published.ir_table_tables import tables_of
-from scenarios.published.published_experiment import PublishedExperiment
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.experiment import Figure
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.ir_table_claims import closing_claims, further_claims, order_claims, rate_claims
+from handover.scenarios.published.ir_table_distances import distance_claims
+from handover.scenarios.published.ir_table_figures import draw_table
+from handover.scenarios.published.ir_table_runs import ARMS, IrTableRuns
+from handover.scenarios.published.ir_table_tables import tables_of
+from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _REPETITIONS, _QUICK = 16, 3
 """Runs of a cell: with 80 of a pose and an arm an interval is at most 23 points wide; the paper has three."""

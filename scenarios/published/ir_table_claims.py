@@ -2,11 +2,20 @@
 
 import numpy as np
 
-from scenarios.campaign.statistics import two_proportions
-from scenarios.published.claim import Claim
-from scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_35, FORWARD_55, POSES, REFLEX, Arm, IrTableRuns
-from scenarios.published.telling import told_p, told_rate
-from scenarios.published.verdict_rules import (
+from handover.scenarios.campaign.statistics import two_proportions
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.ir_table_runs import (
+    ARMS,
+    BLIND,
+    FORWARD_35,
+    FORWARD_55,
+    POSES,
+    REFLEX,
+    Arm,
+    IrTableRuns,
+)
+from handover.scenarios.published.telling import told_p, told_rate
+from handover.scenarios.published.verdict_rules import (
     majority_claim,
     no_worse_claim,
     order_claim,

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from scenarios.campaign.statistics import success_interval, time_interval
-from scenarios.published.claim import Claim, Verdict
-from scenarios.published.ir_table_runs import OBJECTS, POSES, REFLEX, IrTableRuns
-from scenarios.published.telling import told_rate
-from scenarios.published.verdict_rules import nothing_measured
+from handover.scenarios.campaign.statistics import success_interval, time_interval
+from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.published.ir_table_runs import OBJECTS, POSES, REFLEX, IrTableRuns
+from handover.scenarios.published.telling import told_rate
+from handover.scenarios.published.verdict_rules import nothing_measured
 
 _WHERE = "table II"
 _IN_COST = ("thumb", "ring")

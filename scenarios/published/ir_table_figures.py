@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from scenarios.campaign.statistics import success_interval
-from scenarios.experiment import Figure
-from scenarios.ir_grasp.figures import FINGER_COLOURS
-from scenarios.ir_grasp.plots import FINGER_NAMES
-from scenarios.plotting import COLOURS, figure
-from scenarios.published.ir_table_runs import ARMS, OBJECTS, POSES, REFLEX, Count, IrTableRuns
+from handover.scenarios.campaign.statistics import success_interval
+from handover.scenarios.experiment import Figure
+from handover.scenarios.ir_grasp.figures import FINGER_COLOURS
+from handover.scenarios.ir_grasp.plots import FINGER_NAMES
+from handover.scenarios.plotting import COLOURS, figure
+from handover.scenarios.published.ir_table_runs import ARMS, OBJECTS, POSES, REFLEX, Count, IrTableRuns
 
 _OURS, _THEIRS = COLOURS[0], COLOURS[1]
 _APART = 0.13

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.reflex_parameters import Strategy
-from plants.grasp_objects import Thing
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.paper import paper_values
+from handover.controllers.reflex_parameters import Strategy
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.paper import paper_values
 
 POSES: Mapping[bool, str] = {False: "nominal", True: "perturbed"}
 """By whether the object is moved after vision saw it."""

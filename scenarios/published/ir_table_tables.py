@@ -4,12 +4,12 @@ from collections import Counter
 
 import numpy as np
 
-from controllers.ir_reflex import Stop
-from plants.grasp_objects import Thing
-from scenarios.campaign.statistics import LEVEL, paired_test, success_interval, two_proportions
-from scenarios.ir_grasp.plots import FINGER_NAMES
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.ir_table_runs import (
+from handover.controllers.ir_reflex import Stop
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.campaign.statistics import LEVEL, paired_test, success_interval, two_proportions
+from handover.scenarios.ir_grasp.plots import FINGER_NAMES
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.ir_table_runs import (
     ARMS,
     BLIND,
     FORWARD_35,
@@ -20,7 +20,7 @@ from scenarios.published.ir_table_runs import (
     Count,
     IrTableRuns,
 )
-from scenarios.published.telling import told_interval, told_median, told_p, told_share
+from handover.scenarios.published.telling import told_interval, told_median, told_p, told_share
 
 _TITLES = {
     Thing.CYLINDER: "cylinder",

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.published.claim import Claim
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.published_experiment import PublishedExperiment
 
 
 @dataclass(frozen=True, kw_only=True)

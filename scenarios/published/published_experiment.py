@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.experiment import Figure
-from scenarios.published.claim import Claim
-from scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.experiment import Figure
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.comparison_table import ComparisonTable
 
 
 class PublishedExperiment(abc.ABC):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.campaign.statistics import LEVEL, RESAMPLES, Statistic
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.statistics import LEVEL, RESAMPLES, Statistic
 
 
 def ratio_interval(x: Floats, y: Floats, statistic: Statistic) -> tuple[float, float] | None:

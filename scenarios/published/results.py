@@ -4,12 +4,12 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.experiment import Figure
-from scenarios.published.claim import Claim
-from scenarios.published.published_experiment import PublishedExperiment
-from scenarios.run_folder import told_if_not_written, write_whole
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.experiment import Figure
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.run_folder import told_if_not_written, write_whole
 
 
 def write_claims(claims: Sequence[Claim], folder: CampaignFolder) -> None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.campaign.statistics import time_interval
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.statistics import time_interval
 
 
 def told_rate(successes: int, n: int) -> str:

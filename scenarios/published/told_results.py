@@ -5,12 +5,12 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.console import open_console
-from scenarios.published.claim import Claim, Verdict, verdict_counts
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.paper_results import PaperResults
-from scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.console import open_console
+from handover.scenarios.published.claim import Claim, Verdict, verdict_counts
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.paper_results import PaperResults
+from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red", Verdict.NOT_COMPARABLE: "bold"}
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scenarios.campaign.statistics import (
+from handover.scenarios.campaign.statistics import (
     LEVEL,
     Interval,
     compatible_counts,
@@ -16,8 +16,8 @@ from scenarios.campaign.statistics import (
     success_interval,
     two_proportions,
 )
-from scenarios.published.claim import Claim, Verdict
-from scenarios.published.telling import told_interval, told_p, told_rate, told_share
+from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.published.telling import told_interval, told_p, told_rate, told_share
 
 FEW = 0.10
 """Share of runs below which something counts as not happening."""

@@ -4,12 +4,12 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from cosim.exceptions import one_line
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.published.claim import Claim
-from scenarios.run_folder import BadRunFolder
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.run_folder import BadRunFolder
 
 _FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}
 _COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.catalog import SCENARIOS
-from scenarios.published.claim import Claim, verdict_counts
-from scenarios.reporting.claims_section import verdict_html
-from scenarios.shown_unit import shown_unit
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.published.claim import Claim, verdict_counts
+from handover.scenarios.reporting.claims_section import verdict_html
+from handover.scenarios.shown_unit import shown_unit
 
 _MOST_VALUES = 10
 

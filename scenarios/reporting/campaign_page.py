@@ -6,30 +6,30 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from scenarios.campaign.campaign_figures import draw_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.point_layout import layout_of
-from scenarios.published.catalog import EXPERIMENTS
-from scenarios.published.claim import Claim
-from scenarios.published.comparison_table import ComparisonTable
-from scenarios.published.paper_results import PaperResults
-from scenarios.published.published_experiment import PublishedExperiment
-from scenarios.published.results import draw_figures
-from scenarios.reporting.campaign_facts import read_claims, read_results
-from scenarios.reporting.campaign_lead import campaign_lead
-from scenarios.reporting.claims_section import claims_section, comparison_section
-from scenarios.reporting.failures_section import failures_section
-from scenarios.reporting.figures_section import figures_section
-from scenarios.reporting.page import write_page
-from scenarios.reporting.pairs_section import pairs_section
-from scenarios.reporting.points_section import points_section
-from scenarios.reporting.runs_section import runs_section
-from scenarios.reporting.section import Section
-from scenarios.reporting.setting_section import setting_section
-from scenarios.reporting.spread_section import spread_section
-from scenarios.reporting.success_section import success_section
-from scenarios.run_folder import told_if_not_written
+from handover.scenarios.campaign.campaign_figures import draw_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.point_layout import layout_of
+from handover.scenarios.published.catalog import EXPERIMENTS
+from handover.scenarios.published.claim import Claim
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.paper_results import PaperResults
+from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.results import draw_figures
+from handover.scenarios.reporting.campaign_facts import read_claims, read_results
+from handover.scenarios.reporting.campaign_lead import campaign_lead
+from handover.scenarios.reporting.claims_section import claims_section, comparison_section
+from handover.scenarios.reporting.failures_section import failures_section
+from handover.scenarios.reporting.figures_section import figures_section
+from handover.scenarios.reporting.page import write_page
+from handover.scenarios.reporting.pairs_section import pairs_section
+from handover.scenarios.reporting.points_section import points_section
+from handover.scenarios.reporting.runs_section import runs_section
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.setting_section import setting_section
+from handover.scenarios.reporting.spread_section import spread_section
+from handover.scenarios.reporting.success_section import success_section
+from handover.scenarios.run_folder import told_if_not_written
 
 
 def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from scenarios.reporting.page import template
-from scenarios.reporting.plot_html import plot_html
-from scenarios.reporting.section import Section
+from handover.scenarios.reporting.page import template
+from handover.scenarios.reporting.plot_html import plot_html
+from handover.scenarios.reporting.section import Section
 
 _MOST = 24
 """Units that have a bar of their own; the cheapest of more share one."""

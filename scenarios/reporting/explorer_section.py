@@ -9,13 +9,13 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.page import template
-from scenarios.reporting.plot_html import json_html
-from scenarios.reporting.section import Section
-from scenarios.reporting.thinned import changes_of, rows_of_curve
-from scenarios.shown_unit import unit_symbol
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.page import template
+from handover.scenarios.reporting.plot_html import json_html
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.thinned import changes_of, rows_of_curve
+from handover.scenarios.shown_unit import unit_symbol
 
 _BUDGET = 1_400_000
 """Bytes in the page for all signals, about."""

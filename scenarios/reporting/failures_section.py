@@ -7,10 +7,10 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.reporting.rows_table import Cell, rows_table
-from scenarios.reporting.runs_section import run_html
-from scenarios.reporting.section import Section
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.reporting.rows_table import Cell, rows_table
+from handover.scenarios.reporting.runs_section import run_html
+from handover.scenarios.reporting.section import Section
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 _EXAMPLES = 3

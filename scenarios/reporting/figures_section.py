@@ -6,8 +6,8 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from scenarios.experiment import Figure
-from scenarios.reporting.section import Section
+from handover.scenarios.experiment import Figure
+from handover.scenarios.reporting.section import Section
 
 
 def figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
-from cosim.linear import Linear
-from cosim.ports import Floats
-from scenarios.reporting.graph_layout import bent, places
-from scenarios.reporting.page import template
-from scenarios.reporting.plot_html import COLOURS, plot_html
-from scenarios.reporting.section import Section
+from handover.cosim.linear import Linear
+from handover.cosim.ports import Floats
+from handover.scenarios.reporting.graph_layout import bent, places
+from handover.scenarios.reporting.page import template
+from handover.scenarios.reporting.plot_html import COLOURS, plot_html
+from handover.scenarios.reporting.section import Section
 
 _MOST_UNITS = 40
 _MOST_ROWS = 1000

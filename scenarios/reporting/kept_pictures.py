@@ -8,9 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from cosim.exceptions import one_line
-from scenarios.reporting.camera_picture import CameraPicture, Mark
-from scenarios.run_folder import BadRunFolder, told_if_not_written, write_whole
+from handover.cosim.exceptions import one_line
+from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.run_folder import BadRunFolder, told_if_not_written, write_whole
 
 _TOLD = ("t", "camera", "role", "width", "height")
 

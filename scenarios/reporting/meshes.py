@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from cosim.ports import Floats
+from handover.cosim.ports import Floats
 
 
 class Mesh(NamedTuple):

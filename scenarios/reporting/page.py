@@ -12,9 +12,9 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from scenarios.reporting.section import Section
-from scenarios.reporting.tied_text import tied
-from scenarios.run_folder import write_whole
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.tied_text import tied
+from handover.scenarios.run_folder import write_whole
 
 _SCRIPT = "page.js"
 
@@ -59,7 +59,7 @@ def template(name: str) -> jinja2.Template:
 
 def asset(name: str) -> str:
     """Return the text of a file of `scenarios/reporting/page/`."""
-    return resources.files("scenarios.reporting").joinpath("page").joinpath(name).read_text(encoding="utf-8")
+    return resources.files("handover.scenarios.reporting").joinpath("page").joinpath(name).read_text(encoding="utf-8")
 
 
 @functools.lru_cache

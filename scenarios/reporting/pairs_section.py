@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
 
-from scenarios.campaign.campaign_results import CampaignResults, PointResults
-from scenarios.campaign.statistics import paired_test
-from scenarios.reporting.rows_table import Cell, rows_table
-from scenarios.reporting.section import Section
+from handover.scenarios.campaign.campaign_results import CampaignResults, PointResults
+from handover.scenarios.campaign.statistics import paired_test
+from handover.scenarios.reporting.rows_table import Cell, rows_table
+from handover.scenarios.reporting.section import Section
 
 _MOST_PAIRS = 60
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import cv2
 from markupsafe import Markup
 
-from scenarios.reporting.camera_picture import CameraPicture, Mark
-from scenarios.reporting.kept_pictures import read_pictures
-from scenarios.reporting.page import template
-from scenarios.reporting.section import Section
-from scenarios.run_folder import RunFolder
+from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.reporting.kept_pictures import read_pictures
+from handover.scenarios.reporting.page import template
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.run_folder import RunFolder
 
 _WIDTHS = (960, 800, 640, 480, 360)
 """Widths of which the greatest is taken with which all pictures have room, px."""

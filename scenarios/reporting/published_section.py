@@ -5,12 +5,12 @@ from typing import Any
 
 from markupsafe import Markup
 
-from scenarios.catalog import SCENARIOS
-from scenarios.parameters import BadParameter, parameters_of
-from scenarios.reporting.published_value import PublishedValue
-from scenarios.reporting.rows_table import rows_table
-from scenarios.reporting.section import Section
-from scenarios.reporting.told_metric import told
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.parameters import BadParameter, parameters_of
+from handover.scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.reporting.rows_table import rows_table
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.told_metric import told
 
 
 def published_section(summary: Mapping[str, Any], run: Mapping[str, Any]) -> Section | None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.paper import paper_entry
+from handover.scenarios.paper import paper_entry
 
 
 @dataclass(frozen=True, kw_only=True)

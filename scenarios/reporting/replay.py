@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from cosim.ports import Floats
-from scenarios.reporting.meshes import Mesh
+from handover.cosim.ports import Floats
+from handover.scenarios.reporting.meshes import Mesh
 
 
 @dataclass(frozen=True, kw_only=True)

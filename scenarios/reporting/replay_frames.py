@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.ports import Floats
-from scenarios.record import Record
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
 
 MOST = 240
 """Frames of a replay; the page moves bodies smoothly between them."""

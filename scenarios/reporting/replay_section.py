@@ -10,13 +10,13 @@ from markupsafe import Markup, escape
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.page import asset
-from scenarios.reporting.plot_html import json_html
-from scenarios.reporting.replay import Body, Line, Replay
-from scenarios.reporting.replay_frames import frame_rows, phase_changes
-from scenarios.reporting.section import Section
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.page import asset
+from handover.scenarios.reporting.plot_html import json_html
+from handover.scenarios.reporting.replay import Body, Line, Replay
+from handover.scenarios.reporting.replay_frames import frame_rows, phase_changes
+from handover.scenarios.reporting.section import Section
 
 _MARGIN = 0.04
 """Room around what is drawn, over its greatest side."""

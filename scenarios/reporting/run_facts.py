@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from scenarios.catalog import SCENARIOS
-from scenarios.experiment import Experiment
-from scenarios.run_folder import BadRunFolder, RunFolder
-from scenarios.told_value import told_value
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.told_value import told_value
 
 _NUMBER = (int, float)
 _FORMS: Mapping[str, Mapping[str, tuple[type, ...]]] = {

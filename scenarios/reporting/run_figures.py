@@ -5,15 +5,15 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenarios.experiment import Figure, Watch
-from scenarios.parameters import BadParameter, parameters_of
-from scenarios.record import Record
-from scenarios.recorded_signals import RecordedSignals
-from scenarios.reporting.kept_pictures import read_pictures
-from scenarios.reporting.run_facts import RunFacts
-from scenarios.reporting.run_record import record_of
-from scenarios.run_folder import BadRunFolder, RunFolder, told_if_not_written
-from scenarios.ssp_run import draw_outputs
+from handover.scenarios.experiment import Figure, Watch
+from handover.scenarios.parameters import BadParameter, parameters_of
+from handover.scenarios.record import Record
+from handover.scenarios.recorded_signals import RecordedSignals
+from handover.scenarios.reporting.kept_pictures import read_pictures
+from handover.scenarios.reporting.run_facts import RunFacts
+from handover.scenarios.reporting.run_record import record_of
+from handover.scenarios.run_folder import BadRunFolder, RunFolder, told_if_not_written
+from handover.scenarios.ssp_run import draw_outputs
 
 
 def draw_run(folder: RunFolder) -> Sequence[Figure]:

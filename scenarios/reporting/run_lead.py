@@ -2,8 +2,8 @@
 
 from markupsafe import Markup
 
-from scenarios.reporting.page import template
-from scenarios.reporting.run_facts import RunFacts
+from handover.scenarios.reporting.page import template
+from handover.scenarios.reporting.run_facts import RunFacts
 
 _VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
 

@@ -6,22 +6,22 @@ from typing import Any
 
 from markupsafe import Markup
 
-from scenarios.parameters import BadParameter, parameters_of
-from scenarios.record import Record
-from scenarios.reporting.cpu_section import cpu_section
-from scenarios.reporting.explorer_section import explorer_section
-from scenarios.reporting.graph_section import graph_section
-from scenarios.reporting.page import write_page
-from scenarios.reporting.pictures_section import pictures_section
-from scenarios.reporting.published_section import published_section
-from scenarios.reporting.replay_section import replay_section
-from scenarios.reporting.run_facts import RunFacts
-from scenarios.reporting.run_lead import run_lead
-from scenarios.reporting.run_record import record_of
-from scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
-from scenarios.reporting.section import Section
-from scenarios.reporting.time_plots_section import time_plots_section
-from scenarios.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.parameters import BadParameter, parameters_of
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.cpu_section import cpu_section
+from handover.scenarios.reporting.explorer_section import explorer_section
+from handover.scenarios.reporting.graph_section import graph_section
+from handover.scenarios.reporting.page import write_page
+from handover.scenarios.reporting.pictures_section import pictures_section
+from handover.scenarios.reporting.published_section import published_section
+from handover.scenarios.reporting.replay_section import replay_section
+from handover.scenarios.reporting.run_facts import RunFacts
+from handover.scenarios.reporting.run_lead import run_lead
+from handover.scenarios.reporting.run_record import record_of
+from handover.scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.time_plots_section import time_plots_section
+from handover.scenarios.run_folder import BadRunFolder, RunFolder
 
 
 def write_run_page(folder: RunFolder, file: Path | None = None) -> None:

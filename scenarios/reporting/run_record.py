@@ -1,8 +1,8 @@
 """The record in a run's folder, as pages and figures need it."""
 
-from cosim.exceptions import one_line
-from scenarios.record import Record
-from scenarios.run_folder import BadRunFolder, RunFolder
+from handover.cosim.exceptions import one_line
+from handover.scenarios.record import Record
+from handover.scenarios.run_folder import BadRunFolder, RunFolder
 
 
 def record_of(folder: RunFolder) -> Record | None:

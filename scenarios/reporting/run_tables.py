@@ -5,13 +5,13 @@ from typing import Any
 
 from markupsafe import Markup
 
-from scenarios.conversions import told_conversion
-from scenarios.master_rows import master_rows
-from scenarios.reporting.page import template
-from scenarios.reporting.run_facts import RunFacts
-from scenarios.reporting.section import Section
-from scenarios.reporting.told_metric import told
-from scenarios.run_folder import BadRunFolder
+from handover.scenarios.conversions import told_conversion
+from handover.scenarios.master_rows import master_rows
+from handover.scenarios.reporting.page import template
+from handover.scenarios.reporting.run_facts import RunFacts
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.told_metric import told
+from handover.scenarios.run_folder import BadRunFolder
 
 _IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")
 """Metrics that have a place in other tables."""

@@ -5,11 +5,11 @@ from typing import Any, cast
 
 from markupsafe import Markup
 
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.reporting.rows_table import rows_table
-from scenarios.reporting.section import Section
-from scenarios.shown_unit import shown_unit
-from scenarios.told_value import told_value
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.reporting.rows_table import rows_table
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.shown_unit import shown_unit
+from handover.scenarios.told_value import told_value
 
 
 def setting_section(results: CampaignResults) -> Section:

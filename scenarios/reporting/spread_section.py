@@ -7,13 +7,13 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from cosim.ports import Floats
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.point_layout import PointLayout
-from scenarios.reporting.plot_html import json_html, plot_html
-from scenarios.reporting.section import Section
-from scenarios.reporting.success_section import place_axis, plot_height
-from scenarios.shown_unit import shown_unit
+from handover.cosim.ports import Floats
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.point_layout import PointLayout
+from handover.scenarios.reporting.plot_html import json_html, plot_html
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.success_section import place_axis, plot_height
+from handover.scenarios.shown_unit import shown_unit
 
 _SUCCESS, _OTHER = "circle", "x-thin"
 _ENDED = {True: "succeeded", False: "failed", None: "not done"}

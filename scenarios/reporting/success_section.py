@@ -6,10 +6,10 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.point_layout import PointLayout
-from scenarios.reporting.plot_html import plot_html
-from scenarios.reporting.section import Section
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.point_layout import PointLayout
+from handover.scenarios.reporting.plot_html import plot_html
+from handover.scenarios.reporting.section import Section
 
 _A_SCREEN = 15
 """Points of a list; the values of a longer one stand at its top."""

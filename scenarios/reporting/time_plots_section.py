@@ -8,12 +8,12 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.plot_html import COLOURS, plot_html
-from scenarios.reporting.section import Section
-from scenarios.reporting.thinned import changes_of, rows_of_curve, rows_of_steps
-from scenarios.reporting.time_plot import Curve, Level, TimePlot
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.plot_html import COLOURS, plot_html
+from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.thinned import changes_of, rows_of_curve, rows_of_steps
+from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 TIME_AXIS = "time (s)"
 _MOST = 900

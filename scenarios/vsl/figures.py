@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.ports import Floats
-from scenarios.experiment import Figure
-from scenarios.plotting import COLOURS, figure, shade_phases
-from scenarios.record import Record
-from scenarios.vsl.parameters import Parameters
-from scenarios.vsl.path_point import distance
-from scenarios.vsl.plots import BY_SERVOS, errors
-from scenarios.vsl.watch import PathWatch
+from handover.cosim.ports import Floats
+from handover.scenarios.experiment import Figure
+from handover.scenarios.plotting import COLOURS, figure, shade_phases
+from handover.scenarios.record import Record
+from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.path_point import distance
+from handover.scenarios.vsl.plots import BY_SERVOS, errors
+from handover.scenarios.vsl.watch import PathWatch
 
 _SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[5]
 _ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})

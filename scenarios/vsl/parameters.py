@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.trajectory_planner import Elbow, Path
-from controllers.vsl_kinematics import place
-from controllers.vsl_path import segments_of
-from cosim.ports import Floats, Vector3, parameter
-from cosim.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
-from plants.vsl_parameters import HIGHEST_PRESSURE, Link, Motion
+from handover.controllers.trajectory_planner import Elbow, Path
+from handover.controllers.vsl_kinematics import place
+from handover.controllers.vsl_path import segments_of
+from handover.cosim.ports import Floats, Vector3, parameter
+from handover.cosim.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
+from handover.plants.vsl_parameters import HIGHEST_PRESSURE, Link, Motion
 
 
 @dataclass(frozen=True, kw_only=True)

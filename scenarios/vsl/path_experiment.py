@@ -7,17 +7,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cosim.system import System
-from scenarios.experiment import Experiment, Figure, FmuOf
-from scenarios.parameters import BadParameter
-from scenarios.record import Record
-from scenarios.reporting.replay import Replay
-from scenarios.reporting.time_plot import TimePlot
-from scenarios.vsl.figures import draw_path_run
-from scenarios.vsl.parameters import Parameters
-from scenarios.vsl.plots import plot_path_run
-from scenarios.vsl.replay import replay_path
-from scenarios.vsl.watch import PathWatch
+from handover.cosim.system import System
+from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.replay import Replay
+from handover.scenarios.reporting.time_plot import TimePlot
+from handover.scenarios.vsl.figures import draw_path_run
+from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.plots import plot_path_run
+from handover.scenarios.vsl.replay import replay_path
+from handover.scenarios.vsl.watch import PathWatch
 
 _MORE = 5
 """Time after which a path that should have been completed is given up, s (assumed)."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.ports import Floats
-from cosim.signals import Signals
+from handover.cosim.ports import Floats
+from handover.cosim.signals import Signals
 
 
 @dataclass(frozen=True)

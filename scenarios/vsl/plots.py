@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, Level, TimePlot
-from scenarios.vsl.parameters import Parameters
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
+from handover.scenarios.vsl.parameters import Parameters
 
 BY_SERVOS = "tip by the servos, links taken as rigid"
 _BAR = 1e5  # Pa

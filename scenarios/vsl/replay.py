@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from controllers.vsl_path import segments_of
-from cosim.ports import Floats
-from plants.vsl_parameters import Params as ArmParams
-from scenarios.record import Record
-from scenarios.reporting.meshes import ball, prism
-from scenarios.reporting.replay import Body, Line, Replay
-from scenarios.vsl.parameters import Parameters
+from handover.controllers.vsl_path import segments_of
+from handover.cosim.ports import Floats
+from handover.plants.vsl_parameters import Params as ArmParams
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.meshes import ball, prism
+from handover.scenarios.reporting.replay import Body, Line, Replay
+from handover.scenarios.vsl.parameters import Parameters
 
 _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
 _DESIRED, _WAY, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any, ClassVar
 
-from scenarios.vsl.parameters import HybridParameters
-from scenarios.vsl.path_experiment import PathExperiment
+from handover.scenarios.vsl.parameters import HybridParameters
+from handover.scenarios.vsl.path_experiment import PathExperiment
 
 
 class VslHybrid(PathExperiment):

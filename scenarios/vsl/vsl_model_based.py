@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from scenarios.vsl.parameters import Parameters
-from scenarios.vsl.path_experiment import PathExperiment
+from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.path_experiment import PathExperiment
 
 
 class VslModelBased(PathExperiment):

@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cosim.ports import Floats
-from cosim.signals import Signals
-from scenarios.experiment import Metric, Outcome, Watch
-from scenarios.vsl.parameters import Parameters
-from scenarios.vsl.path_point import PathPoint, distance, distance_to_path
+from handover.cosim.ports import Floats
+from handover.cosim.signals import Signals
+from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.path_point import PathPoint, distance, distance_to_path
 
 _REACH_SPAN = 0.01
 """Paths that reach equally far throughout, to this many metres, have no near and far part (assumed)."""

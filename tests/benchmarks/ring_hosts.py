@@ -42,10 +42,10 @@ def handover(
     n: int, fmu: Path, folder: Path, recorded: bool = False, compiled: bool = True
 ) -> Generator[Ring, None, None]:
     """Give a ring in our master."""
-    from cosim.master import Master
-    from cosim.master_options import Algorithm, MasterOptions
-    from cosim.record.recorder import Recorder
-    from cosim.system import System
+    from handover.cosim.master import Master
+    from handover.cosim.master_options import Algorithm, MasterOptions
+    from handover.cosim.record.recorder import Recorder
+    from handover.cosim.system import System
 
     system = System()
     units = [system.add(f"u{i}", fmu, period=H) for i in range(n)]

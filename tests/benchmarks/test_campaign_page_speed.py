@@ -12,12 +12,12 @@ import pyarrow.parquet as pq
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.run_row import RunRow
-from scenarios.campaign.table_writer import table_of
-from scenarios.experiment import Metric
-from scenarios.reporting.campaign_page import write_campaign_page
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.run_row import RunRow
+from handover.scenarios.campaign.table_writer import table_of
+from handover.scenarios.experiment import Metric
+from handover.scenarios.reporting.campaign_page import write_campaign_page
 
 pytestmark = pytest.mark.slow
 

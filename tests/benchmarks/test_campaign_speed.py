@@ -18,12 +18,12 @@ import psutil
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from cosim.master_options import MasterOptions
-from fmus.build import cached
-from scenarios.campaign.crew import Crew
-from scenarios.campaign.dask_crew import embedded_crew
-from scenarios.campaign.run_order import RunOrder
-from scenarios.catalog import SCENARIOS
+from handover.cosim.master_options import MasterOptions
+from handover.fmus.build import cached
+from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.dask_crew import embedded_crew
+from handover.scenarios.campaign.run_order import RunOrder
+from handover.scenarios.catalog import SCENARIOS
 
 pytestmark = pytest.mark.slow
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.signals import Signals
-from fmus.build import cached
-from scenarios.catalog import SCENARIOS
-from scenarios.experiment import Experiment
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.signals import Signals
+from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment import Experiment
 
 SEED = 0
 

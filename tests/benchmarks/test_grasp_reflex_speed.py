@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from cosim.master import Master
-from cosim.signals import Signals
-from fmus.build import cached
-from plants.grasp_objects import Thing
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.ir_grasp.parameters import Parameters
+from handover.cosim.master import Master
+from handover.cosim.signals import Signals
+from handover.fmus.build import cached
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
 
 SEED = 0
 

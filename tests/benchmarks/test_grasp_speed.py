@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from plants.grasp_objects import Thing
-from plants.grasp_parameters import Params
-from plants.grasp_scene import GraspScene, Inputs
+from handover.plants.grasp_objects import Thing
+from handover.plants.grasp_parameters import Params
+from handover.plants.grasp_scene import GraspScene, Inputs
 
 STEP, SECONDS = 0.015, 6.0
 

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from cosim.master import Master
-from cosim.schedule import Schedule
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.schedule import Schedule
+from handover.cosim.system import System
 
 pytestmark = [
     pytest.mark.slow,

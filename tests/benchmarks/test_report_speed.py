@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from scenarios.reporting.run_page import write_run_page
-from scenarios.run_folder import RunFolder
+from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.run_folder import RunFolder
 
 pytestmark = pytest.mark.slow
 

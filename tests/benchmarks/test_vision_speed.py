@@ -10,12 +10,12 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.spatial.transform import Rotation
 
-from controllers.handover_vision import HandoverVision, Outputs, Params
-from controllers.handover_vision import Inputs as Pictures
-from cosim.geometry import quaternion_of
-from cosim.ports import Floats
-from plants.stereo_camera import Inputs, StereoCamera
-from plants.stereo_camera import Params as CameraParams
+from handover.controllers.handover_vision import HandoverVision, Outputs, Params
+from handover.controllers.handover_vision import Inputs as Pictures
+from handover.cosim.geometry import quaternion_of
+from handover.cosim.ports import Floats
+from handover.plants.stereo_camera import Inputs, StereoCamera
+from handover.plants.stereo_camera import Params as CameraParams
 
 R_WB = np.diag([1.0, -1.0, -1.0])
 NAMES = ("ball", "wrist", "gripper")

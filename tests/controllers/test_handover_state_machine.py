@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controllers.flyer_behaviour import Behaviour
-from controllers.flyer_velocity_monitor import VelocityMonitor
-from controllers.handover_state_machine import (
+from handover.controllers.flyer_behaviour import Behaviour
+from handover.controllers.flyer_velocity_monitor import VelocityMonitor
+from handover.controllers.handover_state_machine import (
     HandoverPhase,
     HandoverStateMachine,
     HandoverTask,
@@ -19,8 +19,8 @@ from controllers.handover_state_machine import (
     Params,
     UnusableHandover,
 )
-from cosim.block_description import describe
-from cosim.ports import Floats
+from handover.cosim.block_description import describe
+from handover.cosim.ports import Floats
 
 P = HandoverPhase
 T = 0.016

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controllers.handover_vision import HandoverVision, Inputs, Outputs, Params
-from cosim.block_description import describe
-from cosim.geometry import quaternion_of
-from cosim.pinhole import UnusableCalibration
-from cosim.ports import BLACK_1280X720, Floats
-from plants.stereo_camera import Inputs as Scene
-from plants.stereo_camera import Params as CameraParams
-from plants.stereo_camera import StereoCamera
+from handover.controllers.handover_vision import HandoverVision, Inputs, Outputs, Params
+from handover.cosim.block_description import describe
+from handover.cosim.geometry import quaternion_of
+from handover.cosim.pinhole import UnusableCalibration
+from handover.cosim.ports import BLACK_1280X720, Floats
+from handover.plants.stereo_camera import Inputs as Scene
+from handover.plants.stereo_camera import Params as CameraParams
+from handover.plants.stereo_camera import StereoCamera
 
 R_WB = np.diag([1.0, -1.0, -1.0])
 PLACES = {"front": 0.0, "front-left": 45.0, "left": 90.0, "back-left": 135.0}  # deg from +x to +y

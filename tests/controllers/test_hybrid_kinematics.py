@@ -5,10 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.hybrid_kinematics import Elbow, HybridKinematics, Inputs, Method, Outputs, Params, UnusableModel
-from controllers.vsl_default_model import DEFAULT_MODEL
-from controllers.vsl_kinematics import VslKinematics
-from controllers.vsl_model_text import parse_model
+from handover.controllers.hybrid_kinematics import (
+    Elbow,
+    HybridKinematics,
+    Inputs,
+    Method,
+    Outputs,
+    Params,
+    UnusableModel,
+)
+from handover.controllers.vsl_default_model import DEFAULT_MODEL
+from handover.controllers.vsl_kinematics import VslKinematics
+from handover.controllers.vsl_model_text import parse_model
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 MODEL = parse_model(DEFAULT_MODEL, "that ships")

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controllers.flyer_behaviour import Behaviour
-from controllers.flyer_rotation import UnusableOrientation
-from controllers.flyer_stability import UnusableController
-from controllers.impedance_controller import ImpedanceController, Inputs, Outputs, Params
-from cosim.block_description import describe
-from cosim.geometry import quaternion_of, rotation_of
-from cosim.ports import Floats
+from handover.controllers.flyer_behaviour import Behaviour
+from handover.controllers.flyer_rotation import UnusableOrientation
+from handover.controllers.flyer_stability import UnusableController
+from handover.controllers.impedance_controller import ImpedanceController, Inputs, Outputs, Params
+from handover.cosim.block_description import describe
+from handover.cosim.geometry import quaternion_of, rotation_of
+from handover.cosim.ports import Floats
 
 control: Any = untyped_control
 T = 0.016

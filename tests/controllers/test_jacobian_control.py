@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.constant_curvature import forward_kinematics
-from controllers.jacobian_control import ControlStep, Limits, blend, control_step, keep_limits
-from cosim.ports import Floats
+from handover.controllers.constant_curvature import forward_kinematics
+from handover.controllers.jacobian_control import ControlStep, Limits, blend, control_step, keep_limits
+from handover.cosim.ports import Floats
 
 D_GRIPPER = 0.10
 LIMITS = Limits(

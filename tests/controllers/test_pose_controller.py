@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controllers.flyer_profile import Bounds, profile_between
-from controllers.flyer_stability import UnusableController
-from controllers.pose_controller import Inputs, Outputs, Params, PoseController
-from cosim.block_description import describe
-from cosim.geometry import rotation_of
-from cosim.ports import Floats
-from plants.free_flyer import FreeFlyer
-from plants.free_flyer import Inputs as FlyerInputs
-from plants.free_flyer import Params as FlyerParams
-from plants.thrusters import Inputs as ThrusterInputs
-from plants.thrusters import Params as ThrusterParams
-from plants.thrusters import Thrusters
+from handover.controllers.flyer_profile import Bounds, profile_between
+from handover.controllers.flyer_stability import UnusableController
+from handover.controllers.pose_controller import Inputs, Outputs, Params, PoseController
+from handover.cosim.block_description import describe
+from handover.cosim.geometry import rotation_of
+from handover.cosim.ports import Floats
+from handover.plants.free_flyer import FreeFlyer
+from handover.plants.free_flyer import Inputs as FlyerInputs
+from handover.plants.free_flyer import Params as FlyerParams
+from handover.plants.thrusters import Inputs as ThrusterInputs
+from handover.plants.thrusters import Params as ThrusterParams
+from handover.plants.thrusters import Thrusters
 
 T = 0.016
 MASS, INERTIA = 9.584, np.array([0.1534, 0.1427, 0.1623])

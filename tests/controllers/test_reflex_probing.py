@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from controllers.reflex_move import Move
-from controllers.reflex_probing import Probing
+from handover.controllers.reflex_move import Move
+from handover.controllers.reflex_probing import Probing
 
 SIZES = (0.004, 0.004, 0.04, 0.03)
 

@@ -1,13 +1,13 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from controllers.marker_reader import Markers
-from controllers.marker_ring import MarkerRing
-from controllers.normal_equations import covariance
-from controllers.ring_fit import RingFit
-from cosim.geometry import looking_at, quaternion_of
-from cosim.pinhole import Pinhole
-from cosim.ports import Floats
+from handover.controllers.marker_reader import Markers
+from handover.controllers.marker_ring import MarkerRing
+from handover.controllers.normal_equations import covariance
+from handover.controllers.ring_fit import RingFit
+from handover.cosim.geometry import looking_at, quaternion_of
+from handover.cosim.pinhole import Pinhole
+from handover.cosim.ports import Floats
 
 RING = MarkerRing(0.034, 0.020)
 R_WB = np.diag([1.0, -1.0, -1.0])

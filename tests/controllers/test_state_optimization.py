@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
-from controllers.constant_curvature import forward_kinematics, linearise
-from controllers.state_optimization import StateEstimate, optimise_state
-from cosim.ports import Floats
+from handover.controllers.constant_curvature import forward_kinematics, linearise
+from handover.controllers.state_optimization import StateEstimate, optimise_state
+from handover.cosim.ports import Floats
 
 D_GRIPPER = 0.10
 A_POSE = np.repeat([1.0, 1.05, 1.1], 3)

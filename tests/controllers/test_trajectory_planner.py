@@ -5,10 +5,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.trajectory_planner import Elbow, Inputs, Outputs, Params, Path, TrajectoryPlanner, UnusablePath
-from controllers.vsl_kinematics import VslKinematics
-from controllers.vsl_path import Line, QuarterArc
-from cosim.ports import Floats
+from handover.controllers.trajectory_planner import (
+    Elbow,
+    Inputs,
+    Outputs,
+    Params,
+    Path,
+    TrajectoryPlanner,
+    UnusablePath,
+)
+from handover.controllers.vsl_kinematics import VslKinematics
+from handover.controllers.vsl_path import Line, QuarterArc
+from handover.cosim.ports import Floats
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 DT = 0.02

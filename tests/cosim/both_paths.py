@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from cosim.exceptions import UnitFailure
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.plan.plan_stepper import PlanStepper
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
-from cosim.system import System
-from cosim.variable import Kind
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.plan.plan_stepper import PlanStepper
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
+from handover.cosim.variable import Kind
 
 Build = Callable[[], System]
 

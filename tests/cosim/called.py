@@ -4,8 +4,8 @@ from pathlib import Path
 
 from native_units import native_fmu
 
-from cosim.heartbeat import Heartbeat
-from cosim.system import System
+from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.system import System
 
 
 class Called(Heartbeat):

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from native_units import native_fmu
 
-from cosim.checkpoint import read_checkpoint
-from cosim.checkpointer import Checkpointer
-from cosim.from_then_on import FromThenOn
-from cosim.master import Master
-from cosim.observer import Observer
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.checkpoint import read_checkpoint
+from handover.cosim.checkpointer import Checkpointer
+from handover.cosim.from_then_on import FromThenOn
+from handover.cosim.master import Master
+from handover.cosim.observer import Observer
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 STOP, EVERY = Fraction(20), Fraction(7, 2)
 PASSED = 10.0

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_block
+from handover.fmus.build import build_block
 
 sys.path.insert(0, str(Path(__file__).parent))  # the modules beside the tests
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import fmpy
 
-from fmus.compile import TARGETS, host_platform, zig_cc
+from handover.fmus.compile import TARGETS, host_platform, zig_cc
 
 MODES: tuple[str, ...] = (
     "sound",

@@ -16,8 +16,8 @@ import fmpy
 from native_declaration import Declaration, read_declarations
 from native_description import description2, description3
 
-from cosim.fmpy_edge import library_path
-from fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
+from handover.cosim.fmpy_edge import library_path
+from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 
 SOURCES = Path(__file__).with_name("native")
 HEADERS = Path(fmpy.__file__).parent / "c-code"

@@ -9,10 +9,10 @@ from native_units import native_fmu
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 STATES = ("a.x", "a.v", "b.x", "b.v")
 

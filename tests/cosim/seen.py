@@ -2,10 +2,10 @@
 
 from fractions import Fraction
 
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 Rows = dict[float, tuple[float, ...]]
 

@@ -8,17 +8,17 @@ import pytest
 from native_units import native_fmu
 from oscillator import PLAIN, STATES, STIFF
 
-from cosim.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
-from cosim.exceptions import BadOptions, ScheduleError
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.adaptive_stepper import AdaptiveStepper
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.stepping.step_statistics import StepStatistics
-from cosim.stepping.step_too_small import StepTooSmall
-from cosim.system import System
+from handover.cosim.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
+from handover.cosim.exceptions import BadOptions, ScheduleError
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.step_statistics import StepStatistics
+from handover.cosim.stepping.step_too_small import StepTooSmall
+from handover.cosim.system import System
 
 H = Fraction(1, 100)
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from native_units import native_fmu
 
-from cosim.algebraic_loop import algebraic_loops
-from cosim.exceptions import ScheduleError, UnitRefused
-from cosim.iterating.chained_derivatives import ChainedDerivatives
-from cosim.iterating.magnitudes import Floats
-from cosim.iterating.not_converged import NotConverged
-from cosim.linear import Linear
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.schedule import Schedule
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.algebraic_loop import algebraic_loops
+from handover.cosim.exceptions import ScheduleError, UnitRefused
+from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
+from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.iterating.not_converged import NotConverged
+from handover.cosim.linear import Linear
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.schedule import Schedule
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 CIRCLE = (-2.0, 0.5, 3.0)
 every = pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT, Algorithm.NEWTON])

@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from cosim.events.event_instance import EventInstance
-from cosim.exceptions import WiringError
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.events.event_instance import EventInstance
+from handover.cosim.exceptions import WiringError
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 DATA = b"\x00\xff" + bytes(range(100))

@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from cosim.block_description import describe
-from cosim.declared_fields import DeclarationError, declared_variables
-from cosim.ports import BLACK_1280X720, Int8, Picture1280x720, Single, UInt64, Vector3, output, parameter, port
-from cosim.units import Metre, Newton
-from cosim.variable import Causality, Kind, Variable
-from cosim.width import Width
+from handover.cosim.block_description import describe
+from handover.cosim.declared_fields import DeclarationError, declared_variables
+from handover.cosim.ports import BLACK_1280X720, Int8, Picture1280x720, Single, UInt64, Vector3, output, parameter, port
+from handover.cosim.units import Metre, Newton
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.width import Width
 
 
 class Phase(enum.IntEnum):

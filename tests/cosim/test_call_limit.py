@@ -10,15 +10,15 @@ from called import Called, fed_by
 from endless_blocks import GO_ON
 from native_units import native_fmu
 
-from cosim.failures import UnitHung
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.system import System
-from fmus.build import build_block
-from scenarios.record import Record
+from handover.cosim.failures import UnitHung
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.system import System
+from handover.fmus.build import build_block
+from handover.scenarios.record import Record
 
 LIMIT = 1.0  # s: a unit in Python may take a while to be loaded beside other tests
 

@@ -8,10 +8,10 @@ import pytest
 from called import Called
 from checkpointed import oscillator
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.extrapolation import Extrapolation
 
 START = {
     2: ["Instantiate", "SetupExperiment", "EnterInitializationMode", "ExitInitializationMode"],

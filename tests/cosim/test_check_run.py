@@ -7,13 +7,13 @@ import decay
 import fmpy
 import pytest
 
-from cosim.check.check_fmu import check_fmu
-from cosim.check.check_report import CheckReport
-from cosim.check.finding import Level
-from cosim.check.load_probe import load_fault
-from cosim.exceptions import InvalidFmu
-from cosim.fmpy_edge import unpack
-from fmus.compile import host_platform
+from handover.cosim.check.check_fmu import check_fmu
+from handover.cosim.check.check_report import CheckReport
+from handover.cosim.check.finding import Level
+from handover.cosim.check.load_probe import load_fault
+from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmpy_edge import unpack
+from handover.fmus.compile import host_platform
 
 pytestmark = pytest.mark.skipif(not host_platform().endswith("linux"), reason="signals and messages of Linux")
 

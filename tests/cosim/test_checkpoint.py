@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from native_units import native_fmu
 
-from cosim.checkpoint import (
+from handover.cosim.checkpoint import (
     BadCheckpoint,
     Checkpoint,
     StateNotSaved,
@@ -23,16 +23,16 @@ from cosim.checkpoint import (
     take_checkpoint,
     write_checkpoint,
 )
-from cosim.from_then_on import FromThenOn
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.record.complete_record import complete_record
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.system import System
-from scenarios.record import Record
+from handover.cosim.from_then_on import FromThenOn
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.record.complete_record import complete_record
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.system import System
+from handover.scenarios.record import Record
 
 
 def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path: Path):

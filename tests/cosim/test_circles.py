@@ -8,13 +8,13 @@ import pytest
 from native_units import native_fmu
 from two_masses import TwoMasses
 
-from cosim.exceptions import ScheduleError
-from cosim.instance import Instance
-from cosim.iterating.not_converged import NotConverged
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.observer import Observer
-from cosim.system import System
+from handover.cosim.exceptions import ScheduleError
+from handover.cosim.instance import Instance
+from handover.cosim.iterating.not_converged import NotConverged
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.observer import Observer
+from handover.cosim.system import System
 
 both = pytest.mark.parametrize("algorithm", [Algorithm.FIXED_POINT, Algorithm.NEWTON])
 PERIOD = Fraction(1, 10)

@@ -6,9 +6,9 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.exceptions import UnitRefused
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.system import System
+from handover.cosim.exceptions import UnitRefused
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 TENTH = Fraction(1, 10)

@@ -7,9 +7,9 @@ from fractions import Fraction
 import pytest
 from oscillator import PLAIN
 
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.system import System
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.system import System
 
 HOLD, LINEAR = Extrapolation.HOLD, Extrapolation.LINEAR
 

@@ -6,11 +6,11 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.events.event_failures import StepDiscarded
-from cosim.exceptions import UnitFailure
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.system import System
+from handover.cosim.events.event_failures import StepDiscarded
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 REPEATING = MasterOptions(repeat_discarded=True)

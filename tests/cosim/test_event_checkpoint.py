@@ -7,11 +7,11 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from cosim.checkpoint import Checkpoint, take_checkpoint
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.checkpoint import Checkpoint, take_checkpoint
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 Row = tuple[float, ...]

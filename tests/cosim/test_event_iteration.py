@@ -6,11 +6,11 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.events.event_failures import UnsettledEvents
-from cosim.events.event_iteration import MOST_ITERATIONS
-from cosim.failures import UnitEnded
-from cosim.master import Master
-from cosim.system import System
+from handover.cosim.events.event_failures import UnsettledEvents
+from handover.cosim.events.event_iteration import MOST_ITERATIONS
+from handover.cosim.failures import UnitEnded
+from handover.cosim.master import Master
+from handover.cosim.system import System
 
 
 def followers(most: int) -> System:

@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 from native_units import native_fmu
 
-from cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
-from cosim.fmu_description import describe_fmu
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.ssp.writing import write_ssp
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.system import PortName, System
+from handover.cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
+from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.system import PortName, System
 
 
 def faults_of(s: System) -> tuple[str, ...]:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cosim.archive_faults import archive_faults
-from cosim.exceptions import InvalidFmu
-from cosim.fmu_archive import FmuArchive
+from handover.cosim.archive_faults import archive_faults
+from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmu_archive import FmuArchive
 
 PLAIN = {"modelDescription.xml": b"<fmiModelDescription/>" * 20, "resources/table.csv": b"1,2,3\n" * 100}
 

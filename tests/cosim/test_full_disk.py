@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from native_units import native_fmu
 
-from cosim.exceptions import RecordNotWritten
-from cosim.master import Master
-from cosim.record.record_stream import RecordStream
-from cosim.record.recorder import Recorder
-from cosim.system import System
-from scenarios.record import Record
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.master import Master
+from handover.cosim.record.record_stream import RecordStream
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.system import System
+from handover.scenarios.record import Record
 
 
 def test_a_run_goes_on_where_the_disk_was_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

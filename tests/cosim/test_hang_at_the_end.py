@@ -8,9 +8,9 @@ import pytest
 from called import Called, fed_by
 from native_units import native_fmu
 
-from cosim.failures import UnitHung
-from cosim.master import Master
-from cosim.master_options import MasterOptions
+from handover.cosim.failures import UnitHung
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
 
 
 class Stuck(Called):

@@ -8,8 +8,8 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.system import System
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 G, E = 9.81, 0.7

@@ -4,10 +4,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cosim.iterating.fixed_point import FixedPoint
-from cosim.iterating.interface_newton import InterfaceNewton
-from cosim.iterating.interface_solver import InterfaceSolver, Unsolved
-from cosim.iterating.magnitudes import Floats, Magnitudes
+from handover.cosim.iterating.fixed_point import FixedPoint
+from handover.cosim.iterating.interface_newton import InterfaceNewton
+from handover.cosim.iterating.interface_solver import InterfaceSolver, Unsolved
+from handover.cosim.iterating.magnitudes import Floats, Magnitudes
 
 Make = Callable[..., InterfaceSolver]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from two_masses import SIGNALS, Floats, TwoMasses
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.system import System
 
 STIFF, SOFT = TwoMasses(k_c=4000.0, d_c=8.0), TwoMasses(k_c=2.0)
 PERIOD = Fraction(1, 10)

@@ -9,9 +9,9 @@ from click.testing import CliRunner, Result
 from native_units import native_fmu
 from two_masses import TwoMasses
 
-from cosim.ssp.writing import write_ssp
-from cosim.system import System
-from scenarios.command import main
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system import System
+from handover.scenarios.command import main
 
 
 @pytest.fixture(scope="module")

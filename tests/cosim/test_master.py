@@ -9,13 +9,13 @@ import fmpy
 import numpy as np
 import pytest
 
-from cosim.exceptions import BadOptions, InvalidFmu, UnitFailure, UnitRefused, WiringError
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.record.recorder import Recorder
-from cosim.signals import Signals
-from cosim.system import System
-from scenarios.record import Record
+from handover.cosim.exceptions import BadOptions, InvalidFmu, UnitFailure, UnitRefused, WiringError
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
+from handover.scenarios.record import Record
 
 FmuOf = Callable[..., Path]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest
 
 
 @pytest.mark.parametrize(

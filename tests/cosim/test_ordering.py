@@ -1,4 +1,4 @@
-from cosim.ordering import ordered, strongly_connected
+from handover.cosim.ordering import ordered, strongly_connected
 
 
 class Told:

@@ -5,11 +5,11 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from cosim.exceptions import BadOptions
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.stepping.pacing import Pacer, PaceReport
-from cosim.system import System
+from handover.cosim.exceptions import BadOptions
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.pacing import Pacer, PaceReport
+from handover.cosim.system import System
 
 
 class Clock:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cosim.stepping.pi_controller import PiController
+from handover.cosim.stepping.pi_controller import PiController
 
 
 @pytest.mark.parametrize("power", [2, 3])

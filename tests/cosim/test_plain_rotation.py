@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cosim.plain_rotation import Quaternion, cross, inverse, norm, product, rows, triple, turned, turned_back
-from cosim.ports import Floats
+from handover.cosim.plain_rotation import Quaternion, cross, inverse, norm, product, rows, triple, turned, turned_back
+from handover.cosim.ports import Floats
 
 
 def scalars(q: Floats) -> Quaternion:

@@ -7,14 +7,14 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.native_libraries import CompilationError
-from cosim.plan import choice, memory
-from cosim.plan.plan_stepper import PlanStepper
-from cosim.stepping.extrapolation import Extrapolation
-from cosim.stepping.grid_stepper import GridStepper
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.native_libraries import CompilationError
+from handover.cosim.plan import choice, memory
+from handover.cosim.plan.plan_stepper import PlanStepper
+from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.grid_stepper import GridStepper
+from handover.cosim.system import System
 
 
 def build(period: Fraction = Fraction(1, 10)) -> System:
@@ -24,14 +24,14 @@ def build(period: Fraction = Fraction(1, 10)) -> System:
 
 
 def told(options: MasterOptions, caplog: pytest.LogCaptureFixture, period: Fraction = Fraction(1, 10)) -> list[str]:
-    with caplog.at_level(logging.INFO, "cosim.plan"), Master(build(period), options) as master:
+    with caplog.at_level(logging.INFO, "handover.cosim.plan"), Master(build(period), options) as master:
         assert isinstance(master.stepper, GridStepper)
         master.run(Fraction(1))
     return [r.getMessage() for r in caplog.records]
 
 
 def test_a_plain_system_is_compiled(caplog: pytest.LogCaptureFixture):
-    with caplog.at_level(logging.INFO, "cosim.plan"), Master(build()) as master:
+    with caplog.at_level(logging.INFO, "handover.cosim.plan"), Master(build()) as master:
         assert isinstance(master.stepper, PlanStepper)
     assert caplog.records == []
 
@@ -55,7 +55,7 @@ def test_a_loop_that_is_gone_over_again(caplog: pytest.LogCaptureFixture):
     a, b = s.add("a", native_fmu("gain", 2), a=0.5), s.add("b", native_fmu("gain", 3), a=0.5, b=1.0)
     s.connect(a.y.y, b.u.u)
     s.connect(b.y.y, a.u.u)
-    with caplog.at_level(logging.INFO, "cosim.plan"), Master(s) as master:
+    with caplog.at_level(logging.INFO, "handover.cosim.plan"), Master(s) as master:
         assert isinstance(master.stepper, GridStepper)
     assert [r.getMessage() for r in caplog.records] == ["no compiled plan: units make a loop"]
     with Master(s, MasterOptions(algorithm=Algorithm.JACOBI)) as master:

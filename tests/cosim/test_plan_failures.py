@@ -9,10 +9,10 @@ from both_paths import PLAIN, expect_alike, recorded
 from fmu_of import FmuOf
 from native_units import native_fmu
 
-from cosim.exceptions import UnitFailure
-from cosim.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
-from cosim.master_options import Algorithm
-from cosim.system import System
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
+from handover.cosim.master_options import Algorithm
+from handover.cosim.system import System
 
 
 @pytest.mark.parametrize("algorithm", PLAIN)

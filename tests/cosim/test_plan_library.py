@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from cosim.native_libraries import TARGETS, CompilationError, NativeLibraries, host_platform, zig_cc
-from cosim.plan import compile as plan_compile
-from cosim.plan.compile import FOLDER, SOURCES, plan_library
+from handover.cosim.native_libraries import TARGETS, CompilationError, NativeLibraries, host_platform, zig_cc
+from handover.cosim.plan import compile as plan_compile
+from handover.cosim.plan.compile import FOLDER, SOURCES, plan_library
 
 
 def libraries(folder: Path) -> NativeLibraries:

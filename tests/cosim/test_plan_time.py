@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from cosim.plan.memory import loop
+from handover.cosim.plan.memory import loop
 
 WIDEST = 2**63 - 1
 

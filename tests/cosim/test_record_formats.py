@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from signals_of import signals_of
 
-from cosim.record.recorder import Recorder
-from cosim.units import Unit
-from cosim.variable import Kind
-from scenarios.record import Record
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.units import Unit
+from handover.cosim.variable import Kind
+from handover.scenarios.record import Record
 
 ROWS = 700
 

@@ -8,7 +8,7 @@ PROGRAM = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from cosim.record.recorder import Recorder
+from handover.cosim.record.recorder import Recorder
 from signals_of import signals_of
 
 def record(name, rows):

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from signals_of import signals_of
 
-from cosim.exceptions import RecordNotWritten
-from cosim.record.complete_record import complete_record
-from cosim.record.file_lock import FileLocked
-from cosim.record.recorder import Recorder
-from scenarios.record import Record
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.record.complete_record import complete_record
+from handover.cosim.record.file_lock import FileLocked
+from handover.cosim.record.recorder import Recorder
+from handover.scenarios.record import Record
 
 FmuOf = Callable[..., Path]
 
@@ -26,9 +26,9 @@ def test_every_row_of_a_killed_process_is_recovered(fmu: FmuOf, tmp_path: Path, 
 import os, signal
 from fractions import Fraction
 from pathlib import Path
-from cosim.master import Master
-from cosim.record.recorder import Recorder
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.system import System
 s = System()
 s.add("counter", Path({str(fmu("Counter"))!r}))
 with Master(s) as master, Recorder(Path({str(file)!r}), ["csv"]) as recorder:

@@ -1,4 +1,4 @@
-from cosim.refusal import Refusal
+from handover.cosim.refusal import Refusal
 
 
 class Hot(Refusal):

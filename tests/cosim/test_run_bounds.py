@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from native_units import native_fmu
 
-from cosim.exceptions import UnitFailure
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.record.recorder import Recorder
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.system import System
-from scenarios.record import Record
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.system import System
+from handover.scenarios.record import Record
 
 OPTIONS = {
     "plan": MasterOptions(),

@@ -8,12 +8,12 @@ import pytest
 from called import Called
 from native_units import native_fmu
 
-from cosim.exceptions import UnitFailure
-from cosim.instance import Instance
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.stepping.adaptive_step import AdaptiveStep
-from cosim.system import System
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.instance import Instance
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.system import System
 
 OPTIONS = {
     "newton": MasterOptions(algorithm=Algorithm.NEWTON),

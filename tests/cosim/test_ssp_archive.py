@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ssp_of import component, described, pack_ssp, system
 
-from cosim.exceptions import InvalidSsp
-from cosim.ssp.ssp_file import SspFile
+from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.ssp.ssp_file import SspFile
 
 SOUND = described(system(component("a")))
 

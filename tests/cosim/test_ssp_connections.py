@@ -8,9 +8,9 @@ import decay
 import pytest
 from ssp_of import MM, component, connection, connectors, described, pack_ssp, system
 
-from cosim.exceptions import InvalidSsp
-from cosim.linear import Linear
-from cosim.ssp.ssp_file import SspFile
+from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.linear import Linear
+from handover.cosim.ssp.ssp_file import SspFile
 
 VARIABLE = (
     '<ScalarVariable name="{}" valueReference="{}" causality="{}" variability="continuous"><Real {}/></ScalarVariable>'

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from ssp_of import component, connection, connectors, described, pack_ssp, system
 
-from cosim.master import Master
-from cosim.signals import Signals
-from cosim.ssp.ssp_file import SspFile
-from fmus.build import build_block
+from handover.cosim.master import Master
+from handover.cosim.signals import Signals
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.fmus.build import build_block
 
 STEP = Fraction(1, 10)
 

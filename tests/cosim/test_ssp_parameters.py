@@ -21,8 +21,8 @@ from ssp_of import (
     system,
 )
 
-from cosim.exceptions import InvalidSsp
-from cosim.ssp.ssp_file import SspFile
+from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.ssp.ssp_file import SspFile
 
 MORE = """
     <ScalarVariable name="p[1]" valueReference="20" causality="parameter" variability="fixed"><Real start="1" unit="m"/>

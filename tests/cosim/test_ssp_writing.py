@@ -13,14 +13,14 @@ import pytest
 from fmu_of import FmuOf
 from ssp_schemas import expect_valid
 
-from cosim.exceptions import NotExportable, WiringError
-from cosim.linear import Linear
-from cosim.master import Master
-from cosim.signals import Signals
-from cosim.ssp.ssp_file import SspFile
-from cosim.ssp.writing import write_ssp
-from cosim.system import PortName, System
-from fmus.build import build_block
+from handover.cosim.exceptions import NotExportable, WiringError
+from handover.cosim.linear import Linear
+from handover.cosim.master import Master
+from handover.cosim.signals import Signals
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system import PortName, System
+from handover.fmus.build import build_block
 
 KINDS = ("n", "odd", "light", "pair")
 STEP = Fraction(1, 10)

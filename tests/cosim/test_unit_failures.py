@@ -11,13 +11,13 @@ import pytest
 from called import Called, fed_by
 from native_units import native_fmu
 
-from cosim.exceptions import UnitFailure, UnitRefused
-from cosim.failures import NotFinite, UnitCrashed, UnitDiscarded, UnitEnded, UnitError, UnitFatal, UnitHung
-from cosim.master import Master
-from cosim.master_options import MasterOptions
-from cosim.record.recorder import Recorder
-from cosim.system import System
-from scenarios.record import Record
+from handover.cosim.exceptions import UnitFailure, UnitRefused
+from handover.cosim.failures import NotFinite, UnitCrashed, UnitDiscarded, UnitEnded, UnitError, UnitFatal, UnitHung
+from handover.cosim.master import Master
+from handover.cosim.master_options import MasterOptions
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.system import System
+from handover.scenarios.record import Record
 
 COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "compiled"])
 

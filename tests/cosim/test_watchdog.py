@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import pytest
 
-from cosim.failures import UnitHung
-from cosim.heartbeat import Abandoned, Heartbeat
-from cosim.watchdog import Watchdog
+from handover.cosim.failures import UnitHung
+from handover.cosim.heartbeat import Abandoned, Heartbeat
+from handover.cosim.watchdog import Watchdog
 
 
 class Unit:

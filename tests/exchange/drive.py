@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block_description import Description
-from cosim.variable import Kind, Variable
-from fmus.layout import element_names
-from plants.stereo_camera import Inputs, Params, StereoCamera
+from handover.cosim.block_description import Description
+from handover.cosim.variable import Kind, Variable
+from handover.fmus.layout import element_names
+from handover.plants.stereo_camera import Inputs, Params, StereoCamera
 
 STEPS = 10
 """Steps of a run, each as long as the unit proposes."""

@@ -19,9 +19,9 @@ from drive import STEPS, inputs, parameters, scalars
 from notary import ENTRIES
 from reference import description, variables
 
-from cosim.variable import Kind
-from fmus.catalog import UNITS
-from fmus.layout import element_names
+from handover.cosim.variable import Kind
+from handover.fmus.catalog import UNITS
+from handover.fmus.layout import element_names
 
 SSD, SSV, SSC = (
     f"http://ssp-standard.org/SSP1/{n}" for n in ("SystemStructureDescription", "ParameterValues", "Common")

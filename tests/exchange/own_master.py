@@ -8,10 +8,10 @@ from typing import Any
 
 from reference import Record
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.system import PortName, System
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import PortName, System
 
 
 @dataclass(frozen=True)

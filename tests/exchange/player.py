@@ -6,9 +6,9 @@ from typing import Any
 
 from drive import inputs
 
-from cosim.block_description import describe
-from cosim.ports import output
-from fmus.catalog import UNITS
+from handover.cosim.block_description import describe
+from handover.cosim.ports import output
+from handover.fmus.catalog import UNITS
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -10,15 +10,15 @@ import drive
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.block_description import Description, describe
-from cosim.fmu_description import describe_fmu
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.system import PortName, System
-from cosim.variable import Kind, Variable
-from fmus.build import build_block, cached, import_block
-from fmus.catalog import UNITS
+from handover.cosim.block_description import Description, describe
+from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import PortName, System
+from handover.cosim.variable import Kind, Variable
+from handover.fmus.build import build_block, cached, import_block
+from handover.fmus.catalog import UNITS
 
 TOLERANCE = 1e-12
 """Absolute for values up to 1, relative beyond."""

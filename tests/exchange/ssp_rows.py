@@ -5,11 +5,11 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.ssp.ssp_file import SspFile
-from scenarios.command import main
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.scenarios.command import main
 
 SCENARIO = "flyer_impedance"
 """Its units have FMI 2 forms, steps of one length, and no enumerations that would have to be set."""

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from own_master import Connections, Placed
 
-from fmus.build import cached
+from handover.fmus.build import cached
 
 
 class Wired(NamedTuple):

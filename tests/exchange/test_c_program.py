@@ -12,13 +12,13 @@ import pytest
 from drive import STEPS, inputs, parameters
 from reference import FMI2_UNITS, Record, References, description, expect_same, variables
 
-from cosim.variable import Kind, Variable
-from fmus import interpreter
-from fmus.binaries import FMI2_FOLDERS
-from fmus.build import cached
-from fmus.catalog import UNITS
-from fmus.compile import RUNTIME, host_platform, library, zig_cc
-from fmus.layout import element_names
+from handover.cosim.variable import Kind, Variable
+from handover.fmus import interpreter
+from handover.fmus.binaries import FMI2_FOLDERS
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
+from handover.fmus.compile import RUNTIME, host_platform, library, zig_cc
+from handover.fmus.layout import element_names
 
 pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="c_program.c loads libraries with dlopen"),

@@ -11,8 +11,8 @@ from fmpy_rows import rows_in_fmpy
 from own_master import Placed, run_in_our_own
 from reference import FMI2_UNITS, References, description, expect_same
 
-from fmus.build import cached
-from fmus.catalog import UNITS
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
 
 LIGHT = "Thrusters"
 STEPS = 40

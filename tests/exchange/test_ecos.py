@@ -8,9 +8,9 @@ import pytest
 from ecos_command import Ecos
 from reference import FMI2_UNITS, References, expect_same, variables
 
-from cosim.variable import Kind
-from fmus import interpreter
-from fmus.build import build_block, cached
+from handover.cosim.variable import Kind
+from handover.fmus import interpreter
+from handover.fmus.build import build_block, cached
 
 pytestmark = [
     pytest.mark.skipif(importlib.util.find_spec("ecospy") is None, reason="ecospy has wheels for few platforms"),

@@ -10,10 +10,10 @@ import pytest
 from drive import STEPS, inputs, parameters, scalars
 from reference import FMI2_UNITS, Record, References, description, expect_same, variables
 
-from cosim.variable import Kind, Variable
-from fmus.build import cached
-from fmus.catalog import UNITS
-from fmus.layout import element_names
+from handover.cosim.variable import Kind, Variable
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
+from handover.fmus.layout import element_names
 
 HOST: Any = fmpy
 LIGHT = ("HandoverPartner", "Thrusters")

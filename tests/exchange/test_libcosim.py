@@ -10,8 +10,8 @@ from libcosim_job import Job, without_enumerations
 from own_master import Placed, run_in_our_own
 from reference import FMI2_UNITS, References, description, expect_same
 
-from fmus.build import cached
-from fmus.catalog import UNITS
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
 
 LIGHT = "FreeFlyer"
 

@@ -3,7 +3,7 @@
 import pytest
 from reference import FMI2_UNITS, References, description
 
-from fmus.catalog import UNITS
+from handover.fmus.catalog import UNITS
 
 LIGHT = "HandoverPartner"
 CASES = [(n, fmi) for fmi in (2, 3) for n in (UNITS if fmi == 3 else FMI2_UNITS)]

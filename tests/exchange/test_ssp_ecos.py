@@ -8,8 +8,8 @@ import pytest
 from ecos_command import Ecos
 from ssp_rows import SCENARIO, STEP, STEPS, exported, own_rows
 
-from cosim.ssp.ssp_file import SspFile
-from fmus import interpreter
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.fmus import interpreter
 
 pytestmark = [
     pytest.mark.slow,

@@ -8,7 +8,7 @@ from libcosim_job import Job, known
 from own_master import Placed
 from ssp_rows import STEP, STEPS, exported, own_rows
 
-from cosim.ssp.ssp_file import SspFile
+from handover.cosim.ssp.ssp_file import SspFile
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ from typing import Any
 
 from signatures import signatures
 
-from fmus.binaries import FMI2_FOLDERS
-from fmus.compile import host_platform, library
+from handover.fmus.binaries import FMI2_FOLDERS
+from handover.fmus.compile import host_platform, library
 
 ENTRIES = {2: ("Real", "Integer", "Boolean", "String"), 3: ("Float64", "Int64", "Boolean", "String", "Binary")}
 """Types of variables whose getters and setters every unit has."""

@@ -17,8 +17,8 @@ from typing import Any
 import pytest
 from call_ring import count_of, lines_of
 
-from fmus.build import build_block, cached
-from fmus.catalog import UNITS
+from handover.fmus.build import build_block, cached
+from handover.fmus.catalog import UNITS
 
 DRIVER = Path(__file__).with_name("driver.py")
 SEED = 20

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_block, cached
+from handover.fmus.build import build_block, cached
 
 CYCLES = Path(__file__).with_name("cycles.py")
 LIMIT = 2_000_000

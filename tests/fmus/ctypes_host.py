@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fmus.binaries import FMI2_FOLDERS
-from fmus.compile import host_platform, library
+from handover.fmus.binaries import FMI2_FOLDERS
+from handover.fmus.compile import host_platform, library
 
 OK, DISCARD, ERROR = 0, 2, 3
 

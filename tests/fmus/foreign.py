@@ -8,10 +8,10 @@ from xml.etree import ElementTree as ET
 
 import fmpy
 
-from fmus.binaries import FMI2_FOLDERS
-from fmus.build import build
-from fmus.catalog import Entry
-from fmus.compile import RUNTIME, TARGETS, library, zig_cc
+from handover.fmus.binaries import FMI2_FOLDERS
+from handover.fmus.build import build
+from handover.fmus.catalog import Entry
+from handover.fmus.compile import RUNTIME, TARGETS, library, zig_cc
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 PROTOTYPE = r"typedef\s+([\w*\s]+?)\s+(fmi{fmi}\w+)TYPE\s*\(([^)]*)\);"

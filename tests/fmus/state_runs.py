@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from fmpy_host import Digests, FmpyHost
 
-from cosim.fmu_description import FmuDescription, FmuPort
-from cosim.variable import Kind
-from plants.stereo_camera import Inputs, Outputs, Params, StereoCamera
+from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.variable import Kind
+from handover.plants.stereo_camera import Inputs, Outputs, Params, StereoCamera
 
 STEPS = 12
 """Steps before a state is taken, and after."""

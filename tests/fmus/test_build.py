@@ -8,11 +8,11 @@ import pytest
 from workshop import Workshop
 from written_blocks import write_block
 
-from fmus.build import UnknownVersion, UnusableName, UnusableStep, build_block, cached
-from fmus.catalog import UNITS, Entry, UnknownUnit, find_unit
-from fmus.compile import UnknownPlatform, host_platform
-from fmus.sources import UnknownBlock, closure
-from fmus.universal import universal
+from handover.fmus.build import UnknownVersion, UnusableName, UnusableStep, build_block, cached
+from handover.fmus.catalog import UNITS, Entry, UnknownUnit, find_unit
+from handover.fmus.compile import UnknownPlatform, host_platform
+from handover.fmus.sources import UnknownBlock, closure
+from handover.fmus.universal import universal
 
 
 def test_the_catalog_knows_its_units_without_loading_them():
@@ -68,7 +68,10 @@ def test_an_fmu_carries_its_sources_and_lists_its_packages(workshop: Workshop):
         names = set(archive.namelist())
         unit = json.loads(archive.read("resources/unit.json"))
         page = archive.read("documentation/index.html").decode()
-    assert {"resources/sources/sample_units/every_kind.py", "resources/sources/cosim/block_description.py"} <= names
+    assert {
+        "resources/sources/sample_units/every_kind.py",
+        "resources/sources/handover/cosim/block_description.py",
+    } <= names
     assert not any("build" in name or "catalog" in name for name in names)
     assert [p["module"] for p in unit["packages"]] == ["numpy", "typing_extensions"]
     assert all(p["version"] for p in unit["packages"])
@@ -80,7 +83,7 @@ def test_imports_are_followed_but_those_for_type_checkers(tmp_path: Path, monkey
     monkeypatch.syspath_prepend(tmp_path)
     block = write_block(tmp_path, "followed", "1.0", helper="followed_helper")
     carried = closure(block)
-    assert {"followed.py", "followed_helper.py", "cosim/ports.py"} <= carried.files.keys()
+    assert {"followed.py", "followed_helper.py", "handover/cosim/ports.py"} <= carried.files.keys()
     assert "cv2" not in carried.modules
 
 

@@ -12,8 +12,8 @@ import pytest
 from ctypes_host import CtypesHost
 from workshop import Workshop
 
-from fmus import interpreter
-from fmus.compile import RUNTIME, zig_cc
+from handover.fmus import interpreter
+from handover.fmus.compile import RUNTIME, zig_cc
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="host.c loads libraries with dlopen")
 
@@ -170,7 +170,7 @@ def test_a_program_that_is_no_interpreter_is_told_with_one_cure(
 
 @pytest.mark.parametrize("place", ["0", "1"])
 def test_a_unit_without_its_sources_says_what_may_be_wrong(program: Path, unpacked: CtypesHost, place: str):
-    shutil.rmtree(unpacked.folder / "resources" / "sources" / "fmus")
+    shutil.rmtree(unpacked.folder / "resources" / "sources" / "handover" / "fmus")
     done = run(program, unpacked, PATH="/nonexistent", FMU_PYTHON_PROCESS=place)
     for part in ("cannot be read: the resources folder lacks it", "Either the resource location is wrong, or the FMU"):
         assert part in done.stdout

@@ -10,8 +10,8 @@ import pytest
 from fmpy_host import FmpyHost
 from state_runs import STEPS, inputs_at, other_parameters, run, run_on
 
-from fmus.build import cached
-from fmus.catalog import UNITS
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
 
 LIMIT = 60.0
 """Seconds that another process has for a run."""

@@ -14,12 +14,12 @@ from saved_states import deserialise, save, serialised
 from state_runs import varied
 from workshop import Workshop
 
-from cosim.block_description import describe
-from cosim.fmu_description import describe_fmu
-from cosim.variable import Kind
-from fmus.build import cached, import_block
-from fmus.catalog import UNITS
-from fmus.layout import DuplicateName, Layout
+from handover.cosim.block_description import describe
+from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.variable import Kind
+from handover.fmus.build import cached, import_block
+from handover.fmus.catalog import UNITS
+from handover.fmus.layout import DuplicateName, Layout
 
 SAMPLED = "sampled:Sampled"
 P = 1 / 30

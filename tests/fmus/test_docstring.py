@@ -2,7 +2,7 @@
 
 from textwrap import dedent
 
-from fmus.docstring import Part, parse
+from handover.fmus.docstring import Part, parse
 
 DOCSTRING = dedent(
     """\

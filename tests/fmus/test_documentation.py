@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_block
-from fmus.documentation import seconds
-from fmus.papers import PAPERS, cited
+from handover.fmus.build import build_block
+from handover.fmus.documentation import seconds
+from handover.fmus.papers import PAPERS, cited
 
 HOUSE = Path(__file__).parents[2]
 

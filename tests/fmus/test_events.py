@@ -15,9 +15,9 @@ from sample_units.scalars import Scalars
 from saved_states import deserialise, save, serialised
 from workshop import Workshop
 
-from cosim.block_description import describe
-from cosim.declared_fields import DeclarationError
-from cosim.eventful_block import EndlessEvents, UnfitAdvance, step_through_events
+from handover.cosim.block_description import describe
+from handover.cosim.declared_fields import DeclarationError
+from handover.cosim.eventful_block import EndlessEvents, UnfitAdvance, step_through_events
 
 BALL = "bouncing_ball:BouncingBall"
 G, E, HEIGHT, RELEASE = 9.81, 0.7, 1.0, 0.25

@@ -6,10 +6,10 @@ from fractions import Fraction
 import pytest
 from workshop import Workshop
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.system import System
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
 
 G, E, RELEASE = 9.81, 0.7, 0.25
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]

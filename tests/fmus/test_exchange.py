@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from sample_units import every_kind, eye
 
-from cosim.block_description import describe
-from fmus.buffers import Buffers
-from fmus.exchange import UnfitOutput, output_writer
-from fmus.layout import Layout
+from handover.cosim.block_description import describe
+from handover.fmus.buffers import Buffers
+from handover.fmus.exchange import UnfitOutput, output_writer
+from handover.fmus.layout import Layout
 
 
 def write(block: Any, y: Any, **changed: Any) -> Buffers:

@@ -8,9 +8,9 @@ from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from sample_units.trouble import Deed
 from workshop import Workshop
 
-from cosim.exceptions import UnitRefused
-from cosim.master import Master
-from cosim.system import System
+from handover.cosim.exceptions import UnitRefused
+from handover.cosim.master import Master
+from handover.cosim.system import System
 
 BLOCK = "every_kind:EveryKind"
 

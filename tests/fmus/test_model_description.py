@@ -15,14 +15,14 @@ from fmpy.validation import validate_fmu
 from sample_units import declarations
 from workshop import Workshop
 
-from cosim.block_description import Description, describe
-from cosim.fmu_description import describe_fmu
-from cosim.ports import parameter
-from cosim.units import Number
-from fmus.fmi2_description import fmi2_description
-from fmus.fmi3_description import fmi3_description
-from fmus.layout import DuplicateName, Form, Layout
-from fmus.model_description import AmbiguousName, Model, UnusableText
+from handover.cosim.block_description import Description, describe
+from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.ports import parameter
+from handover.cosim.units import Number
+from handover.fmus.fmi2_description import fmi2_description
+from handover.fmus.fmi3_description import fmi3_description
+from handover.fmus.layout import DuplicateName, Form, Layout
+from handover.fmus.model_description import AmbiguousName, Model, UnusableText
 
 ALL, WITHOUT_DATA = "declarations:Declarations", "declarations:WithoutData"
 

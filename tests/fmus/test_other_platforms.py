@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from foreign import compile_program, compiled_host, expect_clear_answers, unpack
 
-from fmus.catalog import Entry
+from handover.fmus.catalog import Entry
 
 ENTRY = Entry("Scalars", "sample_units.scalars:Scalars", Fraction(1, 100), "for a test")
 QEMU = shutil.which("qemu-aarch64")
@@ -70,7 +70,7 @@ def test_windows_asks_the_interpreter_on_the_path(tmp_path: Path, wine: dict[str
     compile_program(source, tmp_path / "python.exe", "x86_64-windows")  # a program's own folder comes before the PATH
     resources = f"file:///Z:{(unit.folder / 'resources').as_uri()[7:]}"
     output = run(["wine", host, f"Z:{unit.library}", unit.token, resources], wine, tmp_path)
-    script = f"Z:{unit.folder}/resources/sources/fmus/interpreter.py"
+    script = f"Z:{unit.folder}/resources/sources/handover/fmus/interpreter.py"
     assert f"python on the PATH: {script}.dll: LoadLibrary failed with code" in output
 
 

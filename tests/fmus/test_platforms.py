@@ -8,9 +8,9 @@ import pytest
 from foreign import functions
 from libraries import Facts, facts, is_signed, slices
 
-import fmus.compile
-from fmus.binaries import binaries
-from fmus.compile import RUNTIME, TARGETS, compile_runtime, host_platform, library
+import handover.fmus.compile
+from handover.fmus.binaries import binaries
+from handover.fmus.compile import RUNTIME, TARGETS, compile_runtime, host_platform, library
 
 OTHERS = [target for target in TARGETS if target != host_platform()]
 EVERY = [host_platform(), *(pytest.param(target, marks=pytest.mark.slow) for target in OTHERS)]
@@ -47,12 +47,14 @@ def test_the_same_sources_give_the_same_bytes_anywhere_and_tell_of_no_folder(
     elsewhere = tmp_path / "elsewhere"
     shutil.copytree(RUNTIME, elsewhere, ignore=shutil.ignore_patterns("bin"))
     (elsewhere / "unused.h").write_text(f"/* {elsewhere} */")  # so that no cache has libraries of these sources
-    monkeypatch.setattr(fmus.compile, "RUNTIME", elsewhere)
+    monkeypatch.setattr(handover.fmus.compile, "RUNTIME", elsewhere)
     compile_runtime([target])
     again = [library(target, fmi) for fmi in (2, 3)]
     assert all(file.is_relative_to(elsewhere) for file in again)
     assert [file.read_bytes() for file in again] == first
-    folders = {str(p).encode() for p in (RUNTIME.parents[1], elsewhere, Path.home(), fmus.compile.cache_folder())}
+    folders = {
+        str(p).encode() for p in (RUNTIME.parents[1], elsewhere, Path.home(), handover.fmus.compile.cache_folder())
+    }
     assert [folder for folder in folders for content in first if folder in content] == []
     assert [content for content in first if re.search(rb"compiling-|[\w/]+\.[ch]\0|\.pdb\0", content)] == []
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-import fmus.compile
-from fmus.binaries import NotCompiled, binaries
-from fmus.compile import (
+import handover.fmus.compile
+from handover.fmus.binaries import NotCompiled, binaries
+from handover.fmus.compile import (
     RUNTIME,
     TARGETS,
     CompilationError,
@@ -26,7 +26,7 @@ from fmus.compile import (
     named_platforms,
     wanted_platforms,
 )
-from scenarios.command import main
+from handover.scenarios.command import main
 
 COMPILE = r"""
 from pathlib import Path
@@ -45,7 +45,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     copy = tmp_path / "runtime"
     shutil.copytree(RUNTIME, copy, ignore=shutil.ignore_patterns("bin"))
     (copy / "unused.h").write_text(f"/* {copy} */")  # so that no cache has libraries of these sources
-    monkeypatch.setattr(fmus.compile, "RUNTIME", copy)
+    monkeypatch.setattr(handover.fmus.compile, "RUNTIME", copy)
     return copy
 
 
@@ -59,7 +59,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
         Path(arguments[arguments.index("-o") + 1]).write_bytes(b"library")
         return subprocess.CompletedProcess(arguments, 0, "")
 
-    monkeypatch.setattr(fmus.compile, "zig_cc", compile_nothing)
+    monkeypatch.setattr(handover.fmus.compile, "zig_cc", compile_nothing)
     return calls
 
 

@@ -12,8 +12,8 @@ from ctypes_host import OK, CtypesHost
 from workshop import Workshop
 from written_blocks import write_block
 
-from fmus import loader
-from fmus.build import build_block
+from handover.fmus import loader
+from handover.fmus.build import build_block
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop,
 def test_a_missing_source_is_a_logged_error(workshop: Workshop):
     host = workshop.host("scalars:Scalars", 3)
     host.free()
-    (host.folder / "resources" / "sources" / "fmus" / "loader.py").unlink()
+    (host.folder / "resources" / "sources" / "handover" / "fmus" / "loader.py").unlink()
     assert not host.instantiate()
     assert "loader.py cannot be read" in host.log[-1]
 
@@ -105,9 +105,11 @@ def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
     host.free()
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", "_fmu_broken_"))
-    (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text("import cosim.nothing\n")
+    (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text(
+        "import handover.cosim.nothing\n"
+    )
     assert not host.instantiate()
-    assert "the FMU has no module 'cosim.nothing'" in host.log[-1]
+    assert "the FMU has no module 'handover.cosim.nothing'" in host.log[-1]
 
 
 def test_an_explanation_of_a_refusal_has_no_traceback():
@@ -125,7 +127,7 @@ def test_the_prefix_of_a_units_modules_is_told_nowhere(workshop: Workshop):
 
 def test_a_path_keeps_all_its_parts():
     error = ValueError("in /tmp/_fmu_12.d/a.py: <_fmu_12ab.plants.arm.Arm object>, _fmu_12ab.größe.Ünit")
-    assert loader.explain(error) == "ValueError: in /tmp/_fmu_12.d/a.py: <plants.arm.Arm object>, größe.Ünit"
+    assert loader.explain(error) == "ValueError: in /tmp/_fmu_12.d/a.py: <handover.plants.arm.Arm object>, größe.Ünit"
 
 
 def test_two_builds_in_one_folder_are_told_with_a_cure(workshop: Workshop):

@@ -7,7 +7,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.compile import RUNTIME, compile_runtime, host_platform, library, zig_cc
+from handover.fmus.compile import RUNTIME, compile_runtime, host_platform, library, zig_cc
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 

@@ -20,7 +20,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from step_speed import INPUTS, OUTPUTS, Measured, assignments, medians
 from workshop import Workshop
 
-from fmus.compile import RUNTIME, zig_cc
+from handover.fmus.compile import RUNTIME, zig_cc
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="step_loop.c measures with clock_gettime")
 

@@ -13,12 +13,12 @@ import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from fmpy.validation import validate_fmu
 
-from cosim.fmu_description import describe_fmu, indices_of
-from cosim.master import Master
-from cosim.signals import Signals
-from fmus.build import build_block, cached
-from scenarios.free_flyer.flyer_impedance import FlyerImpedance
-from scenarios.free_flyer.impedance_parameters import Parameters
+from handover.cosim.fmu_description import describe_fmu, indices_of
+from handover.cosim.master import Master
+from handover.cosim.signals import Signals
+from handover.fmus.build import build_block, cached
+from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
+from handover.scenarios.free_flyer.impedance_parameters import Parameters
 
 BLOCK = "sample_units.every_kind:EveryKind"
 

@@ -13,10 +13,10 @@ import pytest
 from fmpy.validation import validate_fmu
 from workshop import Workshop
 
-from cosim.exceptions import UnitRefused, WiringError
-from cosim.master import Master
-from cosim.record.recorder import Recorder
-from cosim.system import System
+from handover.cosim.exceptions import UnitRefused, WiringError
+from handover.cosim.master import Master
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.system import System
 
 BLOCK = "every_width:EveryWidth"
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ctypes_host import CtypesHost
 
-from fmus.build import build_block
+from handover.fmus.build import build_block
 
 
 class Workshop:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.ports import Floats
-from plants.grasp_objects import SOLIDS, Disc, Slab, Solid, Thing, outlines
+from handover.cosim.ports import Floats
+from handover.plants.grasp_objects import SOLIDS, Disc, Slab, Solid, Thing, outlines
 
 
 def met_of_polygons(thing: Thing, start: tuple[float, float], heading: float) -> float | None:

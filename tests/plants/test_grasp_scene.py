@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.block_description import describe
-from cosim.ports import Floats
-from plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
-from plants.grasp_objects import SOLIDS, Thing
-from plants.grasp_parameters import Params, UnusableScene
-from plants.grasp_scene import SEES_NOTHING, GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
-from plants.grasp_tendon import PULLEYS, STIFFNESS, resting_posture
-from plants.grasp_world import DT, GraspWorld, beginning
+from handover.cosim.block_description import describe
+from handover.cosim.ports import Floats
+from handover.plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
+from handover.plants.grasp_objects import SOLIDS, Thing
+from handover.plants.grasp_parameters import Params, UnusableScene
+from handover.plants.grasp_scene import SEES_NOTHING, GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
+from handover.plants.grasp_tendon import PULLEYS, STIFFNESS, resting_posture
+from handover.plants.grasp_world import DT, GraspWorld, beginning
 
 STEP = 0.015
 AROUND = Params(p_WH_0=np.array([-0.13, 0.0]), sigma_0=0.1)

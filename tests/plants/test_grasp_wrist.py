@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from cosim.ports import Floats
-from plants.grasp_wrist import follow
+from handover.cosim.ports import Floats
+from handover.plants.grasp_wrist import follow
 
 SPEED, ACCELERATION, LAG, DT = 0.3, 10.0, 0.02, 1e-3
 

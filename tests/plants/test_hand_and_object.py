@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cosim.block_description import describe
-from cosim.ports import Floats
-from plants.hand_and_object import (
+from handover.cosim.block_description import describe
+from handover.cosim.ports import Floats
+from handover.plants.hand_and_object import (
     Activity,
     HandAndObject,
     Holder,

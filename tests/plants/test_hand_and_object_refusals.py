@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.ports import Floats
-from plants.hand_and_object import HandAndObject, Inputs, Motion, Params, StartHolder, UnusableHand
+from handover.cosim.ports import Floats
+from handover.plants.hand_and_object import HandAndObject, Inputs, Motion, Params, StartHolder, UnusableHand
 
 
 def begun(p_WG: Floats, **changes: Any) -> None:

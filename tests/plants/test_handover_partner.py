@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cosim.block_description import describe
-from cosim.ports import Floats
-from plants.handover_partner import HandoverPartner, Holder, Inputs, Outputs, Params, UnusablePartner
-from plants.tendon_arm import Inputs as ArmInputs
-from plants.tendon_arm import TendonArm
-from plants.tendon_parameters import Params as ArmParams
+from handover.cosim.block_description import describe
+from handover.cosim.ports import Floats
+from handover.plants.handover_partner import HandoverPartner, Holder, Inputs, Outputs, Params, UnusablePartner
+from handover.plants.tendon_arm import Inputs as ArmInputs
+from handover.plants.tendon_arm import TendonArm
+from handover.plants.tendon_parameters import Params as ArmParams
 
 STILL = Params(tremor_rms=0.0, drift_rms=0.0)
 AT_BALL = np.array([0.17, 0.01, -0.59])

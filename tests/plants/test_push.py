@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from cosim.master import Master
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.signals import Signals
-from cosim.system import System
-from fmus.build import build_block
-from plants.push import Axis, Inputs, Params, Push
+from handover.cosim.master import Master
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
+from handover.fmus.build import build_block
+from handover.plants.push import Axis, Inputs, Params, Push
 
 PULSE = Params(axis=Axis.Z, force=5.0, torque=-3.0, start=0.105, duration=0.05)
 
@@ -56,7 +56,10 @@ def built(folder: Path, path: str, fmi: int) -> Path:
 @pytest.mark.parametrize("algorithm", Algorithm)
 def test_a_robot_gets_the_whole_impulse_in_any_order(folder: Path, algorithm: Algorithm, push_first: bool):
     system = System()
-    files = {"push": built(folder, "plants.push:Push", 3), "robot": built(folder, "plants.free_flyer:FreeFlyer", 3)}
+    files = {
+        "push": built(folder, "handover.plants.push:Push", 3),
+        "robot": built(folder, "handover.plants.free_flyer:FreeFlyer", 3),
+    }
     starts: dict[str, dict[str, Any]] = {"push": {"start": 0.0, "duration": 0.05}, "robot": {}}
     names = ["push", "robot"] if push_first else ["robot", "push"]
     units = {name: system.add(name, files[name], **starts[name]) for name in names}
@@ -75,7 +78,7 @@ def test_a_robot_gets_the_whole_impulse_in_any_order(folder: Path, algorithm: Al
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_unit_without_inputs_is_valid_and_runs_elsewhere(folder: Path, fmi: int):
-    file = built(folder, "plants.push:Push", fmi)
+    file = built(folder, "handover.plants.push:Push", fmi)
     assert validate_fmu(str(file)) == []
     result = fmpy.simulate_fmu(str(file), stop_time=1.6, output_interval=0.016, start_values={"start": 0.805})
     f = result["f_G[1]"] if fmi == 2 else result["f_G"][:, 0]

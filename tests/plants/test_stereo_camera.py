@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.block_description import describe
-from cosim.pinhole import Pinhole, UnusableCalibration
-from plants.sketch import Pixels
-from plants.stereo_camera import BadCover, Inputs, Params, StereoCamera
+from handover.cosim.block_description import describe
+from handover.cosim.pinhole import Pinhole, UnusableCalibration
+from handover.plants.sketch import Pixels
+from handover.plants.stereo_camera import BadCover, Inputs, Params, StereoCamera
 
 HOUSE = Path(__file__).parents[2]
 FAR = np.array([0.3, 1.5, -1.2])  # out of both pictures

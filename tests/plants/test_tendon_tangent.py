@@ -1,10 +1,10 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from plants.tendon_design import TendonDesign
-from plants.tendon_parameters import Params
-from plants.tendon_tangent import TendonTangent
+from handover.cosim.ports import Floats
+from handover.plants.tendon_design import TendonDesign
+from handover.plants.tendon_parameters import Params
+from handover.plants.tendon_tangent import TendonTangent
 
 
 def energy(design: TendonDesign, p: Floats, R: Floats, L0: Floats) -> float:

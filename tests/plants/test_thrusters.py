@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.ports import Floats
-from plants.thrusters import Inputs, Outputs, Params, Thrusters
+from handover.cosim.ports import Floats
+from handover.plants.thrusters import Inputs, Outputs, Params, Thrusters
 
 DT = 0.016
 

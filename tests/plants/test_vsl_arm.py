@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.block_description import describe
-from cosim.ports import Floats
-from plants.vsl_arm import Inputs as ArmInputs
-from plants.vsl_arm import Outputs as ArmOutputs
-from plants.vsl_arm import UnusableInput, VslArm
-from plants.vsl_parameters import Link, Motion, Params, UnusableVslArm
-from plants.vsl_statics import NoEquilibrium
+from handover.cosim.block_description import describe
+from handover.cosim.ports import Floats
+from handover.plants.vsl_arm import Inputs as ArmInputs
+from handover.plants.vsl_arm import Outputs as ArmOutputs
+from handover.plants.vsl_arm import UnusableInput, VslArm
+from handover.plants.vsl_parameters import Link, Motion, Params, UnusableVslArm
+from handover.plants.vsl_statics import NoEquilibrium
 
 EXACT = Params(servo_noise=0.0, current_noise=0.0, tracker_noise=0.0, pressure_noise=0.0)
 PRINTED = replace(EXACT, link_2=Link.RIGID, link_3=Link.RIGID)

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.ports import Floats
-from plants.vsl_chain import Pose, VslChain
-from plants.vsl_dynamics import NoConvergence, VslDynamics
-from plants.vsl_parameters import Link, Motion, Params
-from plants.vsl_statics import VslStatics
+from handover.cosim.ports import Floats
+from handover.plants.vsl_chain import Pose, VslChain
+from handover.plants.vsl_dynamics import NoConvergence, VslDynamics
+from handover.plants.vsl_parameters import Link, Motion, Params
+from handover.plants.vsl_statics import VslStatics
 
 OUTSTRETCHED = (0.47588225, -0.95176450)
 """Stiff arm at (0.4, 0, 0.15) m, elbow up."""

@@ -1,6 +1,6 @@
 import pytest
 
-from plants.vsl_servo import VslServo
+from handover.plants.vsl_servo import VslServo
 
 
 def servo() -> VslServo:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plants.vsl_chain import Pose, VslChain
-from plants.vsl_parameters import Link, Params
-from plants.vsl_statics import NoEquilibrium, VslStatics
+from handover.plants.vsl_chain import Pose, VslChain
+from handover.plants.vsl_parameters import Link, Params
+from handover.plants.vsl_statics import NoEquilibrium, VslStatics
 
 STIFF = 1e11
 ONE_LINK = Params(

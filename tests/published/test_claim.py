@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from scenarios.published.claim import Claim, Verdict, verdict_counts
-from scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.claim import Claim, Verdict, verdict_counts
+from handover.scenarios.published.comparison_table import ComparisonTable
 
 CLAIM = Claim(
     claim="It holds.",

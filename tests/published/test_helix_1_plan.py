@@ -2,10 +2,10 @@ from collections import Counter
 
 import pytest
 
-from scenarios.campaign.statistics import FEWEST
-from scenarios.catalog import SCENARIOS
-from scenarios.parameters import parse_parameters
-from scenarios.published.helix_1 import Helix1
+from handover.scenarios.campaign.statistics import FEWEST
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.published.helix_1 import Helix1
 
 PERIODS = {"0.1": "1.38", "0.2": "1.51", "0.4": "1.45"}
 

@@ -9,14 +9,14 @@ import pytest
 import tomli
 from grasp_table import grasp_table
 
-from plants.grasp_objects import Thing
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import PlannedRun
-from scenarios.published.claim import Claim, Verdict
-from scenarios.published.ir_table import IrTable
-from scenarios.published.ir_table_claims import closing_claims, rate_claims
-from scenarios.published.ir_table_distances import distance_claims
-from scenarios.published.ir_table_runs import BLIND, FORWARD_35, REFLEX, IrTableRuns
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.published.ir_table import IrTable
+from handover.scenarios.published.ir_table_claims import closing_claims, rate_claims
+from handover.scenarios.published.ir_table_distances import distance_claims
+from handover.scenarios.published.ir_table_runs import BLIND, FORWARD_35, REFLEX, IrTableRuns
 
 TUNED = range(1000, 1008)
 """Seeds with which the scenario was tuned."""
@@ -63,7 +63,7 @@ def test_a_quick_one_has_as_many_runs_of_a_cell_as_the_paper():
 
 
 def test_every_published_value_tells_its_origin():
-    text = resources.files("scenarios.ir_grasp").joinpath("paper.toml").read_text(encoding="utf-8")
+    text = resources.files("handover.scenarios.ir_grasp").joinpath("paper.toml").read_text(encoding="utf-8")
     for name, entry in tomli.loads(text)["published"].items():
         assert set(entry) == {"value", "unit", "where", "status"}, name
         assert entry["where"], name

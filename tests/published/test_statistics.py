@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from scenarios.campaign.statistics import (
+from handover.scenarios.campaign.statistics import (
     compatible_counts,
     paired_test,
     success_interval,

@@ -2,9 +2,9 @@
 
 import pytest
 
-from scenarios.campaign.statistics import success_interval
-from scenarios.published.claim import Verdict
-from scenarios.published.verdict_rules import (
+from handover.scenarios.campaign.statistics import success_interval
+from handover.scenarios.published.claim import Verdict
+from handover.scenarios.published.verdict_rules import (
     FEW,
     fewest_for,
     majority_claim,

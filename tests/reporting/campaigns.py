@@ -9,14 +9,14 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.ordered_run import carry_out_order
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import prepared
-from scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.ordered_run import carry_out_order
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 
 
 @dataclass

@@ -10,10 +10,10 @@ import pyarrow as pa
 import pytest
 from campaigns import folder_of, table_of, told
 
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.published.claim import Claim, Verdict
-from scenarios.reporting.campaign_page import write_campaign_page
-from scenarios.run_folder import BadRunFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.reporting.campaign_page import write_campaign_page
+from handover.scenarios.run_folder import BadRunFolder
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 

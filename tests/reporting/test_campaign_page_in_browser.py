@@ -7,9 +7,9 @@ from campaigns import carried_out
 from opened_page import opened, overflow, wait_until
 from playwright.sync_api import Browser
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"strategy": "reflex"}, {"strategy": "blind"}], repetitions=2, seed=1, paired=True

@@ -7,8 +7,8 @@ import pytest
 from campaigns import folder_of, table_of, told
 from click.testing import CliRunner
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.command import main
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.command import main
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 

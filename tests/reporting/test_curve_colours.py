@@ -5,13 +5,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.record import Record
-from scenarios.reporting.plot_html import COLOURS
-from scenarios.reporting.time_plots_section import time_figure
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.plot_html import COLOURS
+from handover.scenarios.reporting.time_plots_section import time_figure
 
-PAGE = files("scenarios.reporting") / "page"
+PAGE = files("handover.scenarios.reporting") / "page"
 
 
 def page_colours() -> list[dict[str, str]]:

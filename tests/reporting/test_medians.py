@@ -5,8 +5,8 @@ import math
 import pytest
 from campaigns import results_of
 
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.statistics import time_interval
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.statistics import time_interval
 
 
 def moved(points: int, values: list[float]) -> CampaignResults:

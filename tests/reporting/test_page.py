@@ -6,10 +6,10 @@ import plotly.graph_objects as go
 import pytest
 from markupsafe import Markup
 
-from cosim.exceptions import RecordNotWritten
-from scenarios.reporting.page import write_page
-from scenarios.reporting.plot_html import plot_html
-from scenarios.reporting.section import Section
+from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.reporting.page import write_page
+from handover.scenarios.reporting.plot_html import plot_html
+from handover.scenarios.reporting.section import Section
 
 EVIL = "</script><script>alert(1)</script>"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scenarios.reporting.camera_picture import CameraPicture, Mark
-from scenarios.reporting.kept_pictures import write_pictures
-from scenarios.reporting.pictures_section import pictures_section
-from scenarios.run_folder import RunFolder
+from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.reporting.kept_pictures import write_pictures
+from handover.scenarios.reporting.pictures_section import pictures_section
+from handover.scenarios.run_folder import RunFolder
 
 BALL = Mark(label="ball, as measured", shape="circle", u=319.5, v=359.5, radius=32.0, colour="#ffd23f")
 GONE = Mark(label="wrist, as measured", shape="cross", u=2000.0, v=10.0)

@@ -7,9 +7,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.replay_frames import MOST, frame_rows, phase_changes
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.replay_frames import MOST, frame_rows, phase_changes
 
 
 def test_moments_lie_evenly_in_time_where_rows_do_not():

@@ -9,11 +9,11 @@ from opened_page import opened, wait_until
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
 
-from cosim.ports import Floats
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.record import Record
-from scenarios.reporting.replay_frames import frame_rows
+from handover.cosim.ports import Floats
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.replay_frames import frame_rows
 
 SCENE = "document.querySelector('.replay-scene')"
 POINTS = """name => {

@@ -13,11 +13,11 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from cosim.ports import Floats
-from scenarios.record import Record
-from scenarios.reporting.meshes import prism
-from scenarios.reporting.replay import Body, Line, Replay
-from scenarios.reporting.replay_section import replay_section
+from handover.cosim.ports import Floats
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.meshes import prism
+from handover.scenarios.reporting.replay import Body, Line, Replay
+from handover.scenarios.reporting.replay_section import replay_section
 
 ROWS = 1000
 MOVING: Floats = np.column_stack([np.linspace(0.0, 2.0, ROWS), np.zeros(ROWS), np.zeros(ROWS)])

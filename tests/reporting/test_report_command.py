@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from scenarios.command import main
+from handover.scenarios.command import main
 
 FILES = {"figures", "report.html", "run.json", "signals.parquet", "summary.json"}
 

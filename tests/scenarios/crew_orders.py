@@ -4,10 +4,10 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-from cosim.master_options import MasterOptions
-from fmus.build import build_block, cached
-from scenarios.campaign.run_order import RunOrder
-from scenarios.catalog import SCENARIOS
+from handover.cosim.master_options import MasterOptions
+from handover.fmus.build import build_block, cached
+from handover.scenarios.campaign.run_order import RunOrder
+from handover.scenarios.catalog import SCENARIOS
 
 
 def order(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_grasp", seed: int = 3) -> RunOrder:

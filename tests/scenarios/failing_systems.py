@@ -9,13 +9,13 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
-from cosim.ssp.writing import write_ssp
-from cosim.system import System
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system import System
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cosim"))
 native_fmu: Callable[..., Path] = importlib.import_module("native_units").native_fmu
 
-_MAIN = "from scenarios.entry import main; main()"
+_MAIN = "from handover.scenarios.entry import main; main()"
 IN_TERMINAL = f"import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); {_MAIN}"
 """The command where standard input is a terminal, which it makes the one that controls it."""
 

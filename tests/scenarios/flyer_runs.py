@@ -3,14 +3,14 @@
 from pathlib import Path
 from typing import Any
 
-from fmus.build import cached
-from scenarios.ended import Ended
-from scenarios.experiment import Experiment
-from scenarios.interruption import Interruption
-from scenarios.parameters import parse_parameters
-from scenarios.run_folder import RunFolder
-from scenarios.runner import carry_out
-from scenarios.task import Task
+from handover.fmus.build import cached
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.runner import carry_out
+from handover.scenarios.task import Task
 
 
 def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:

@@ -10,9 +10,9 @@ from typing import Any
 
 import psutil
 
-from scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.campaign_table import CampaignTable
 
-_ENTRY = [sys.executable, "-c", "from scenarios.entry import main; main()"]
+_ENTRY = [sys.executable, "-c", "from handover.scenarios.entry import main; main()"]
 Going = subprocess.Popen[str]
 
 

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from own_crew import OwnCrew
 
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import prepared
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.campaign.tally import Tally
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.tally import Tally
 
 PLAN = CampaignPlan(
     scenario="ir_grasp",

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from cosim.exceptions import RecordNotWritten
-from cosim.master_options import Algorithm, MasterOptions
-from cosim.record.file_lock import folder_locked
-from scenarios.campaign.bad_crew import BadCrew
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_place import place_of
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.run_folder import BadRunFolder
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.record.file_lock import folder_locked
+from handover.scenarios.campaign.bad_crew import BadCrew
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_place import place_of
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.run_folder import BadRunFolder
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"thing": "cylinder"}, repetitions=2

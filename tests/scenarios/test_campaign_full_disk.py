@@ -14,15 +14,15 @@ import pytest
 from click.testing import CliRunner, Result
 from own_crew import OwnCrew
 
-from cosim.master_options import MasterOptions
-from scenarios import supervisor
-from scenarios.campaign import dask_crew
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.cluster_crew import ClusterCrew
-from scenarios.campaign.crew import Crew
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.campaign.run_server import RunServer
-from scenarios.command import main
+from handover.cosim.master_options import MasterOptions
+from handover.scenarios import supervisor
+from handover.scenarios.campaign import dask_crew
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.cluster_crew import ClusterCrew
+from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.run_server import RunServer
+from handover.scenarios.command import main
 
 CALL = ["sweep", "ir_grasp", "-p", "strategy=forward", "--repeat", "3", "--out", "c", "--no-report", "--workers", "2"]
 BEGINNING = "3 runs of ir_grasp on 2 workers into c\n"

@@ -2,12 +2,12 @@
 
 import pytest
 
-from scenarios.campaign.grid import parse_grid, set_parameters
-from scenarios.free_flyer.robot_to_human import RobotToHuman
-from scenarios.helix_handover.helix_handover import HelixHandover
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.parameters import BadParameter
-from scenarios.vsl.vsl_hybrid import VslHybrid
+from handover.scenarios.campaign.grid import parse_grid, set_parameters
+from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
+from handover.scenarios.helix_handover.helix_handover import HelixHandover
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.vsl.vsl_hybrid import VslHybrid
 
 
 def faults(*given: str) -> list[str]:

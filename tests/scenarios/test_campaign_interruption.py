@@ -10,15 +10,15 @@ from typing import Any
 import pytest
 from own_crew import OwnCrew
 
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_interruption import CampaignInterruption
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import prepared
-from scenarios.campaign.run_order import RunAnswer, RunOrder
-from scenarios.campaign.tally import Tally
-from scenarios.campaign_call import call_campaign
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.campaign_call import call_campaign
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 
-from scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
+from handover.scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
 
 PLAN = CampaignPlan(
     scenario="ir_grasp",

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from scenarios.bad_call import BadCall
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import checked_plan, unit_fmus
-from scenarios.parameters import BadParameter
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import checked_plan, unit_fmus
+from handover.scenarios.parameters import BadParameter
 
 
 def plan(**given: object) -> CampaignPlan:

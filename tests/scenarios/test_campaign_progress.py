@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from scenarios.campaign.campaign_progress import CampaignProgress, told_done, told_left
-from scenarios.campaign.tally import Tally
+from handover.scenarios.campaign.campaign_progress import CampaignProgress, told_done, told_left
+from handover.scenarios.campaign.tally import Tally
 
 
 @pytest.mark.parametrize(

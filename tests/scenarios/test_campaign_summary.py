@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_results import CampaignResults
-from scenarios.campaign.campaign_summary import print_campaign
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.run_row import RunRow
-from scenarios.campaign.table_writer import table_of
-from scenarios.campaign.tally import Tally
-from scenarios.experiment import Metric
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.campaign_summary import print_campaign
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.run_row import RunRow
+from handover.scenarios.campaign.table_writer import table_of
+from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.experiment import Metric
 
 
 def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> str:

@@ -8,12 +8,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.run_row import RunRow
-from scenarios.campaign.table_writer import TableWriter, table_of
-from scenarios.experiment import Metric
-from scenarios.run_folder import BadRunFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.run_row import RunRow
+from handover.scenarios.campaign.table_writer import TableWriter, table_of
+from handover.scenarios.experiment import Metric
+from handover.scenarios.run_folder import BadRunFolder
 
 PLAN = CampaignPlan(
     scenario="vsl_hybrid",
@@ -104,8 +104,8 @@ def test_it_is_written_seldom_while_runs_come_fast(tmp_path: Path, monkeypatch: 
         written.append(now[0])
         now[0] += 0.05
 
-    monkeypatch.setattr("scenarios.campaign.table_writer.time.monotonic", lambda: now[0])
-    monkeypatch.setattr("scenarios.campaign.table_writer.pq.write_table", take_a_second)
+    monkeypatch.setattr("handover.scenarios.campaign.table_writer.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("handover.scenarios.campaign.table_writer.pq.write_table", take_a_second)
     writer = TableWriter(PLAN, tmp_path / "runs.parquet")
     for _ in range(1000):
         now[0] += 0.1

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from fmus.build import build_block, cached
-from fmus.catalog import UNITS
-from scenarios.catalog import SCENARIOS
-from scenarios.command import main
-from scenarios.record import Record
+from handover.fmus.build import build_block, cached
+from handover.fmus.catalog import UNITS
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.command import main
+from handover.scenarios.record import Record
 
 
 def call(*arguments: str | Path) -> Result:
@@ -60,7 +60,7 @@ def test_every_unit_can_be_listed(name: str):
 
 
 def test_a_reader_who_leaves_does_not_change_the_status(tmp_path: Path):
-    command = [sys.executable, "-c", "from scenarios.entry import main; main()", "list"]
+    command = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "list"]
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -72,7 +72,7 @@ def test_a_reader_who_leaves_does_not_change_the_status(tmp_path: Path):
 
 def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
     (tmp_path / "click.py").write_text("raise KeyboardInterrupt\n")
-    command = [sys.executable, "-c", "from scenarios.entry import main; main()", "list"]
+    command = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "list"]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (130, "Aborted!\n")
@@ -182,8 +182,8 @@ def test_build_writes_the_files_it_names(tmp_path: Path):
 OWN = """
 from dataclasses import dataclass
 from fractions import Fraction
-from cosim.ports import output
-from cosim.units import Metre
+from handover.cosim.ports import output
+from handover.cosim.units import Metre
 
 @dataclass(frozen=True)
 class Params: ...

@@ -16,9 +16,9 @@ from clusters import scheduler, worker
 from crew_orders import bad_order, order
 from living import lives, parent, servers, until
 
-from scenarios.campaign.bad_crew import BadCrew
-from scenarios.campaign.dask_crew import crew_at
-from scenarios.campaign.scheduler_address import scheduler_address
+from handover.scenarios.campaign.bad_crew import BadCrew
+from handover.scenarios.campaign.dask_crew import crew_at
+from handover.scenarios.campaign.scheduler_address import scheduler_address
 
 pytestmark = [
     pytest.mark.slow,

@@ -6,14 +6,14 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
-from cosim.master import Master
-from cosim.record.recorder import Recorder
-from cosim.ssp.ssp_file import SspFile
-from cosim.system import System
-from fmus.build import cached
-from scenarios.catalog import SCENARIOS
-from scenarios.command import main
-from scenarios.parameters import parse_parameters
+from handover.cosim.master import Master
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.system import System
+from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.command import main
+from handover.scenarios.parameters import parse_parameters
 
 CHEAP = "ir_grasp"
 STOPS = {"ir_grasp": Fraction(1, 2), "helix_handover": Fraction(3, 10)}

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from flyer_runs import metric, run
 
-from cosim.schedule import Schedule
-from fmus.build import cached
-from scenarios.free_flyer.collaborative import Collaborative
-from scenarios.free_flyer.failed_reception import FailedReception
-from scenarios.free_flyer.flyer_handover import FlyerHandover
-from scenarios.free_flyer.handover_parameters import Parameters
-from scenarios.free_flyer.human_to_robot import HumanToRobot
-from scenarios.free_flyer.robot_to_human import RobotToHuman
-from scenarios.parameters import BadParameter
-from scenarios.record import Record
+from handover.cosim.schedule import Schedule
+from handover.fmus.build import cached
+from handover.scenarios.free_flyer.collaborative import Collaborative
+from handover.scenarios.free_flyer.failed_reception import FailedReception
+from handover.scenarios.free_flyer.flyer_handover import FlyerHandover
+from handover.scenarios.free_flyer.handover_parameters import Parameters
+from handover.scenarios.free_flyer.human_to_robot import HumanToRobot
+from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
+from handover.scenarios.parameters import BadParameter
+from handover.scenarios.record import Record
 
 HANDOVERS = (RobotToHuman, HumanToRobot, FailedReception, Collaborative)
 FREE, GRIPPER, HAND, BOTH = range(4)

@@ -8,18 +8,18 @@ import pytest
 import tomli
 from origins import assert_every_default_has_its_origin
 
-import scenarios.free_flyer
-from controllers.flyer_handover_parameters import Params as DecisionParams
-from controllers.impedance_controller import Behaviour
-from controllers.impedance_controller import Params as ImpedanceParams
-from controllers.pose_controller import Params as PoseParams
-from plants.flyer_hand_parameters import Params as PersonParams
-from plants.free_flyer import Params as RobotParams
-from plants.push import Params as PushParams
-from plants.thrusters import Params as ThrustersParams
-from scenarios.free_flyer import scene
-from scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
-from scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters
+import handover.scenarios.free_flyer
+from handover.controllers.flyer_handover_parameters import Params as DecisionParams
+from handover.controllers.impedance_controller import Behaviour
+from handover.controllers.impedance_controller import Params as ImpedanceParams
+from handover.controllers.pose_controller import Params as PoseParams
+from handover.plants.flyer_hand_parameters import Params as PersonParams
+from handover.plants.free_flyer import Params as RobotParams
+from handover.plants.push import Params as PushParams
+from handover.plants.thrusters import Params as ThrustersParams
+from handover.scenarios.free_flyer import scene
+from handover.scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
+from handover.scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -38,7 +38,7 @@ CODE = {
 
 @pytest.fixture(scope="module")
 def paper() -> Paper:
-    file = Path(scenarios.free_flyer.__file__).parent / "paper.toml"
+    file = Path(handover.scenarios.free_flyer.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 

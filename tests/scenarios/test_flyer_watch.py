@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from controllers.handover_state_machine import HandoverPhase as Phase
-from cosim.fmu_description import FmuPort
-from cosim.signals import Signals
-from cosim.variable import Causality, Kind
-from plants.hand_and_object import Holder
-from scenarios.free_flyer.handover_parameters import Parameters
-from scenarios.free_flyer.handover_watch import HandoverWatch
+from handover.controllers.handover_state_machine import HandoverPhase as Phase
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.signals import Signals
+from handover.cosim.variable import Causality, Kind
+from handover.plants.hand_and_object import Holder
+from handover.scenarios.free_flyer.handover_parameters import Parameters
+from handover.scenarios.free_flyer.handover_watch import HandoverWatch
 
 PLACE = np.array([0.0, -0.07, 0.0])
 

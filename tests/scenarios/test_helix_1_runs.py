@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from own_crew import OwnCrew
 
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_progress import CampaignProgress
-from scenarios.campaign.dask_crew import embedded_crew
-from scenarios.campaign.plan_check import prepared
-from scenarios.published.claim import Verdict
-from scenarios.published.helix_1 import Helix1
-from scenarios.published.results import draw_figures, write_claims
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_progress import CampaignProgress
+from handover.scenarios.campaign.dask_crew import embedded_crew
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.published.claim import Verdict
+from handover.scenarios.published.helix_1 import Helix1
+from handover.scenarios.published.results import draw_figures, write_claims
 
 FAST = {"alpha": "0.4", "control_period": "1.45", "place": "front", "tuning": "thesis"}
 

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.schedule import Schedule
-from fmus.build import cached
-from scenarios.helix_handover.helix_handover import HelixHandover
-from scenarios.helix_handover.parameters import Parameters
-from scenarios.record import Record
+from handover.cosim.schedule import Schedule
+from handover.fmus.build import cached
+from handover.scenarios.helix_handover.helix_handover import HelixHandover
+from handover.scenarios.helix_handover.parameters import Parameters
+from handover.scenarios.record import Record
 
 
 def command(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-c", "from scenarios.command import main; main()", *map(str, arguments)]
+    return [sys.executable, "-c", "from handover.scenarios.command import main; main()", *map(str, arguments)]
 
 
 def run(out: Path, *arguments: str) -> tuple[int, dict[str, Any]]:

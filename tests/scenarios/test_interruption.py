@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from fmus.build import build_block
-from scenarios.interruption import Interruption
+from handover.fmus.build import build_block
+from handover.scenarios.interruption import Interruption
 
 BLOCKS = ["HangingArm", "NativelyHangingArm"][: 2 if sys.platform.startswith("linux") else 1]
 
 
 def start(*arguments: str | Path) -> "subprocess.Popen[str]":
-    call = [sys.executable, "-c", "from scenarios.entry import main; main()", "run", "helix_handover"]
+    call = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "run", "helix_handover"]
     return subprocess.Popen([*call, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.ir_reflex import Phase, Stop
-from controllers.reflex_parameters import Strategy
-from cosim.master import Master
-from cosim.schedule import Schedule
-from fmus.build import cached
-from plants.grasp_objects import Thing
-from scenarios.experiment import Outcome
-from scenarios.interruption import Interruption
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.situation import Situation, asked_for
-from scenarios.record import Record
-from scenarios.run_folder import RunFolder
-from scenarios.runner import carry_out
-from scenarios.task import Task
+from handover.controllers.ir_reflex import Phase, Stop
+from handover.controllers.reflex_parameters import Strategy
+from handover.cosim.master import Master
+from handover.cosim.schedule import Schedule
+from handover.fmus.build import cached
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.experiment import Outcome
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.ir_grasp.situation import Situation, asked_for
+from handover.scenarios.record import Record
+from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.runner import carry_out
+from handover.scenarios.task import Task
 
 
 def fmu(unit: str) -> Path:

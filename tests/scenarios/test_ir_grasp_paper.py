@@ -8,11 +8,11 @@ import pytest
 import tomli
 from origins import assert_every_default_has_its_origin
 
-import scenarios.ir_grasp
-from controllers.reflex_parameters import Params as ReflexParams
-from plants.grasp_objects import Thing
-from plants.grasp_parameters import Params as SceneParams
-from scenarios.ir_grasp.parameters import Parameters
+import handover.scenarios.ir_grasp
+from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.plants.grasp_objects import Thing
+from handover.plants.grasp_parameters import Params as SceneParams
+from handover.scenarios.ir_grasp.parameters import Parameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -21,7 +21,7 @@ CODE = {"scene": SceneParams, "reflex": ReflexParams, "scenario": Parameters}
 
 @pytest.fixture(scope="module")
 def paper() -> Paper:
-    file = Path(scenarios.ir_grasp.__file__).parent / "paper.toml"
+    file = Path(handover.scenarios.ir_grasp.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 

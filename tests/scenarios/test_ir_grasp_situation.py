@@ -4,11 +4,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.reflex_parameters import Strategy
-from plants.grasp_hand import PALM
-from plants.grasp_objects import Thing, outlines
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.situation import Situation
+from handover.controllers.reflex_parameters import Strategy
+from handover.plants.grasp_hand import PALM
+from handover.plants.grasp_objects import Thing, outlines
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.ir_grasp.situation import Situation
 
 EXACT: dict[str, Any] = {"vision_position": 0.0, "vision_yaw": 0.0}
 

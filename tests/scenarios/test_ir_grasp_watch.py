@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from controllers.ir_reflex import Phase, Stop
-from cosim.fmu_description import FmuPort
-from cosim.signals import Signals
-from cosim.variable import Causality, Kind
-from scenarios.ir_grasp.parameters import Parameters
-from scenarios.ir_grasp.watch import GraspWatch
+from handover.controllers.ir_reflex import Phase, Stop
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.signals import Signals
+from handover.cosim.variable import Causality, Kind
+from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.ir_grasp.watch import GraspWatch
 
 HELD = (0.1, 0.0)
 """Where a held object is, in H."""

@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 from own_crew import OwnCrew
 
-from plants.grasp_objects import Thing
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan_check import prepared
-from scenarios.published.ir_table import IrTable
-from scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
-from scenarios.published.results import draw_figures, write_claims
+from handover.plants.grasp_objects import Thing
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.published.ir_table import IrTable
+from handover.scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
+from handover.scenarios.published.results import draw_figures, write_claims
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scenarios.reporting.camera_picture import CameraPicture, Mark
-from scenarios.reporting.kept_pictures import read_pictures, write_pictures
-from scenarios.run_folder import BadRunFolder
+from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.reporting.kept_pictures import read_pictures, write_pictures
+from handover.scenarios.run_folder import BadRunFolder
 
 MARK = Mark(label="ball, as measured", shape="circle", u=30.5, v=20.0, radius=6.0, colour="#ffd23f")
 

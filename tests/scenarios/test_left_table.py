@@ -9,13 +9,13 @@ import pytest
 from click.testing import CliRunner
 from own_crew import OwnCrew
 
-from scenarios.campaign.campaign import carry_out_campaign
-from scenarios.campaign.campaign_folder import CampaignFolder
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.left_table import complete_table
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.plan_check import prepared
-from scenarios.command import main
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.left_table import complete_table
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.command import main
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}

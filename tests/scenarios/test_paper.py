@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 import tomli
 
-import scenarios.helix_handover
-from controllers.servo_parameters import Params as ServoParams
-from plants.handover_partner import Params as HandParams
-from plants.stereo_camera import Params as CameraParams
-from plants.tendon_parameters import Params as ArmParams
-from scenarios.catalog import SCENARIOS
-from scenarios.helix_handover.parameters import Parameters, Place, Tuning
-from scenarios.helix_handover.rig import calibration
+import handover.scenarios.helix_handover
+from handover.controllers.servo_parameters import Params as ServoParams
+from handover.plants.handover_partner import Params as HandParams
+from handover.plants.stereo_camera import Params as CameraParams
+from handover.plants.tendon_parameters import Params as ArmParams
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.helix_handover.parameters import Parameters, Place, Tuning
+from handover.scenarios.helix_handover.rig import calibration
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
 
-FILES = sorted((Path(scenarios.helix_handover.__file__).parent.parent).glob("*/paper.toml"))
+FILES = sorted((Path(handover.scenarios.helix_handover.__file__).parent.parent).glob("*/paper.toml"))
 
 
 @pytest.fixture(scope="module")
 def paper() -> dict[str, dict[str, dict[str, Any]]]:
-    file = Path(scenarios.helix_handover.__file__).parent / "paper.toml"
+    file = Path(handover.scenarios.helix_handover.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 

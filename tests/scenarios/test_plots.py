@@ -8,12 +8,12 @@ import pyarrow.parquet as pq
 import pytest
 from flyer_runs import metric, run
 
-from scenarios.catalog import SCENARIOS
-from scenarios.ended import Ended
-from scenarios.experiment import Experiment
-from scenarios.parameters import parse_parameters
-from scenarios.record import Record
-from scenarios.reporting.time_plot import Curve, TimePlot
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Experiment
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.time_plot import Curve, TimePlot
 
 FAST = {
     "ir_grasp": (),

@@ -9,11 +9,11 @@ import pytest
 import tomli
 from flyer_runs import run
 
-import scenarios
-from scenarios.catalog import SCENARIOS
-from scenarios.parameters import parse_parameters
-from scenarios.reporting.published_section import published_section
-from scenarios.reporting.published_value import PublishedValue
+import handover.scenarios
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.reporting.published_section import published_section
+from handover.scenarios.reporting.published_value import PublishedValue
 
 FAST = {
     "ir_grasp": {(): 3},
@@ -59,7 +59,7 @@ def test_so_does_a_handover_by_the_helix(given: tuple[str, ...], number: int, tm
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_every_published_value_is_in_the_paper_file(scenario: str):
     for value in values_of(scenario, ()):
-        file = Path(scenarios.__file__).parent / value.paper / "paper.toml"
+        file = Path(handover.scenarios.__file__).parent / value.paper / "paper.toml"
         entry: dict[str, Any] = tomli.loads(file.read_text(encoding="utf-8"))["published"][value.name]
         assert value.status == entry["status"]
         assert value.where == entry["where"]

@@ -10,11 +10,11 @@ sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
 
 from flyer_runs import run
 
-from scenarios.catalog import SCENARIOS
-from scenarios.parameters import parse_parameters
-from scenarios.record import Record
-from scenarios.reporting.replay import Body, Line
-from scenarios.reporting.replay_section import replay_section
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.replay import Body, Line
+from handover.scenarios.reporting.replay_section import replay_section
 
 MUST_SHOW = {
     "helix_handover": {"arm", "gripper", "hand", "ball", "cameras"},

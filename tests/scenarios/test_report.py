@@ -13,12 +13,12 @@ sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
 
 from failing_systems import failing_ssp, native_fmu
 
-from cosim.ssp.writing import write_ssp
-from cosim.system import System
-from scenarios.command import main
-from scenarios.master_rows import master_rows
-from scenarios.reporting.run_page import write_run_page
-from scenarios.run_folder import RunFolder
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system import System
+from handover.scenarios.command import main
+from handover.scenarios.master_rows import master_rows
+from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.run_folder import RunFolder
 
 
 class Page(HTMLParser):

@@ -10,15 +10,15 @@ import pytest
 from click.testing import CliRunner, Result
 from killed_run import end_between
 
-from fmus.build import cached
-from scenarios.catalog import SCENARIOS
-from scenarios.command import main
-from scenarios.ended import Ended
-from scenarios.experiment import Outcome
-from scenarios.listing import print_summary
-from scenarios.parameters import parse_parameters
-from scenarios.record import Record
-from scenarios.run_folder import RunFolder
+from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.command import main
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Outcome
+from handover.scenarios.listing import print_summary
+from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.record import Record
+from handover.scenarios.run_folder import RunFolder
 
 fcntl = pytest.importorskip("fcntl")
 

@@ -11,14 +11,14 @@ from click.testing import CliRunner
 from failing_systems import failing_ssp, native_fmu, start
 from flyer_runs import run
 
-from cosim.system import System
-from fmus.build import cached
-from scenarios.command import main
-from scenarios.free_flyer.flyer_impedance import FlyerImpedance
-from scenarios.ir_grasp.ir_grasp import IrGrasp
-from scenarios.run_summary import parameter_rows
-from scenarios.task import Task
-from scenarios.told_system import told_system
+from handover.cosim.system import System
+from handover.fmus.build import cached
+from handover.scenarios.command import main
+from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.run_summary import parameter_rows
+from handover.scenarios.task import Task
+from handover.scenarios.told_system import told_system
 
 
 def read(out: Path, name: str) -> dict[str, Any]:

@@ -17,13 +17,13 @@ from click.testing import CliRunner
 from crew_orders import bad_order, order
 from living import children, lives, until
 
-from scenarios.campaign.plan import PlannedRun
-from scenarios.campaign.run_row import row_of
-from scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
-from scenarios.command import main
-from scenarios.record import Record
-from scenarios.reporting.run_page import write_run_page
-from scenarios.run_folder import RunFolder
+from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.campaign.run_row import row_of
+from handover.scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
+from handover.scenarios.command import main
+from handover.scenarios.record import Record
+from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.run_folder import RunFolder
 
 slow = pytest.mark.slow
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")

@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from clusters import closed_port, scheduler
 
-from scenarios.campaign.bad_crew import BadCrew
-from scenarios.campaign.scheduler_address import scheduler_address
+from handover.scenarios.campaign.bad_crew import BadCrew
+from handover.scenarios.campaign.scheduler_address import scheduler_address
 
 
 def refused(address: str) -> str:

@@ -2,10 +2,10 @@ import sys
 
 import pytest
 
-from scenarios.experiment import Metric
-from scenarios.reporting.told_metric import told
-from scenarios.run_metrics import peak_memory
-from scenarios.run_summary import metric_data
+from handover.scenarios.experiment import Metric
+from handover.scenarios.reporting.told_metric import told
+from handover.scenarios.run_metrics import peak_memory
+from handover.scenarios.run_summary import metric_data
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

@@ -9,14 +9,14 @@ from click.testing import CliRunner, Result
 from clusters import closed_port
 from own_crew import OwnCrew
 
-from cosim.record.file_lock import folder_locked
-from fmus.build import cached
-from scenarios.campaign import dask_crew, plan_check
-from scenarios.campaign.bad_crew import BadCrew, CrewLost
-from scenarios.campaign.campaign_table import CampaignTable
-from scenarios.campaign.plan import CampaignPlan
-from scenarios.campaign.run_order import RunOrder
-from scenarios.command import main
+from handover.cosim.record.file_lock import folder_locked
+from handover.fmus.build import cached
+from handover.scenarios.campaign import dask_crew, plan_check
+from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.run_order import RunOrder
+from handover.scenarios.command import main
 
 CALL = [
     "sweep",

@@ -9,8 +9,8 @@ import psutil
 import pytest
 from sweeping import Going, ended, runs_in, sweeping, wait_for
 
-from scenarios.campaign.campaign_interruption import CampaignInterruption
-from scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
+from handover.scenarios.campaign.campaign_table import CampaignTable
 
 pytestmark = pytest.mark.slow
 

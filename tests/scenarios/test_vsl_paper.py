@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 import tomli
 
-import scenarios.vsl
-from controllers.hybrid_kinematics import Params as KinematicsParams
-from controllers.trajectory_planner import Elbow
-from controllers.trajectory_planner import Params as PlannerParams
-from controllers.vsl_path import Path, QuarterArc, segments_of
-from cosim.declared_fields import declared_variables
-from cosim.ports import Floats
-from cosim.variable import Causality
-from plants.vsl_parameters import Params as ArmParams
-from scenarios import vsl_training_data
-from scenarios.vsl.parameters import HybridParameters, Parameters
-from scenarios.vsl_train_command import vsl_train
-from scenarios.vsl_training import SPLIT
+import handover.scenarios.vsl
+from handover.controllers.hybrid_kinematics import Params as KinematicsParams
+from handover.controllers.trajectory_planner import Elbow
+from handover.controllers.trajectory_planner import Params as PlannerParams
+from handover.controllers.vsl_path import Path, QuarterArc, segments_of
+from handover.cosim.declared_fields import declared_variables
+from handover.cosim.ports import Floats
+from handover.cosim.variable import Causality
+from handover.plants.vsl_parameters import Params as ArmParams
+from handover.scenarios import vsl_training_data
+from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl_train_command import vsl_train
+from handover.scenarios.vsl_training import SPLIT
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
@@ -31,7 +31,7 @@ Paper = dict[str, dict[str, dict[str, Any]]]
 
 @pytest.fixture(scope="module")
 def paper() -> Paper:
-    file = pathlib.Path(scenarios.vsl.__file__).parent / "paper.toml"
+    file = pathlib.Path(handover.scenarios.vsl.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 

@@ -9,22 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.exceptions import UnitRefused
-from cosim.master import Master
-from cosim.observer import Observer
-from cosim.record.recorder import Recorder
-from fmus.build import cached
-from scenarios.ended import Ended
-from scenarios.experiment import Outcome
-from scenarios.interruption import Interruption
-from scenarios.parameters import BadParameter, parse_parameters
-from scenarios.record import Record
-from scenarios.run_folder import RunFolder
-from scenarios.runner import carry_out
-from scenarios.task import Task
-from scenarios.vsl.path_experiment import PathExperiment
-from scenarios.vsl.vsl_hybrid import VslHybrid
-from scenarios.vsl.vsl_model_based import VslModelBased
+from handover.cosim.exceptions import UnitRefused
+from handover.cosim.master import Master
+from handover.cosim.observer import Observer
+from handover.cosim.record.recorder import Recorder
+from handover.fmus.build import cached
+from handover.scenarios.ended import Ended
+from handover.scenarios.experiment import Outcome
+from handover.scenarios.interruption import Interruption
+from handover.scenarios.parameters import BadParameter, parse_parameters
+from handover.scenarios.record import Record
+from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.runner import carry_out
+from handover.scenarios.task import Task
+from handover.scenarios.vsl.path_experiment import PathExperiment
+from handover.scenarios.vsl.vsl_hybrid import VslHybrid
+from handover.scenarios.vsl.vsl_model_based import VslModelBased
 
 BOTH = [VslModelBased, VslHybrid]
 

@@ -14,21 +14,21 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from controllers.vsl_default_model import DEFAULT_MODEL
-from controllers.vsl_kinematics import Elbow, VslKinematics
-from controllers.vsl_model import VslModel
-from controllers.vsl_model_text import parse_model, read_model
-from cosim.exceptions import InvalidFmu
-from cosim.master import Master
-from cosim.ports import Floats
-from cosim.signals import Signals
-from cosim.system import System
-from cosim.zip_writing import write_archive
-from fmus.build import build_block, cached
-from scenarios import vsl_train_command
-from scenarios.vsl_train_command import vsl_train
-from scenarios.vsl_training import Errors, VslTraining, content_key, split
-from scenarios.vsl_training_data import Dataset, describe_arm
+from handover.controllers.vsl_default_model import DEFAULT_MODEL
+from handover.controllers.vsl_kinematics import Elbow, VslKinematics
+from handover.controllers.vsl_model import VslModel
+from handover.controllers.vsl_model_text import parse_model, read_model
+from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.master import Master
+from handover.cosim.ports import Floats
+from handover.cosim.signals import Signals
+from handover.cosim.system import System
+from handover.cosim.zip_writing import write_archive
+from handover.fmus.build import build_block, cached
+from handover.scenarios import vsl_train_command
+from handover.scenarios.vsl_train_command import vsl_train
+from handover.scenarios.vsl_training import Errors, VslTraining, content_key, split
+from handover.scenarios.vsl_training_data import Dataset, describe_arm
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 TRAINING = VslTraining(fmu=Path("none"), kinematics=ARM, points=0, seed=0)
@@ -72,13 +72,13 @@ def test_inverse_residuals_lead_from_the_measured_tip_to_the_command():
 
 def test_key_follows_the_sources_of_the_plant_alone(tmp_path: Path):
     def key(name: str, **files: bytes) -> str:
-        sources = {"resources/sources/plants/arm.py": b"1", "resources/sources/cosim/block.py": b"2", **files}
+        sources = {"resources/sources/handover/plants/arm.py": b"1", "resources/sources/cosim/block.py": b"2", **files}
         return content_key(write_archive(tmp_path / name, sources))
 
     first = key("a.fmu")
     assert key("b.fmu") == first
-    assert key("c.fmu", **{"resources/sources/cosim/block.py": b"3"}) == first
-    assert key("d.fmu", **{"resources/sources/plants/arm.py": b"3"}) != first
+    assert key("c.fmu", **{"resources/sources/handover/cosim/block.py": b"3"}) == first
+    assert key("d.fmu", **{"resources/sources/handover/plants/arm.py": b"3"}) != first
     with zipfile.ZipFile(tmp_path / "e.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", "1")
     assert content_key(tmp_path / "e.fmu") != first

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cosim.fmu_description import FmuPort
-from cosim.signals import Signals
-from cosim.variable import Causality, Kind
-from scenarios.vsl.parameters import HybridParameters, Parameters
-from scenarios.vsl.path_point import distance_to_path
-from scenarios.vsl.watch import PathWatch
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.signals import Signals
+from handover.cosim.variable import Causality, Kind
+from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.path_point import distance_to_path
+from handover.scenarios.vsl.watch import PathWatch
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from controllers.visual_servo import Phase
-from cosim.fmu_description import FmuPort
-from cosim.signals import Signals
-from cosim.variable import Causality, Kind
-from plants.handover_partner import Holder
-from scenarios.helix_handover.parameters import Cover, Parameters
-from scenarios.helix_handover.rig import camera_of
-from scenarios.helix_handover.watch import HandoverWatch
+from handover.controllers.visual_servo import Phase
+from handover.cosim.fmu_description import FmuPort
+from handover.cosim.signals import Signals
+from handover.cosim.variable import Causality, Kind
+from handover.plants.handover_partner import Holder
+from handover.scenarios.helix_handover.parameters import Cover, Parameters
+from handover.scenarios.helix_handover.rig import camera_of
+from handover.scenarios.helix_handover.watch import HandoverWatch
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
 P_WG = np.array([0.16, 0.0, -0.6])

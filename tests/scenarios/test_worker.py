@@ -11,9 +11,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from crew_orders import order
 from distributed import Client
 
-from scenarios.campaign import worker
-from scenarios.campaign.server_process import ServerProcess
-from scenarios.run_folder import versions
+from handover.scenarios.campaign import worker
+from handover.scenarios.campaign.server_process import ServerProcess
+from handover.scenarios.run_folder import versions
 
 
 def test_an_order_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -6,8 +6,8 @@ from collections.abc import Generator
 import pytest
 from own_crew import OwnCrew
 
-from scenarios.campaign import dask_crew, scheduler_address
-from scenarios.campaign.workforce import Workforce
+from handover.scenarios.campaign import dask_crew, scheduler_address
+from handover.scenarios.campaign.workforce import Workforce
 
 
 @pytest.mark.parametrize("checked", [True, False], ids=["checked", "unchecked"])

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.ports import Vector3, output
-from cosim.units import Metre
+from handover.cosim.ports import Vector3, output
+from handover.cosim.units import Metre
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.ports import Int8, Int16, Int32, Single, UInt8, UInt16, UInt32, UInt64, Vector3, output, parameter, port
-from cosim.units import Metre, Second
+from handover.cosim.ports import (
+    Int8,
+    Int16,
+    Int32,
+    Single,
+    UInt8,
+    UInt16,
+    UInt32,
+    UInt64,
+    Vector3,
+    output,
+    parameter,
+    port,
+)
+from handover.cosim.units import Metre, Second
 
 
 @dataclass(frozen=True, kw_only=True)
