@@ -49,6 +49,7 @@ SHARED_SOURCES = (
     "slave.c",
     "state.c",
     "text.c",
+    "values.c",
     "variables.c",
 )
 SOURCES = {

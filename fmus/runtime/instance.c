@@ -30,28 +30,6 @@ void instance_free(Instance *instance) {
     free(instance);
 }
 
-static void refuse_text(const Instance *instance, const char *function, Text *bad) {
-    refuse(instance, function, "%s", text_of(bad));
-    text_clear(bad);
-}
-
-bool inputs_finite(const Instance *instance, const char *function) {
-    Text bad = {0};
-    bool found = find_not_finite(instance, instance->first_input, instance->n_inputs, &bad);
-    if (found) refuse_text(instance, function, &bad);
-    return !found;
-}
-
-Status check_outputs(Instance *instance, const char *function) {
-    Text bad = {0};
-    bool found = find_not_finite(instance, instance->first_output, instance->n_outputs, &bad) ||
-                 (instance->gives_singles && find_beyond_single(instance, &bad));
-    if (!found) return STATUS_OK;
-    refuse_text(instance, function, &bad);
-    instance->mode = FAILED;
-    return STATUS_ERROR;
-}
-
 Status instance_set_times(Instance *instance, const char *function, double start, bool has_stop, double stop) {
     if (!isfinite(start)) return refuse(instance, function, "the start time is %g", start);
     if (has_stop && !(stop >= start))

@@ -145,11 +145,34 @@ Status refuse(const Instance *instance, const char *function, const char *format
 void warn(const Instance *instance, const char *function, const char *format, ...);
 void note(const Instance *instance, const char *function, const char *format, ...);
 Status refuse_unsupported(const Instance *instance, const char *function, const char *reason);
+/* A file of the FMU's sources is not where it is to be. */
+void refuse_unreadable(const Instance *instance, const char *function, const char *path);
 
 /* Whether the function may be called now; if not, says so in the log. */
 bool allowed(const Instance *instance, const char *function, unsigned modes);
 bool given(const Instance *instance, const char *function, const void *pointer, const char *what);
 Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]);
+
+/* variables.c */
+
+/* Takes over the table that describes the buffers. The addresses in it are off by `shift`, where another process wrote
+ * them, which has mapped the memory that both share to another place. */
+bool take_table(Instance *instance, const char *bytes, size_t size, uint64_t shift);
+
+/* The variable of a checked value reference. */
+static inline const Variable *variable_of(const Instance *instance, uint32_t reference) {
+    return &instance->variables[reference];
+}
+
+static inline const char *name_of(const Instance *instance, const Variable *variable) {
+    return instance->names + variable->name;
+}
+
+/* Whether all real inputs are finite; if not, says so in the log. */
+bool inputs_finite(const Instance *instance, const char *function);
+/* Whether all real outputs are, and those of type Float32 within its range. If not, the block has got there by itself,
+ * so it is of no further use: the mode is FAILED. */
+Status check_outputs(Instance *instance, const char *function);
 
 /* slave.c: calls into Python, wherever it runs (side.h). Those that change the block (call, step, set_state) put the
  * instance into the mode FAILED if they fail otherwise than by a refusal; all do if the interpreter is gone. */
@@ -179,9 +202,6 @@ Status instance_reset(Instance *instance, const char *function);
 Status instance_refresh_outputs(Instance *instance, const char *function);
 double time_tolerance(const Instance *instance); /* what a host may lose by adding up step sizes */
 Status plain_step(Instance *instance, const char *function, double t, double dt);
-bool inputs_finite(const Instance *instance, const char *function);
-/* If not, the block has got there by itself, so it is of no further use: the mode is FAILED. */
-Status check_outputs(Instance *instance, const char *function);
 
 /* sampling.c: ticks of a sampled block */
 
@@ -208,12 +228,7 @@ Status get_derivative(Instance *instance, const char *function, bool adjoint, co
                       const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
                       double sensitivity[], size_t n_sensitivity);
 
-/* variables.c */
-
-/* The variable of a checked value reference. */
-static inline const Variable *variable_of(const Instance *instance, uint32_t reference) {
-    return &instance->variables[reference];
-}
+/* values.c */
 
 /* Whether these variables may be read (written) now and have `values` entries altogether. Reading brings outputs up to
  * date, writing marks them stale. */
@@ -236,11 +251,6 @@ Status get_strings(Instance *instance, const char *function, Type type, const ui
                    const char *values[], size_t);
 Status set_strings(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
                    const char *const values[], size_t);
-
-/* The first of `n` real entries that is not finite, described, or false if all are. */
-bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *description);
-/* The same for the first Float32 output that no Float32 holds. */
-bool find_beyond_single(const Instance *instance, Text *description);
 
 /* state.c */
 

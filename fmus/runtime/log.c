@@ -42,6 +42,13 @@ Status refuse_unsupported(const Instance *instance, const char *function, const 
     return refuse(instance, function, "not supported: %s", reason);
 }
 
+void refuse_unreadable(const Instance *instance, const char *function, const char *path) {
+    refuse(instance, function,
+           "%s cannot be read: the resources folder lacks it. Either the resource location is wrong, or the FMU was "
+           "taken apart. Cure: give the location of the unpacked FMU's folder resources, or build the FMU again",
+           path);
+}
+
 static const char *mode_name(Mode mode) {
     switch (mode) {
         case INSTANTIATED: return "instantiated";

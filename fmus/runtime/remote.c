@@ -139,7 +139,7 @@ static bool take_over(Instance *instance, const char *function, const Answer *an
         return false;
     }
     uint64_t shift = (uint64_t)(uintptr_t)memory->address - begun.address;
-    return slave_take_table(instance, table, size - (size_t)(table - answer->bytes), shift);
+    return take_table(instance, table, size - (size_t)(table - answer->bytes), shift);
 }
 
 /* Starts the interpreter and the slave in it. NO_PYTHON: the interpreter is of no use, `fault` says why. */
