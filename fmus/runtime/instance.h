@@ -189,19 +189,16 @@ Status slave_derivative(Instance *instance, const char *function, const double s
 Status slave_get_string(Instance *instance, const char *function, size_t index, const char **value);
 Status slave_set_string(Instance *instance, const char *function, size_t index, const char *value);
 
-/* instance.c: life and time */
+/* lifecycle.c: the modes from instantiation to the end */
 
 Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void), void *environment, bool logging);
 void instance_free(Instance *instance);
 Status instance_set_times(Instance *instance, const char *function, double start, bool has_stop, double stop);
 Status instance_enter_initialisation(Instance *instance, const char *function);
 Status instance_exit_initialisation(Instance *instance, const char *function);
-Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
 Status instance_terminate(Instance *instance, const char *function);
 Status instance_reset(Instance *instance, const char *function);
 Status instance_refresh_outputs(Instance *instance, const char *function);
-double time_tolerance(const Instance *instance); /* what a host may lose by adding up step sizes */
-Status plain_step(Instance *instance, const char *function, double t, double dt);
 
 /* sampling.c: ticks of a sampled block */
 
@@ -213,10 +210,10 @@ Status sampling_activate(Instance *instance, const char *function);
 Status sampling_evaluate(Instance *instance, const char *function);
 Status sampling_settle(Instance *instance, const char *function);
 
-/* events.c: event mode, and blocks that have events of their own */
+/* stepping.c: steps, and event mode between them */
 
 static inline bool has_events(const Instance *instance) { return instance->abilities & HAS_EVENTS; }
-Status events_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
+Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
 Status events_enter(Instance *instance, const char *function);
 Status events_leave(Instance *instance, const char *function);
 Status events_update(Instance *instance, const char *function, double *next_event);
