@@ -2,9 +2,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "log.h"
 #include "platform.h"
 #include "python_api.h"
 #include "side.h"
+#include "variables.h"
 
 #define FILE_INPUT 257 /* Py_file_input */
 

@@ -2,7 +2,9 @@
 #include <string.h>
 
 #include "fmi.h"
-#include "instance.h"
+#include "log.h"
+#include "values.h"
+#include "variables.h"
 
 typedef const fmi3ValueReference References[];
 

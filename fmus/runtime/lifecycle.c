@@ -3,7 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "instance.h"
+#include "lifecycle.h"
+#include "log.h"
+#include "sampling.h"
+#include "slave.h"
+#include "state.h"
+#include "text.h"
+#include "variables.h"
 
 Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void), void *environment, bool logging) {
     Instance *instance = calloc(1, sizeof *instance);

@@ -2,7 +2,8 @@
  * their category is among those that the host has chosen. */
 #include <string.h>
 
-#include "instance.h"
+#include "log.h"
+#include "text.h"
 
 static void say(const Instance *instance, Status status, const char *category, const char *function, const char *format,
                 va_list arguments) {

@@ -9,10 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "log.h"
 #include "platform.h"
 #include "process.h"
 #include "python_api.h"
 #include "side.h"
+#include "variables.h"
 
 #define TIMEOUT 300.0 /* s: for a call, if FMU_PYTHON_TIMEOUT is not set */
 #define STARTING 60.0 /* s: at least, for starting */

@@ -8,6 +8,7 @@
 #define SIDE_H
 
 #include "instance.h"
+#include "text.h"
 
 typedef enum {
     ANSWERED,

@@ -2,8 +2,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "log.h"
 #include "platform.h"
 #include "side.h"
+#include "slave.h"
 
 /* In which ways the interpreter may run, by FMU_PYTHON_PROCESS. */
 static bool read_ways(const Instance *instance, const char *function, bool *here, bool *apart) {

@@ -2,7 +2,11 @@
  * (cosim/eventful_block.py); what a sampled block does in a step, and at its ticks, is in sampling.c. */
 #include <math.h>
 
-#include "instance.h"
+#include "log.h"
+#include "sampling.h"
+#include "slave.h"
+#include "stepping.h"
+#include "variables.h"
 
 #define TIME_TOLERANCE 1e-9 /* of the time, or of 1 s: what a host may lose by adding up step sizes */
 
@@ -99,7 +103,6 @@ static Status handle_event(Instance *instance, const char *function) {
     return check_outputs(instance, function);
 }
 
-/* Settles what is due at this instant; gives the time of the next known event, or infinity. */
 Status events_update(Instance *instance, const char *function, double *next) {
     *next = INFINITY;
     if (instance->events.clock_active && sampling_settle(instance, function) != STATUS_OK) return STATUS_ERROR;

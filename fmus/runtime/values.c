@@ -3,7 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "instance.h"
+#include "lifecycle.h"
+#include "log.h"
+#include "slave.h"
+#include "text.h"
+#include "values.h"
+#include "variables.h"
 
 static const char *kind_name(unsigned kind) {
     static const char *const names[] = {"a real", "an integer or enumeration", "a boolean", "a string", "a binary"};

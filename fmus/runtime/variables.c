@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "instance.h"
+#include "log.h"
+#include "text.h"
+#include "variables.h"
 
 bool take_table(Instance *instance, const char *bytes, size_t size, uint64_t shift) {
     TableHeader header;
