@@ -36,8 +36,7 @@ RUNTIME = Path(__file__).with_name("runtime")
 SHARED_SOURCES = (
     "derivatives.c",
     "embedded.c",
-    "events.c",
-    "instance.c",
+    "lifecycle.c",
     "log.c",
     "platform.c",
     "process_lock.c",
@@ -49,7 +48,9 @@ SHARED_SOURCES = (
     "shared_memory.c",
     "slave.c",
     "state.c",
+    "stepping.c",
     "text.c",
+    "values.c",
     "variables.c",
 )
 SOURCES = {

@@ -3,7 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "instance.h"
+#include "derivatives.h"
+#include "lifecycle.h"
+#include "log.h"
+#include "slave.h"
+#include "variables.h"
 
 #define NOT_PROVIDED "the block has no directional_derivative; modelDescription.xml says that none are provided"
 

@@ -2,9 +2,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "log.h"
 #include "platform.h"
 #include "python_api.h"
 #include "side.h"
+#include "variables.h"
 
 #define FILE_INPUT 257 /* Py_file_input */
 
@@ -206,11 +208,10 @@ static void warn_of(const Instance *instance, const char *function, PyObject *lo
     drop(warning);
 }
 
-/* The table, taken over. */
-static bool take_table(Instance *instance) {
+static bool fetch_table(Instance *instance) {
     PyObject *bytes = invoke(instance, "table", NULL, NULL);
     Answer table = {0};
-    bool taken = bytes && take(bytes, &table) && slave_take_table(instance, table.bytes, table.size, 0);
+    bool taken = bytes && take(bytes, &table) && take_table(instance, table.bytes, table.size, 0);
     free(table.bytes);
     drop(bytes);
     return taken;
@@ -226,7 +227,7 @@ static bool begin(Instance *instance, const char *function, const char *resource
     PyObject *wanted = py.PyUnicode_FromString(token);
     if (start && folder && wanted) side->slave = py.PyObject_CallFunctionObjArgs(start, folder, wanted, NULL);
     side->step = side->slave ? py.PyObject_GetAttrString(side->slave, "step") : NULL;
-    bool begun = side->step && take_table(instance);
+    bool begun = side->step && fetch_table(instance);
     if (begun)
         warn_of(instance, function, loader, folder);
     else

@@ -2,9 +2,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "derivatives.h"
 #include "fmi.h"
-#include "instance.h"
+#include "lifecycle.h"
+#include "log.h"
 #include "platform.h"
+#include "slave.h"
+#include "state.h"
+#include "stepping.h"
+#include "text.h"
+#include "values.h"
+#include "variables.h"
 
 #define ASYNCHRONOUS "steps are done when fmi2DoStep returns"
 #define DERIVATIVES "derivatives of inputs and outputs with respect to time are not provided"

@@ -2,8 +2,14 @@
 #include <stdlib.h>
 
 #include "fmi.h"
-#include "instance.h"
+#include "lifecycle.h"
+#include "log.h"
 #include "platform.h"
+#include "sampling.h"
+#include "slave.h"
+#include "state.h"
+#include "stepping.h"
+#include "text.h"
 
 /* The callback does not say whose message it is, so the message begins with the instance's name. */
 static void log_message(const Instance *instance, Status status, const char *category, const char *message) {

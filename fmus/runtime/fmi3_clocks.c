@@ -3,7 +3,8 @@
  * Its value reference follows those of all other variables (fmus/fmi3_description.py).
  */
 #include "fmi.h"
-#include "instance.h"
+#include "log.h"
+#include "sampling.h"
 
 #define NO_CLOCKS "this unit has no clocks"
 #define REFERENCES const fmi3ValueReference vr[], size_t n

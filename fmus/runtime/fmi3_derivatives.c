@@ -1,6 +1,6 @@
 /* FMI 3.0: partial derivatives. */
+#include "derivatives.h"
 #include "fmi.h"
-#include "instance.h"
 
 #define ARGUMENTS                                                                                                   \
     fmi3Instance handle, const fmi3ValueReference unknowns[], size_t n_unknowns, const fmi3ValueReference knowns[], \

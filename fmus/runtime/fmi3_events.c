@@ -2,7 +2,8 @@
 #include <math.h>
 
 #include "fmi.h"
-#include "instance.h"
+#include "log.h"
+#include "stepping.h"
 
 #define BEGIN(modes)             \
     Instance *instance = handle; \

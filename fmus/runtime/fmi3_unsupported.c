@@ -1,6 +1,6 @@
 /* FMI 3.0: what a unit does not offer. The functions are there, so that a host finds every name, and refuse. */
 #include "fmi.h"
-#include "instance.h"
+#include "log.h"
 
 #define CONFIGURATION "this unit has no structural parameters"
 #define DEPENDENCIES "the dependencies do not change, see ModelStructure in modelDescription.xml"

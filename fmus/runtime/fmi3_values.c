@@ -2,7 +2,9 @@
 #include <string.h>
 
 #include "fmi.h"
-#include "instance.h"
+#include "log.h"
+#include "values.h"
+#include "variables.h"
 
 typedef const fmi3ValueReference References[];
 
@@ -27,7 +29,7 @@ static bool kept(const Instance *instance, const char *function, uint32_t refere
     if (number == as_told) return true;
     const Variable *variable = variable_of(instance, reference);
     refuse(instance, function, "the value %lld of '%s' (value reference %u) does not fit its type", (long long)number,
-           instance->names + variable->name, reference);
+           name_of(instance, variable), reference);
     return false;
 }
 
@@ -100,7 +102,7 @@ fmi3Status fmi3GetBinary(fmi3Instance handle, References vr, size_t n, size_t si
 static bool fits(const Instance *instance, const char *function, const Variable *variable, size_t size,
                  fmi3Binary value) {
     const BinaryBuffer *buffer = &instance->binaries[variable->offset];
-    const char *name = instance->names + variable->name;
+    const char *name = name_of(instance, variable);
     if (size > 0 && !given(instance, function, value, name)) return false;
     if (size == 0 || size == buffer->capacity || (!buffer->exact && size < buffer->capacity)) return true;
     refuse(instance, function, "%zu bytes for '%s', which takes %s%llu", size, name, buffer->exact ? "" : "at most ",

@@ -1,7 +1,18 @@
-/* One instance of a unit, whatever the standard: its modes, its variables' buffers, its Python side.
+/* One instance of a unit, whatever the standard: its mode, its variables' buffers, its Python side.
  *
- * fmi2.c and fmi3_*.c translate the standards' functions into these. `function` is always the name of the standard's
- * function that the host called; it begins the log line of every refusal.
+ * fmi2.c and fmi3_*.c translate the standards' functions into calls of these files, each of which calls what stands
+ * below it and nothing above:
+ *
+ *     values.c, derivatives.c   variables, read and written; partial derivatives of outputs by inputs
+ *     lifecycle.c, stepping.c   modes from instantiation to the end; steps and event mode
+ *     sampling.c, state.c       ticks of a sampled block; saved states
+ *     slave.c                   calls into Python
+ *     embedded.c, remote.c      Python in the host's process, or in one of its own
+ *     variables.c               the table of variables, checks of their values
+ *     log.c                     what the host is told
+ *
+ * In all of them `function` is the name of the standard's function that the host called; it begins the log line of every
+ * refusal.
  *
  * A refused call (wrong mode, unknown variable, NULL) changes nothing, be it refused here or by a Python exception
  * with a true `is_refusal`. A failure in the block's own code puts the instance into the mode FAILED: it can be reset,
@@ -13,8 +24,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-#include "text.h"
 
 /* The values are those of fmi2Status and fmi3Status. */
 typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR } Status;
@@ -132,124 +141,5 @@ struct Instance {
 
     SavedState *states;
 };
-
-/* log.c */
-
-enum { LOG_WARNINGS = 1, LOG_NOTES = 2, LOG_EVERYTHING = 3 };
-
-#define CATEGORY_ERROR "logStatusError"
-#define CATEGORY_WARNING "logStatusWarning"
-#define CATEGORY_ALL "logAll"
-
-Status refuse(const Instance *instance, const char *function, const char *format, ...);
-void warn(const Instance *instance, const char *function, const char *format, ...);
-void note(const Instance *instance, const char *function, const char *format, ...);
-Status refuse_unsupported(const Instance *instance, const char *function, const char *reason);
-
-/* Whether the function may be called now; if not, says so in the log. */
-bool allowed(const Instance *instance, const char *function, unsigned modes);
-bool given(const Instance *instance, const char *function, const void *pointer, const char *what);
-Status set_logging(Instance *instance, const char *function, bool on, size_t n, const char *const categories[]);
-
-/* slave.c: calls into Python, wherever it runs (side.h). Those that change the block (call, step, set_state) put the
- * instance into the mode FAILED if they fail otherwise than by a refusal; all do if the interpreter is gone. */
-
-bool slave_start(Instance *instance, const char *function, const char *resources, const char *token);
-void slave_release(Instance *instance);
-bool slave_revive(Instance *instance, const char *function); /* so that a call can be made, if there is a way */
-Status slave_call(Instance *instance, const char *function, const char *method);
-Status slave_step(Instance *instance, const char *function);
-Status slave_get_state(Instance *instance, const char *function, char **bytes, size_t *size);
-Status slave_set_state(Instance *instance, const char *function, const char *bytes, size_t size);
-/* The real outputs' derivative in a direction of the real inputs, both as they lie in `floats`. */
-Status slave_derivative(Instance *instance, const char *function, const double seed[], double sensitivity[]);
-Status slave_get_string(Instance *instance, const char *function, size_t index, const char **value);
-Status slave_set_string(Instance *instance, const char *function, size_t index, const char *value);
-
-/* instance.c: life and time */
-
-Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void), void *environment, bool logging);
-void instance_free(Instance *instance);
-Status instance_set_times(Instance *instance, const char *function, double start, bool has_stop, double stop);
-Status instance_enter_initialisation(Instance *instance, const char *function);
-Status instance_exit_initialisation(Instance *instance, const char *function);
-Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
-Status instance_terminate(Instance *instance, const char *function);
-Status instance_reset(Instance *instance, const char *function);
-Status instance_refresh_outputs(Instance *instance, const char *function);
-double time_tolerance(const Instance *instance); /* what a host may lose by adding up step sizes */
-Status plain_step(Instance *instance, const char *function, double t, double dt);
-bool inputs_finite(const Instance *instance, const char *function);
-/* If not, the block has got there by itself, so it is of no further use: the mode is FAILED. */
-Status check_outputs(Instance *instance, const char *function);
-
-/* sampling.c: ticks of a sampled block */
-
-static inline bool is_sampled(const Instance *instance) { return instance->period_counter != 0; }
-static inline bool has_clock(const Instance *instance) { return instance->abilities & HAS_CLOCK; }
-double period(const Instance *instance);
-Status sampling_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
-Status sampling_activate(Instance *instance, const char *function);
-Status sampling_evaluate(Instance *instance, const char *function);
-Status sampling_settle(Instance *instance, const char *function);
-
-/* events.c: event mode, and blocks that have events of their own */
-
-static inline bool has_events(const Instance *instance) { return instance->abilities & HAS_EVENTS; }
-Status events_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
-Status events_enter(Instance *instance, const char *function);
-Status events_leave(Instance *instance, const char *function);
-Status events_update(Instance *instance, const char *function, double *next_event);
-
-/* derivatives.c */
-
-/* J seed of the real outputs `unknowns` by the real inputs `knowns`; `adjoint` gives seed J instead. */
-Status get_derivative(Instance *instance, const char *function, bool adjoint, const uint32_t unknowns[], size_t n_unknowns,
-                      const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
-                      double sensitivity[], size_t n_sensitivity);
-
-/* variables.c */
-
-/* The variable of a checked value reference. */
-static inline const Variable *variable_of(const Instance *instance, uint32_t reference) {
-    return &instance->variables[reference];
-}
-
-/* Whether these variables may be read (written) now and have `values` entries altogether. Reading brings outputs up to
- * date, writing marks them stale. */
-bool may_get(Instance *instance, const char *function, Kind kind, Type type, const uint32_t references[], size_t n,
-             const void *values, size_t n_values);
-bool may_set(Instance *instance, const char *function, Kind kind, Type type, const uint32_t references[], size_t n,
-             const void *values, size_t n_values);
-
-/* Whether an integer variable takes a number. */
-bool takes_integer(const Instance *instance, const char *function, uint32_t reference, int64_t number);
-
-Status get_floats(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n, double values[],
-                  size_t);
-Status set_floats(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
-                  const double values[], size_t);
-Status get_singles(Instance *instance, const char *function, const uint32_t vr[], size_t n, float values[], size_t);
-Status set_singles(Instance *instance, const char *function, const uint32_t vr[], size_t n, const float values[],
-                   size_t);
-Status get_strings(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
-                   const char *values[], size_t);
-Status set_strings(Instance *instance, const char *function, Type type, const uint32_t vr[], size_t n,
-                   const char *const values[], size_t);
-
-/* The first of `n` real entries that is not finite, described, or false if all are. */
-bool find_not_finite(const Instance *instance, size_t first, size_t n, Text *description);
-/* The same for the first Float32 output that no Float32 holds. */
-bool find_beyond_single(const Instance *instance, Text *description);
-
-/* state.c */
-
-Status state_get(Instance *instance, const char *function, void **state);
-Status state_set(Instance *instance, const char *function, void *state);
-Status state_free(Instance *instance, const char *function, void **state);
-Status state_size(Instance *instance, const char *function, void *state, size_t *size);
-Status state_serialise(Instance *instance, const char *function, void *state, void *bytes, size_t size);
-Status state_deserialise(Instance *instance, const char *function, const void *bytes, size_t size, void **state);
-void states_free(Instance *instance);
 
 #endif

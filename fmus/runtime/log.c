@@ -2,7 +2,8 @@
  * their category is among those that the host has chosen. */
 #include <string.h>
 
-#include "instance.h"
+#include "log.h"
+#include "text.h"
 
 static void say(const Instance *instance, Status status, const char *category, const char *function, const char *format,
                 va_list arguments) {
@@ -40,6 +41,13 @@ void note(const Instance *instance, const char *function, const char *format, ..
 
 Status refuse_unsupported(const Instance *instance, const char *function, const char *reason) {
     return refuse(instance, function, "not supported: %s", reason);
+}
+
+void refuse_unreadable(const Instance *instance, const char *function, const char *path) {
+    refuse(instance, function,
+           "%s cannot be read: the resources folder lacks it. Either the resource location is wrong, or the FMU was "
+           "taken apart. Cure: give the location of the unpacked FMU's folder resources, or build the FMU again",
+           path);
 }
 
 static const char *mode_name(Mode mode) {

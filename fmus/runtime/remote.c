@@ -9,10 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "log.h"
 #include "platform.h"
 #include "process.h"
 #include "python_api.h"
 #include "side.h"
+#include "variables.h"
 
 #define TIMEOUT 300.0 /* s: for a call, if FMU_PYTHON_TIMEOUT is not set */
 #define STARTING 60.0 /* s: at least, for starting */
@@ -139,7 +141,7 @@ static bool take_over(Instance *instance, const char *function, const Answer *an
         return false;
     }
     uint64_t shift = (uint64_t)(uintptr_t)memory->address - begun.address;
-    return slave_take_table(instance, table, size - (size_t)(table - answer->bytes), shift);
+    return take_table(instance, table, size - (size_t)(table - answer->bytes), shift);
 }
 
 /* Starts the interpreter and the slave in it. NO_PYTHON: the interpreter is of no use, `fault` says why. */

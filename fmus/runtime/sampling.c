@@ -7,7 +7,10 @@
  */
 #include <math.h>
 
-#include "instance.h"
+#include "log.h"
+#include "sampling.h"
+#include "slave.h"
+#include "variables.h"
 
 #define MOST_TICKS 1e9 /* in a step: hours */
 #define STEP_TOLERANCE 1e-6 /* relative: hosts write step sizes as decimals, and add them up */

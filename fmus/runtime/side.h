@@ -8,6 +8,7 @@
 #define SIDE_H
 
 #include "instance.h"
+#include "text.h"
 
 typedef enum {
     ANSWERED,
@@ -42,11 +43,5 @@ typedef enum { STARTED, NOT_STARTED, NO_PYTHON } Start; /* NOT_STARTED is in the
 
 Start embedded_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried);
 Start remote_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried);
-
-/* Logs that a file of the FMU's sources is not where it is to be. */
-void refuse_unreadable(const Instance *instance, const char *function, const char *path);
-
-/* Takes over the table that describes the buffers; their addresses in it are off by `shift`. */
-bool slave_take_table(Instance *instance, const char *bytes, size_t size, uint64_t shift);
 
 #endif

@@ -2,47 +2,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "log.h"
 #include "platform.h"
 #include "side.h"
-
-bool slave_take_table(Instance *instance, const char *bytes, size_t size, uint64_t shift) {
-    TableHeader header;
-    char *table = malloc(size);
-    if (!table) return false;
-    memcpy(table, bytes, size);
-    memcpy(&header, bytes, sizeof header);
-    free(instance->table);
-    instance->table = table;
-    BinaryBuffer *binaries = (BinaryBuffer *)(table + sizeof header);
-    for (uint64_t i = 0; i < header.binaries; i++) binaries[i].address += shift;
-    instance->binaries = binaries;
-    instance->variables = (const Variable *)(binaries + header.binaries);
-    instance->n_variables = header.variables;
-    instance->names = (const char *)(instance->variables + header.variables);
-    instance->floats = (double *)(uintptr_t)(header.floats + shift);
-    instance->integers = (int64_t *)(uintptr_t)(header.integers + shift);
-    instance->booleans = (uint8_t *)(uintptr_t)(header.booleans + shift);
-    instance->sizes = (uint64_t *)(uintptr_t)(header.sizes + shift);
-    instance->first_input = header.first_input;
-    instance->n_inputs = header.inputs;
-    instance->first_output = header.first_output;
-    instance->n_outputs = header.outputs;
-    instance->gives_singles = false;
-    for (size_t i = 0; i < instance->n_variables; i++)
-        if (instance->variables[i].causality == OUTPUT && instance->variables[i].type == TYPE_FLOAT32)
-            instance->gives_singles = true;
-    instance->abilities = header.abilities;
-    instance->period_counter = header.period_counter;
-    instance->period_resolution = header.period_resolution;
-    return true;
-}
-
-void refuse_unreadable(const Instance *instance, const char *function, const char *path) {
-    refuse(instance, function,
-           "%s cannot be read: the resources folder lacks it. Either the resource location is wrong, or the FMU was "
-           "taken apart. Cure: give the location of the unpacked FMU's folder resources, or build the FMU again",
-           path);
-}
+#include "slave.h"
 
 /* In which ways the interpreter may run, by FMU_PYTHON_PROCESS. */
 static bool read_ways(const Instance *instance, const char *function, bool *here, bool *apart) {

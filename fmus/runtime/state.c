@@ -2,7 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "instance.h"
+#include "log.h"
+#include "slave.h"
+#include "state.h"
 
 #define MAGIC 0x48435354u /* "HCST": begins a serialised state */
 #define VERSION 2u

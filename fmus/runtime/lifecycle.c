@@ -1,10 +1,15 @@
-#include "instance.h"
-
+/* An instance from instantiation to its end, through the modes that the host puts it in; steps and event mode are in
+ * stepping.c. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-#define TIME_TOLERANCE 1e-9 /* of the time, or of 1 s: what a host may lose by adding up step sizes */
+#include "lifecycle.h"
+#include "log.h"
+#include "sampling.h"
+#include "slave.h"
+#include "state.h"
+#include "text.h"
+#include "variables.h"
 
 Instance *instance_new(const char *name, Logger *log, void (*host_logger)(void), void *environment, bool logging) {
     Instance *instance = calloc(1, sizeof *instance);
@@ -30,28 +35,6 @@ void instance_free(Instance *instance) {
     free(instance);
 }
 
-static void refuse_text(const Instance *instance, const char *function, Text *bad) {
-    refuse(instance, function, "%s", text_of(bad));
-    text_clear(bad);
-}
-
-bool inputs_finite(const Instance *instance, const char *function) {
-    Text bad = {0};
-    bool found = find_not_finite(instance, instance->first_input, instance->n_inputs, &bad);
-    if (found) refuse_text(instance, function, &bad);
-    return !found;
-}
-
-Status check_outputs(Instance *instance, const char *function) {
-    Text bad = {0};
-    bool found = find_not_finite(instance, instance->first_output, instance->n_outputs, &bad) ||
-                 (instance->gives_singles && find_beyond_single(instance, &bad));
-    if (!found) return STATUS_OK;
-    refuse_text(instance, function, &bad);
-    instance->mode = FAILED;
-    return STATUS_ERROR;
-}
-
 Status instance_set_times(Instance *instance, const char *function, double start, bool has_stop, double stop) {
     if (!isfinite(start)) return refuse(instance, function, "the start time is %g", start);
     if (has_stop && !(stop >= start))
@@ -68,6 +51,8 @@ Status instance_enter_initialisation(Instance *instance, const char *function) {
     return STATUS_OK;
 }
 
+/* Outputs are worked out when they are asked for, as hosts set one variable after another. Between steps they are those
+ * of the last step, whatever was set since. */
 Status instance_refresh_outputs(Instance *instance, const char *function) {
     if (!instance->outputs_stale) return STATUS_OK;
     if (instance->events.clock_active && instance->mode == EVENT) return sampling_evaluate(instance, function);
@@ -87,47 +72,13 @@ Status instance_exit_initialisation(Instance *instance, const char *function) {
     return STATUS_OK;
 }
 
-double time_tolerance(const Instance *instance) {
-    return TIME_TOLERANCE * fmax(1.0, fabs(instance->floats[0]));
-}
-
-Status plain_step(Instance *instance, const char *function, double t, double dt) {
-    double before = instance->floats[0], dt_before = instance->floats[1];
-    instance->floats[0] = t;
-    instance->floats[1] = dt;
-    if (slave_step(instance, function) != STATUS_OK) {
-        instance->floats[0] = before;
-        instance->floats[1] = dt_before;
-        return STATUS_ERROR;
-    }
-    instance->floats[0] = t + dt;
-    return check_outputs(instance, function);
-}
-
-Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
-    double tolerance = time_tolerance(instance);
-    if (!(fabs(t - instance->floats[0]) <= tolerance))
-        return refuse(instance, function, "the step begins at t = %.17g s where the instance is at %.17g s", t,
-                      instance->floats[0]);
-    if (!(dt > 0.0 && isfinite(t + dt)))
-        return refuse(instance, function, "the step size is %.17g s; it must be positive, and the step's end finite",
-                      dt);
-    if (t + dt > instance->stop_time + tolerance)
-        return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
-                      instance->stop_time);
-    if (!inputs_finite(instance, function)) return STATUS_ERROR;
-    *end = (StepEnd){false, false};
-    if (is_sampled(instance)) return sampling_step(instance, function, t, dt, end);
-    if (instance->event_mode_used && has_events(instance)) return events_step(instance, function, t, dt, end);
-    return plain_step(instance, function, t, dt);
-}
-
 Status instance_terminate(Instance *instance, const char *function) {
     note(instance, function, "ends at t = %.17g s", instance->floats[0]);
     instance->mode = TERMINATED;
     return STATUS_OK;
 }
 
+/* From any mode, so it is also the way back after a failure: there may be no interpreter any more. */
 Status instance_reset(Instance *instance, const char *function) {
     if (!slave_revive(instance, function) || slave_call(instance, function, "reset") != STATUS_OK) return STATUS_ERROR;
     instance->mode = INSTANTIATED;

@@ -1,7 +1,31 @@
-/* Event mode, and blocks with events of their own (cosim/eventful_block.py). */
+/* How an instance gets on in time: steps, and event mode between them. A block may have events of its own
+ * (cosim/eventful_block.py); what a sampled block does in a step, and at its ticks, is in sampling.c. */
 #include <math.h>
 
-#include "instance.h"
+#include "log.h"
+#include "sampling.h"
+#include "slave.h"
+#include "stepping.h"
+#include "variables.h"
+
+#define TIME_TOLERANCE 1e-9 /* of the time, or of 1 s: what a host may lose by adding up step sizes */
+
+static double time_tolerance(const Instance *instance) {
+    return TIME_TOLERANCE * fmax(1.0, fabs(instance->floats[0]));
+}
+
+static Status plain_step(Instance *instance, const char *function, double t, double dt) {
+    double before = instance->floats[0], dt_before = instance->floats[1];
+    instance->floats[0] = t;
+    instance->floats[1] = dt;
+    if (slave_step(instance, function) != STATUS_OK) {
+        instance->floats[0] = before;
+        instance->floats[1] = dt_before;
+        return STATUS_ERROR;
+    }
+    instance->floats[0] = t + dt;
+    return check_outputs(instance, function);
+}
 
 /* When the block will have an event that is known beforehand; infinity if none. */
 static Status ask_next_event(Instance *instance, const char *function, double *next) {
@@ -12,7 +36,7 @@ static Status ask_next_event(Instance *instance, const char *function, double *n
 
 /* Without leave to return early the block handles what happens within the step by itself; only an event at the step's
  * end is left to the host. */
-Status events_step(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
+static Status step_to_event(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
     if (instance->events.event_pending)
         return refuse(instance, function,
                       "the event at t = %.17g s is not handled yet: call fmi3EnterEventMode and "
@@ -39,6 +63,24 @@ Status events_step(Instance *instance, const char *function, double t, double dt
     return STATUS_OK;
 }
 
+Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
+    double tolerance = time_tolerance(instance);
+    if (!(fabs(t - instance->floats[0]) <= tolerance))
+        return refuse(instance, function, "the step begins at t = %.17g s where the instance is at %.17g s", t,
+                      instance->floats[0]);
+    if (!(dt > 0.0 && isfinite(t + dt)))
+        return refuse(instance, function, "the step size is %.17g s; it must be positive, and the step's end finite",
+                      dt);
+    if (t + dt > instance->stop_time + tolerance)
+        return refuse(instance, function, "the step ends at t = %.17g s, after the stop time %.17g s", t + dt,
+                      instance->stop_time);
+    if (!inputs_finite(instance, function)) return STATUS_ERROR;
+    *end = (StepEnd){false, false};
+    if (is_sampled(instance)) return sampling_step(instance, function, t, dt, end);
+    if (instance->event_mode_used && has_events(instance)) return step_to_event(instance, function, t, dt, end);
+    return plain_step(instance, function, t, dt);
+}
+
 Status events_enter(Instance *instance, const char *function) {
     if (!instance->event_mode_used)
         return refuse(instance, function, "the instance was made with eventModeUsed = fmi3False");
@@ -61,7 +103,6 @@ static Status handle_event(Instance *instance, const char *function) {
     return check_outputs(instance, function);
 }
 
-/* Settles what is due at this instant; gives the time of the next known event, or infinity. */
 Status events_update(Instance *instance, const char *function, double *next) {
     *next = INFINITY;
     if (instance->events.clock_active && sampling_settle(instance, function) != STATUS_OK) return STATUS_ERROR;
