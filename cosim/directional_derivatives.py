@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.fmu_description import FmuDescription, FmuPort
-from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.ports import Floats
 from handover.cosim.state_calls import Call
 
 

@@ -15,8 +15,8 @@ from handover.cosim.failures import STATUS, UnitEnded, failure_of
 from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
 from handover.cosim.fmu_description import FmuDescription, FmuPort
 from handover.cosim.heartbeat import Abandoned, Heartbeat
-from handover.cosim.iterating.magnitudes import Floats
 from handover.cosim.native_step import NativeStep
+from handover.cosim.ports import Floats
 from handover.cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
 from handover.cosim.start_values import numbers_of
 from handover.cosim.state_calls import State, StateCalls

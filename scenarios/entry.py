@@ -1,10 +1,14 @@
 """Where the command `handover` starts: Ctrl-C counts from its first instant."""
 
 import sys
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from handover.scenarios.exit_status import ABORTED
 from handover.scenarios.standard_streams import open_standard_streams
+
+if TYPE_CHECKING:
+    from handover.cosim.heartbeat import Heartbeat
+    from handover.scenarios.forked_child import ChildEnd
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may end the process that they are in."""
@@ -17,7 +21,9 @@ def main() -> None:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
             from handover.scenarios.supervisor import can_supervise, run_to_end, supervise
 
-            (supervise if can_supervise() else run_to_end)(_command)
+            if can_supervise():
+                supervise(_command, _report_crash)
+            run_to_end(_command)
         _command()
     except KeyboardInterrupt:
         _abort()
@@ -29,6 +35,12 @@ def _command() -> None:
     except KeyboardInterrupt:
         _abort()
     command()
+
+
+def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:
+    from handover.scenarios.tell_death import tell_death  # what it loads is loaded by no other run
+
+    return tell_death(heartbeat, end, wall)
 
 
 def _abort() -> NoReturn:

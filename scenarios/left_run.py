@@ -15,7 +15,7 @@ from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment import Experiment
 from handover.scenarios.resumption import Resumption, unpack
 from handover.scenarios.run_folder import BadRunFolder, RunFolder, is_full, sha256_of, version_differences, versions
-from handover.scenarios.ssp_call import open_experiment
+from handover.scenarios.ssp_run import open_experiment
 from handover.scenarios.task import Task
 
 

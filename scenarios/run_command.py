@@ -28,8 +28,8 @@ from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.scenario_arguments import scenario_options
 from handover.scenarios.seconds import Seconds
-from handover.scenarios.ssp_call import open_experiment, refuse_for_ssp, source_of, ssp_options
-from handover.scenarios.ssp_run import NoParameters, is_ssp
+from handover.scenarios.ssp_call import refuse_for_ssp, ssp_options
+from handover.scenarios.ssp_run import NoParameters, is_ssp, open_experiment, source_of
 from handover.scenarios.task import Task
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.

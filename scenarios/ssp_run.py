@@ -1,5 +1,6 @@
 """An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
 
+import contextlib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,9 +11,12 @@ from typing import Any, ClassVar
 from handover.cosim.signals import Signals
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system import System
+from handover.scenarios import supervisor
+from handover.scenarios.bad_call import BadCall
 from handover.scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
 from handover.scenarios.plotting import COLOURS, figure
 from handover.scenarios.record import Record
+from handover.scenarios.run_folder import sha256_of
 
 _MOST_SIGNALS = 6
 """Signals in one figure."""
@@ -98,3 +102,25 @@ def draw_outputs(units: Iterable[str], record: Record, folder: Path) -> list[Fig
             axes[-1].set_xlabel("time (s)")
         figures.append(Figure(file, f"Outputs of {name} over time."))
     return figures
+
+
+def open_experiment(
+    path: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
+) -> Experiment[UntilStop]:
+    """Open an SSP as an experiment; `opened` closes it.
+
+    Raises:
+        InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
+    """
+    ssp = opened.enter_context(SspFile(path, step))
+    supervisor.heartbeat.tell_scratch(str(ssp.folder))
+    until = stop or ssp.stop
+    if until is None:
+        raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
+    return experiment_of(ssp, until)
+
+
+def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
+    """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
+    told = {"stop": str(stop), "step": None if step is None else str(step)}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **told}

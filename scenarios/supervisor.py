@@ -52,8 +52,11 @@ def can_supervise() -> bool:
     return hasattr(os, "fork") and threading.active_count() == 1
 
 
-def supervise(command: Callable[[], Any]) -> NoReturn:
-    """Run a command in a child process and end with its status; if it dies, tell how and complete what it left.
+def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
+    """Run a command in a child process and end with its status.
+
+    If it dies, `report_crash` gets the heartbeat, how the child ended and the seconds that it lived; it completes what
+    the run left, says what happened and returns the exit status.
 
     The child is a process group of its own: the parent alone hears of Ctrl-C and passes on what it hears, so that the
     child hears of each once. If the parent dies, so does the child.
@@ -73,7 +76,7 @@ def supervise(command: Callable[[], Any]) -> NoReturn:
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     end = child.wait()
     assert end is not None  # it watched nothing else
-    _end_as(end, time.monotonic() - began)
+    _end_as(end, time.monotonic() - began, report_crash)
 
 
 def run_to_end(command: Callable[[], Any]) -> NoReturn:
@@ -118,14 +121,12 @@ def _pass_on(child: int) -> None:
         signal.signal(signal.SIGTSTP, stop)
 
 
-def _end_as(end: ChildEnd, wall: float) -> NoReturn:
+def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
     """End as the child did; where it was not done, tell what it died of."""
     if end.signal is not None and end.signal in ORDERS:
         signal.signal(end.signal, signal.SIG_DFL)
         os.kill(os.getpid(), end.signal)
     if heartbeat.status is not None:
         sys.exit(heartbeat.status if end.signal is not None else end.status)
-    from handover.scenarios.tell_death import tell_death  # what it loads is loaded by no other run
-
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(tell_death(heartbeat, end, wall))
+    sys.exit(report_crash(heartbeat, end, wall))

@@ -7,7 +7,7 @@ import numpy as np
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.group import Group
 from handover.cosim.iterating.interface import Interface
-from handover.cosim.iterating.magnitudes import Floats
+from handover.cosim.ports import Floats
 from handover.cosim.system import Connection
 from handover.cosim.variable import Kind
 

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
-from handover.cosim.iterating.magnitudes import Floats, Magnitudes
+from handover.cosim.iterating.magnitudes import Magnitudes
+from handover.cosim.ports import Floats
 
 
 class FixedPoint:

@@ -8,8 +8,8 @@ from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
 from handover.cosim.iterating.group_stepping import MakeSolver
 from handover.cosim.iterating.interface import Interface
 from handover.cosim.iterating.interface_solver import Unsolved
-from handover.cosim.iterating.magnitudes import Floats
 from handover.cosim.iterating.not_converged import not_converged
+from handover.cosim.ports import Floats
 
 
 class InitialValues:

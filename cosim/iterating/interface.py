@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.iterating.magnitudes import Floats, Magnitudes
+from handover.cosim.iterating.magnitudes import Magnitudes
+from handover.cosim.ports import Floats
 from handover.cosim.system import Connection
 from handover.cosim.variable import Kind
 from handover.cosim.width import Width

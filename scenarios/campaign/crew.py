@@ -1,5 +1,6 @@
 """Who carries out the runs of a campaign."""
 
+import os
 from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -31,3 +32,8 @@ class Crew(Protocol):
             CrewLost: all of them have gone for good.
         """
         ...
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

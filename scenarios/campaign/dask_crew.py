@@ -15,7 +15,7 @@ from distributed import Client, LocalCluster
 from handover.cosim.exceptions import one_line
 from handover.scenarios.campaign.bad_crew import BadCrew
 from handover.scenarios.campaign.cluster_crew import ClusterCrew
-from handover.scenarios.campaign.workforce import cores
+from handover.scenarios.campaign.crew import cores
 
 _SILENT = logging.CRITICAL + 1
 _LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")

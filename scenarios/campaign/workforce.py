@@ -2,10 +2,9 @@
 
 import contextlib
 import functools
-import os
 from dataclasses import dataclass
 
-from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.crew import Crew, cores
 
 
 @dataclass(frozen=True)
@@ -52,8 +51,3 @@ class Workforce:
         from handover.scenarios.campaign.scheduler_address import scheduler_address
 
         return scheduler_address(self.scheduler or "")
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -7,7 +7,8 @@ import pytest
 from handover.cosim.iterating.fixed_point import FixedPoint
 from handover.cosim.iterating.interface_newton import InterfaceNewton
 from handover.cosim.iterating.interface_solver import InterfaceSolver, Unsolved
-from handover.cosim.iterating.magnitudes import Floats, Magnitudes
+from handover.cosim.iterating.magnitudes import Magnitudes
+from handover.cosim.ports import Floats
 
 Make = Callable[..., InterfaceSolver]
 
