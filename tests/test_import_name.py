@@ -1,0 +1,62 @@
+"""All is imported under one name, beside whatever folders a user's own repository has."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDERS = ("cosim", "plants", "controllers", "fmus", "scenarios")
+
+PROGRAM = """
+import importlib
+from handover.cosim.system import System
+from handover.plants.hand_tremor import HandTremor
+from handover.scenarios.catalog import SCENARIOS
+from handover.fmus.catalog import UNITS
+assert System.__module__.startswith("handover.")
+for folder in {folders!r}:
+    assert importlib.import_module(folder).OWNER == "user", folder
+    assert importlib.import_module(folder + ".arm").OWNER == "user", folder
+print(len(SCENARIOS), len(UNITS))
+"""
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """A user's repository that has folders, and packages, of the names that ours have, and a script."""
+    for folder in FOLDERS:
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").write_text('OWNER = "user"\n')
+        (tmp_path / folder / "arm.py").write_text('OWNER = "user"\n')
+    (tmp_path / "script.py").write_text(PROGRAM.format(folders=FOLDERS))
+    return tmp_path
+
+
+@pytest.mark.parametrize("added", ["", "."], ids=["plainly", "with PYTHONPATH=."])
+@pytest.mark.parametrize("call", [["script.py"], ["-m", "script"], ["-c", "import script"]], ids=" ".join)
+def test_a_repository_with_folders_of_the_same_names_keeps_them(repository: Path, added: str, call: list[str]):
+    inherited = os.environ.get("PYTHONPATH", "")
+    path = os.pathsep.join(part for part in (added, inherited) if part)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, *call],
+        cwd=repository,
+        env={**environment, **({"PYTHONPATH": path} if path else {})},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    scenarios, units = map(int, done.stdout.split())
+    assert scenarios >= 9
+    assert units >= 17
+
+
+def test_the_package_holds_what_the_five_folders_hold():
+    import handover
+
+    package = Path(handover.__file__ or "").parent
+    for folder in FOLDERS:
+        assert (package / folder / "__init__.py").is_file(), folder
