@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from handover.controllers.marker_reader import Markers
 from handover.controllers.marker_ring import MarkerRing
 from handover.controllers.normal_equations import least_squares
+from handover.cosim.geometry import rotation_by
 from handover.cosim.pinhole import Pinhole
 from handover.cosim.ports import Floats
 
@@ -77,7 +77,7 @@ class RingFit:
                 dx, information = least_squares(J, e)
             except np.linalg.LinAlgError:
                 return None
-            pose = pose[0] + dx[:3], pose[1] @ Rotation.from_rotvec(dx[3:]).as_matrix()
+            pose = pose[0] + dx[:3], pose[1] @ rotation_by(dx[3:])
             if np.abs(dx).max() < _SETTLED:
                 return RingPose(*pose, information)
         return None
@@ -129,7 +129,7 @@ class RingFit:
         _, turns, shifts, _ = cv2.solvePnPGeneric(p_MP, xy, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
         guesses: list[tuple[Floats, Floats]] = []
         for turn, shift in zip(turns, shifts, strict=True):
-            R_WM = camera.R_WC @ Rotation.from_rotvec(np.asarray(turn, dtype=np.float64).ravel()).as_matrix()
+            R_WM = camera.R_WC @ rotation_by(np.asarray(turn, dtype=np.float64).ravel())
             p_WM = camera.p_WC + camera.R_WC @ np.asarray(shift, dtype=np.float64).ravel()
             R_WR = R_WM @ np.transpose(R_RM)
             guesses.append((p_WM - R_WR @ p_RP.mean(axis=0), R_WR))

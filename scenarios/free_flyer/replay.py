@@ -1,6 +1,7 @@
 """The free-flyer in space: with a person, the object and the hand that takes it, or pushed at its gripper."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from handover.cosim.geometry import rotation_of
 from handover.cosim.ports import Floats
@@ -53,7 +54,7 @@ def _robot(record: Record, gap: Floats) -> list[Body]:
         Body(label=label, colour=part.colour, mesh=_own(part, p_WB[0], q_WB[0]), p_WB=p_WB, q_WB=q_WB)
         for label, part in (("robot", cube), ("arm", arm), ("gripper", palm))
     ]
-    z_B = rotation_of(q_WB)[:, :, 2]
+    z_B = Rotation.from_quat(q_WB, scalar_first=True).as_matrix()[:, :, 2]
     for jaw, side in zip(jaws, (0.5, -0.5), strict=True):
         p_WJ = p_WB + side * gap[:, None] * z_B
         made.append(Body(label="gripper", colour=jaw.colour, mesh=_own(jaw, p_WB[0], q_WB[0]), p_WB=p_WJ, q_WB=q_WB))
@@ -77,7 +78,8 @@ def _person(record: Record) -> list[Body]:
 
 def _fingers(record: Record) -> list[Line]:
     """Return thumb and fingers."""
-    p_WH, R_WH = record["person.p_WH"], rotation_of(record["person.q_WH"])
+    p_WH = record["person.p_WH"]
+    R_WH = Rotation.from_quat(record["person.q_WH"], scalar_first=True).as_matrix()
     bent = [finger_points(angles) for angles in record["person.finger"]]
     colour = person_at(record, 0)[1].colour
     made: list[Line] = []
