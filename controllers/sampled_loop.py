@@ -3,18 +3,23 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
-import control as untyped_control
 import numpy as np
 
 from handover.cosim.ports import Floats
 
-control: Any = untyped_control
-
 _LASTING = math.exp(-1.0)  # a pole nearer to zero, as those of a delay are, is all but gone within a sample
 _WHOLE = 1e-9  # of a period: what a delay of whole periods may be off by rounding
+
+
+@cache
+def _control() -> Any:
+    """Load python-control, which takes a second, when the first loop is closed: ports are read without it."""
+    import control
+
+    return control
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,12 +72,12 @@ class SampledLoop:
         whole = math.floor(self.delay / self.period + _WHOLE)
         line = _delay_line(commands, whole, self.period)
         past = max(self.delay - whole * self.period, 0.0)
-        straight = control.ss([], [], [], np.eye(disturbances), self.period)
-        forward = _sampled(self._plant, past, self.period) * control.append(line, straight)
+        straight = _control().ss([], [], [], np.eye(disturbances), self.period)
+        forward = _sampled(self._plant, past, self.period) * _control().append(line, straight)
         c = self._controller
         idle = np.zeros((disturbances, c.D.shape[1]))
-        law = control.ss(c.A, c.B, np.vstack([c.C, idle[:, : c.A.shape[0]]]), np.vstack([c.D, idle]), self.period)
-        return control.feedback(forward, law)[:, commands:]
+        law = _control().ss(c.A, c.B, np.vstack([c.C, idle[:, : c.A.shape[0]]]), np.vstack([c.D, idle]), self.period)
+        return _control().feedback(forward, law)[:, commands:]
 
     @cached_property
     def poles(self) -> Any:
@@ -101,7 +106,7 @@ class SampledLoop:
     def response(self, d: Floats) -> Floats:
         """Return y, shape (n, outputs), at the beginnings of n periods from rest, with d of shape (n, disturbances)."""
         T = self.period * np.arange(len(d))
-        y: Floats = control.forced_response(self.system, T, np.transpose(d), squeeze=False).outputs
+        y: Floats = _control().forced_response(self.system, T, np.transpose(d), squeeze=False).outputs
         return np.transpose(y)
 
 
@@ -120,7 +125,7 @@ def _delay_line(channels: int, periods: int, period: float) -> Any:
     A, B = np.eye(n, k=-channels), np.eye(n, channels)
     C, D = np.eye(n + channels, n, k=-channels), np.eye(n + channels, channels)  # u[n], then the states, newest first
     wanted = slice(channels * periods, None)
-    return control.ss(A, B, C[wanted], D[wanted], period)
+    return _control().ss(A, B, C[wanted], D[wanted], period)
 
 
 def _sampled(plant: LinearPlant, past: float, period: float) -> Any:
@@ -131,11 +136,11 @@ def _sampled(plant: LinearPlant, past: float, period: float) -> Any:
     commands = plant.B.shape[1]
     before = np.zeros_like(plant.B) if older is None else newer.A @ older.B[:, :commands]
     B = np.hstack([newer.B[:, :commands], before, whole.B[:, commands:]])
-    return control.ss(whole.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])), period)
+    return _control().ss(whole.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])), period)
 
 
 @lru_cache(maxsize=16)
 def _discrete(plant: LinearPlant, time: float) -> Any:
     B = np.hstack([plant.B, plant.E])
-    continuous = control.ss(plant.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])))
-    return control.sample_system(continuous, time, method="zoh")
+    continuous = _control().ss(plant.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])))
+    return _control().sample_system(continuous, time, method="zoh")

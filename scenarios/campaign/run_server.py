@@ -9,6 +9,7 @@ Where processes cannot be forked (Windows) it carries runs out itself: what a un
 
 import contextlib
 import gc
+import importlib
 import os
 import pickle
 import select
@@ -23,6 +24,7 @@ from typing import BinaryIO, NoReturn
 from handover.cosim.heartbeat import Heartbeat
 from handover.fmus.build import import_block
 from handover.fmus.catalog import UNITS
+from handover.fmus.sources import closure
 from handover.scenarios import supervisor
 from handover.scenarios.campaign.ordered_run import (
     answer_of,
@@ -78,6 +80,8 @@ class RunServer:
         for unit in SCENARIOS[scenario].units.values():
             with contextlib.suppress(Exception):  # a run that needs it will tell
                 import_block(UNITS[unit].block)
+                for package in closure(UNITS[unit].block).modules:  # also what is imported at first use only
+                    importlib.import_module(package)
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
 
