@@ -11,16 +11,18 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from handover.cosim.capabilities import Capabilities, capabilities_of
 from handover.cosim.events.fmu_clock import FmuClock, clocks_of, without_clocks
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmpy_edge import ModelDescription, ModelVariable, mime_types, read_description
 from handover.cosim.fmu_xml import XmlElement
 from handover.cosim.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.variable import Causality, Declared, Kind
 from handover.cosim.width import Width
+
+if TYPE_CHECKING:
+    from handover.cosim.fmpy_edge import ModelDescription, ModelVariable
 
 _KINDS = {
     "Real": Kind.REAL,
@@ -110,6 +112,11 @@ def describe_fmu(path: Path) -> FmuDescription:
         InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, or a clock
             that cannot tick.
     """
+    from handover.cosim.fmpy_edge import (  # FMPy takes long to load, and wiring knows no file yet
+        mime_types,
+        read_description,
+    )
+
     md, root = read_description(path)
     is_fmi2 = md.fmiVersion == "2.0"
     units = {u.name: _unit(u) for u in md.unitDefinitions}
@@ -160,7 +167,7 @@ def _unit(u: Any) -> Unit:
     return Unit(u.name, base, float(u.baseUnit.factor or 1.0), float(u.baseUnit.offset or 0.0))
 
 
-def _port(v: ModelVariable, units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
+def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = _KINDS.get(v.type)
     if kind is None:  # clocks, see `handover.cosim.events.fmu_clock`, and whatever later standards bring
         return None
@@ -226,7 +233,7 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
 
 
 def _feedthrough(
-    md: ModelDescription, owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
+    md: "ModelDescription", owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
     """Return the declared and the presumed dependencies of outputs on inputs."""
     declared: dict[str, set[str]] = defaultdict(set)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
@@ -41,6 +40,8 @@ class Row:
 
 def page(model: Model, packages: list[Package]) -> bytes:
     """Return the page as HTML."""
+    import jinja2  # long to load, and most builds are found in the cache
+
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,

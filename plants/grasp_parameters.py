@@ -27,6 +27,9 @@ from handover.cosim.units import (
 from handover.plants.grasp_objects import SOLIDS, Solid, Thing, outlines
 from handover.plants.infrared_sensor import InfraredSensor, UnusableSensor
 
+SEES_NOTHING = 0.2
+"""Value of the output `range` where a sensor's ray meets no object, in m."""
+
 _LIGHTEST = 1e-3
 """Least mass of an object, kg: contacts with much heavier phalanges fling away what is lighter."""
 

@@ -13,11 +13,8 @@ from handover.cosim.ports import Vector2, Vector3, Vector8, output, port
 from handover.cosim.refusal import Refusal
 from handover.cosim.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.grasp_hand import FINGERS
-from handover.plants.grasp_parameters import Params, UnusableScene
+from handover.plants.grasp_parameters import SEES_NOTHING, Params, UnusableScene
 from handover.plants.grasp_world import DT, Command, GraspWorld, beginning
-
-SEES_NOTHING = 0.2
-"""Value of the output `range` where a sensor's ray meets no object, in m."""
 
 _SLOT = 5  # internal steps for which a sensor is active
 _CHECKPOINT = 500  # internal steps after which the world is made anew of its own snapshot

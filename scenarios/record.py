@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest
@@ -17,6 +16,8 @@ class Record:
     """The signals of a run. `time` is in seconds, shape (rows,)."""
 
     def __init__(self, path: Path) -> None:
+        import pyarrow.parquet as pq  # long to load, and records are named by scenarios that have none yet
+
         self._table = pq.read_table(path)
         self._columns: dict[str, list[str]] = {}
         for name in self._table.column_names:

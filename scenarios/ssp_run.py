@@ -14,7 +14,6 @@ from handover.cosim.system import System
 from handover.scenarios import supervisor
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
-from handover.scenarios.plotting import COLOURS, figure
 from handover.scenarios.record import Record
 from handover.scenarios.run_folder import sha256_of
 
@@ -86,6 +85,8 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
 
 def draw_outputs(units: Iterable[str], record: Record, folder: Path) -> list[Figure]:
     """Draw the first real outputs of each unit over time, an axis for each."""
+    from handover.scenarios.plotting import COLOURS, figure  # what draws takes long to load
+
     figures: list[Figure] = []
     for name in units:
         ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MOST_SIGNALS]

@@ -10,11 +10,8 @@ import numpy as np
 from handover.cosim.ports import Floats
 from handover.cosim.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.free_flyer.handover_figures import draw_handover
 from handover.scenarios.free_flyer.handover_parameters import Parameters
-from handover.scenarios.free_flyer.handover_plots import plot_handover
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch
-from handover.scenarios.free_flyer.replay import replay_handover
 from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_handover
 from handover.scenarios.paper import paper_values
 from handover.scenarios.parameters import BadParameter
@@ -118,14 +115,20 @@ class FlyerHandover(Experiment[HandoverWatch]):
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw paths, gripper, thrust over time, and the scene at three moments."""
+        from handover.scenarios.free_flyer.handover_figures import draw_handover  # what draws takes long to load
+
         return draw_handover(parameters, watch, record, folder)
 
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return the gripper's place, speed and angle, who holds the object, and thrust over time."""
+        from handover.scenarios.free_flyer.handover_plots import plot_handover
+
         return plot_handover(parameters, record, self.receivers)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return robot, hand and object in space."""
+        from handover.scenarios.free_flyer.replay import replay_handover
+
         return replay_handover(record)
 
 

@@ -9,12 +9,9 @@ import numpy as np
 
 from handover.cosim.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.free_flyer.impedance_figures import draw_push
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
-from handover.scenarios.free_flyer.impedance_plots import plot_push
 from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from handover.scenarios.free_flyer.published import published_of_push
-from handover.scenarios.free_flyer.replay import replay_push
 from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from handover.scenarios.paper import paper_values
 from handover.scenarios.record import Record
@@ -97,12 +94,18 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
 
     def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
+        from handover.scenarios.free_flyer.impedance_figures import draw_push  # what draws takes long to load
+
         return draw_push(parameters, watch, record, folder)
 
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return errors actual and calculated, push and thrust over time."""
+        from handover.scenarios.free_flyer.impedance_plots import plot_push
+
         return plot_push(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return the robot, its gripper's place of rest and the push in space."""
+        from handover.scenarios.free_flyer.replay import replay_push
+
         return replay_push(record)

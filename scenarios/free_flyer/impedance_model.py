@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from handover.cosim.ports import Floats
 from handover.scenarios.free_flyer.behaviour import Behaviour
 from handover.scenarios.paper import paper_values
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
 """Signals of a push that make up a `Motion`, in the order of its fields after time."""
@@ -55,7 +57,9 @@ class Errors:
     @property
     def disagreement(self) -> tuple[float, float]:
         """Greatest difference along any axis, m and rad; of orientations, the turn from one to the other."""
-        apart: Rotation = Rotation.from_rotvec(-self.R) * Rotation.from_rotvec(self.R_model)
+        from scipy.spatial.transform import Rotation  # long to load, and used when a run has ended
+
+        apart = Rotation.from_rotvec(-self.R) * Rotation.from_rotvec(self.R_model)
         turn: Floats = np.array(apart.as_rotvec())
         return float(np.max(np.abs(self.p - self.p_model))), float(np.max(np.abs(turn)))
 
@@ -76,6 +80,8 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     else is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
     the mean is turned back by half the step's turn.
     """
+    from scipy.spatial.transform import Rotation
+
     body = paper_values("free_flyer", "robot")
     gains = paper_values("free_flyer", f"gains_{behaviour.item}")
     m: float = body["mass"]
@@ -95,8 +101,10 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     )
 
 
-def _propulsion(motion: Motion, R_WB: Rotation, r_W: Floats, m: float, I_B: Floats) -> tuple[Floats, Floats]:
+def _propulsion(motion: Motion, R_WB: "Rotation", r_W: Floats, m: float, I_B: Floats) -> tuple[Floats, Floats]:
     """Return force, and torque about B, of the propulsion in W at the beginning of each step."""
+    from scipy.spatial.transform import Rotation
+
     dt = np.diff(motion.t)[:, np.newaxis]
     v_WB = motion.v_WG - np.cross(motion.w_WB, r_W)
     w_B: Floats = R_WB.apply(motion.w_WB, inverse=True)

@@ -9,11 +9,8 @@ import numpy as np
 
 from handover.cosim.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.helix_handover.figures import draw_handover
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
-from handover.scenarios.helix_handover.plots import plot_handover
 from handover.scenarios.helix_handover.published import published_of
-from handover.scenarios.helix_handover.replay import replay_handover
 from handover.scenarios.helix_handover.rig import calibration
 from handover.scenarios.helix_handover.watch import HandoverWatch
 from handover.scenarios.record import Record
@@ -114,12 +111,18 @@ class HelixHandover(Experiment[HandoverWatch]):
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
+        from handover.scenarios.helix_handover.figures import draw_handover  # what draws takes long to load
+
         return draw_handover(parameters, watch.pictures(), record, folder)
 
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distance to the goal, positions, tendons and gripper over time."""
+        from handover.scenarios.helix_handover.plots import plot_handover
+
         return plot_handover(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return arm, gripper, hand, ball and cameras in space."""
+        from handover.scenarios.helix_handover.replay import replay_handover
+
         return replay_handover(record)

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 
-from handover.controllers.handover_vision import Params as Vision
 from handover.cosim.pinhole import Pinhole
 from handover.cosim.ports import Floats
 from handover.cosim.signals import Signals
@@ -63,6 +62,8 @@ def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
 
 def _mark(side: Cover, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
     """Yield the mark of a point, unless it is behind the camera."""
+    from handover.controllers.handover_vision import Params as Vision  # long to load for who only lists parameters
+
     camera = _camera(side)
     u, v = camera.project(p_WP).tolist()
     if np.isfinite(u) and np.isfinite(v):

@@ -9,11 +9,8 @@ import numpy as np
 
 from handover.cosim.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.ir_grasp.figures import draw_grasp
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.plots import plot_grasp
 from handover.scenarios.ir_grasp.published import published_of
-from handover.scenarios.ir_grasp.replay import replay_grasp
 from handover.scenarios.ir_grasp.situation import Situation
 from handover.scenarios.ir_grasp.watch import GraspWatch
 from handover.scenarios.parameters import BadParameter
@@ -112,12 +109,18 @@ class IrGrasp(Experiment[GraspWatch]):
 
     def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments, distances and cost, and the commands."""
+        from handover.scenarios.ir_grasp.figures import draw_grasp  # what draws takes long to load
+
         return draw_grasp(parameters, watch.moments, record, folder)
 
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distances, cost, and wrist, heading and closure over time."""
+        from handover.scenarios.ir_grasp.plots import plot_grasp
+
         return plot_grasp(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:
         """Return hand, object and beams in space."""
+        from handover.scenarios.ir_grasp.replay import replay_grasp
+
         return replay_grasp(parameters, record)

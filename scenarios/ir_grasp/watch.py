@@ -8,7 +8,7 @@ from handover.controllers.reflex_parameters import Params as ReflexParams
 from handover.cosim.ports import Floats
 from handover.cosim.signals import Signals
 from handover.plants.grasp_objects import SOLIDS
-from handover.plants.grasp_scene import SEES_NOTHING
+from handover.plants.grasp_parameters import SEES_NOTHING
 from handover.scenarios.experiment import Metric, Outcome, Watch
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.situation import asked_for

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,6 +56,8 @@ class CameraPicture:
         cls, *, t: float, camera: str, role: str, pixels: NDArray[np.uint8], marks: Sequence[Mark] = ()
     ) -> "CameraPicture":
         """Return a picture of pixels, shape (height, width, 3), blue green red."""
+        import cv2  # as below: every scenario knows pictures, most take none
+
         height, width, _ = pixels.shape
         _, coded = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         return cls(t=t, camera=camera, role=role, jpeg=coded.tobytes(), width=width, height=height, marks=tuple(marks))
@@ -64,5 +65,7 @@ class CameraPicture:
     @property
     def pixels(self) -> NDArray[np.uint8]:
         """The pixels as JPEG keeps them, shape (height, width, 3), blue green red."""
+        import cv2
+
         decoded = cv2.imdecode(np.frombuffer(self.jpeg, dtype=np.uint8), cv2.IMREAD_COLOR)
         return np.asarray(decoded, dtype=np.uint8)

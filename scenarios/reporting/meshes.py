@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from handover.cosim.ports import Floats
 
@@ -23,6 +22,8 @@ class Mesh(NamedTuple):
 
 def hull(points: Floats) -> Mesh:
     """Return the convex hull of points, shape (n, 3)."""
+    from scipy.spatial import ConvexHull  # long to load, and meshes are named by scenarios that draw none yet
+
     found = ConvexHull(points)
     triangles = found.simplices.astype(np.int64)
     a, b, c = (points[triangles[:, k]] for k in range(3))

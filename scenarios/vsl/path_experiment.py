@@ -13,10 +13,7 @@ from handover.scenarios.parameters import BadParameter
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.replay import Replay
 from handover.scenarios.reporting.time_plot import TimePlot
-from handover.scenarios.vsl.figures import draw_path_run
 from handover.scenarios.vsl.parameters import Parameters
-from handover.scenarios.vsl.plots import plot_path_run
-from handover.scenarios.vsl.replay import replay_path
 from handover.scenarios.vsl.watch import PathWatch
 
 _MORE = 5
@@ -115,12 +112,18 @@ class PathExperiment(Experiment[PathWatch]):
 
     def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
+        from handover.scenarios.vsl.figures import draw_path_run  # what draws takes long to load
+
         return draw_path_run(parameters, watch, record, folder)
 
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return error and place of the tip, joints, pressures and currents over time."""
+        from handover.scenarios.vsl.plots import plot_path_run
+
         return plot_path_run(parameters, record, hybrid=self.hybrid)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:
         """Return arm, load, path and the tip's way in space."""
+        from handover.scenarios.vsl.replay import replay_path
+
         return replay_path(parameters, record, hybrid=self.hybrid)

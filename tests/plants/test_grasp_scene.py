@@ -10,8 +10,8 @@ from handover.cosim.block_description import describe
 from handover.cosim.ports import Floats
 from handover.plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
 from handover.plants.grasp_objects import SOLIDS, Thing
-from handover.plants.grasp_parameters import Params, UnusableScene
-from handover.plants.grasp_scene import SEES_NOTHING, GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
+from handover.plants.grasp_parameters import SEES_NOTHING, Params, UnusableScene
+from handover.plants.grasp_scene import GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
 from handover.plants.grasp_tendon import PULLEYS, STIFFNESS, resting_posture
 from handover.plants.grasp_world import DT, GraspWorld, beginning
 
