@@ -6,12 +6,7 @@ from contextlib import contextmanager
 import click
 
 from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
-from handover.fmus.binaries import NotCompiled
-from handover.fmus.compile import CompilationError, UnknownPlatform
-from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
 from handover.scenarios.exit_status import BAD_CALL, UNIT_FAILED
-from handover.scenarios.parameters import BadParameter
-from handover.scenarios.run_folder import BadRunFolder
 
 
 class BadCall(click.ClickException):
@@ -45,6 +40,12 @@ def told_in_one_line() -> Generator[None, None, None]:
     A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten,
     a cluster that has gone as WorkersLost.
     """
+    from handover.fmus.binaries import NotCompiled  # what builds and records is loaded by commands that do it
+    from handover.fmus.compile import CompilationError, UnknownPlatform
+    from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
+    from handover.scenarios.parameters import BadParameter
+    from handover.scenarios.run_folder import BadRunFolder
+
     try:
         yield
     except UnitFailure as e:

@@ -1,27 +1,32 @@
-"""The robots whose experiments can be run, and the scenarios by name."""
+"""The robots whose experiments can be run, and the scenarios by name.
 
-from collections.abc import Mapping
+Scenarios are named, not imported: a run loads its own, and no other robot's.
+"""
+
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from handover.scenarios.experiment import Experiment
-from handover.scenarios.free_flyer.collaborative import Collaborative
-from handover.scenarios.free_flyer.failed_reception import FailedReception
-from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
-from handover.scenarios.free_flyer.human_to_robot import HumanToRobot
-from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
-from handover.scenarios.helix_handover.helix_handover import HelixHandover
-from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.vsl.vsl_hybrid import VslHybrid
-from handover.scenarios.vsl.vsl_model_based import VslModelBased
 
 
 @dataclass(frozen=True)
 class RobotSystem:
-    """A published robot with its world: what it is, and the scenarios that it is in."""
+    """A published robot with its world.
+
+    Attributes:
+        title: what it is.
+        paths: the scenarios that it is in: paths of their classes by name.
+    """
 
     title: str
-    scenarios: tuple[type[Experiment[Any]], ...]
+    paths: Mapping[str, str]
+
+    @property
+    def scenarios(self) -> tuple[type[Experiment[Any]], ...]:
+        """Its scenarios, loaded."""
+        return tuple(SCENARIOS[name] for name in self.paths)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -30,13 +35,55 @@ class RobotSystem:
 
 
 SYSTEMS = (
-    RobotSystem("Helix, a tendon-driven soft arm", (HelixHandover,)),
-    RobotSystem("VSL arm, with links of variable stiffness", (VslModelBased, VslHybrid)),
+    RobotSystem(
+        "Helix, a tendon-driven soft arm",
+        {"helix_handover": "handover.scenarios.helix_handover.helix_handover:HelixHandover"},
+    ),
+    RobotSystem(
+        "VSL arm, with links of variable stiffness",
+        {
+            "vsl_model_based": "handover.scenarios.vsl.vsl_model_based:VslModelBased",
+            "vsl_hybrid": "handover.scenarios.vsl.vsl_hybrid:VslHybrid",
+        },
+    ),
     RobotSystem(
         "Free-flyer, in microgravity",
-        (FlyerImpedance, RobotToHuman, HumanToRobot, FailedReception, Collaborative),
+        {
+            "flyer_impedance": "handover.scenarios.free_flyer.flyer_impedance:FlyerImpedance",
+            "flyer_robot_to_human": "handover.scenarios.free_flyer.robot_to_human:RobotToHuman",
+            "flyer_human_to_robot": "handover.scenarios.free_flyer.human_to_robot:HumanToRobot",
+            "flyer_failed_reception": "handover.scenarios.free_flyer.failed_reception:FailedReception",
+            "flyer_collaborative": "handover.scenarios.free_flyer.collaborative:Collaborative",
+        },
     ),
-    RobotSystem("IR grasp, a soft hand with infrared sensors", (IrGrasp,)),
+    RobotSystem(
+        "IR grasp, a soft hand with infrared sensors",
+        {"ir_grasp": "handover.scenarios.ir_grasp.ir_grasp:IrGrasp"},
+    ),
 )
 
-SCENARIOS: Mapping[str, type[Experiment[Any]]] = {e.name: e for system in SYSTEMS for e in system.scenarios}
+
+class _Scenarios(Mapping[str, type[Experiment[Any]]]):
+    """Scenarios by name, each loaded when it is asked for."""
+
+    def __init__(self, paths: Mapping[str, str]) -> None:
+        self._paths = paths
+
+    def __getitem__(self, name: str) -> type[Experiment[Any]]:
+        module, _, experiment = self._paths[name].partition(":")
+        loaded: type[Experiment[Any]] = getattr(import_module(module), experiment)
+        return loaded
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._paths
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._paths)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+
+SCENARIOS: Mapping[str, type[Experiment[Any]]] = _Scenarios(
+    {name: path for system in SYSTEMS for name, path in system.paths.items()}
+)

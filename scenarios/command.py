@@ -1,21 +1,8 @@
-"""The command `handover`."""
+"""The command `handover`: its commands by name, each loaded when it is called or its help is asked for."""
+
+from importlib import import_module
 
 import click
-
-from handover.cosim.exceptions import nearest
-from handover.fmus.catalog import UNITS
-from handover.scenarios.bad_call import BadCall
-from handover.scenarios.build_command import build_command
-from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.check_command import check
-from handover.scenarios.export_command import export_command
-from handover.scenarios.listing import print_catalog, print_scenario, print_unit
-from handover.scenarios.paper_command import paper
-from handover.scenarios.report_command import report
-from handover.scenarios.resume_command import resume
-from handover.scenarios.run_command import run
-from handover.scenarios.sweep_command import sweep
-from handover.scenarios.vsl_train_command import vsl_train
 
 _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
 
@@ -57,32 +44,95 @@ Environment
 """
 
 
-@click.group(help=_HELP, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class DeferredCommand(click.Command):
+    """A command that stands in the group's help until it is called, and is loaded then.
+
+    Args:
+        name: of the command.
+        path: where it is, `module:attribute`.
+        help: the first sentence of its help, as click shortens it for the group's.
+        short_help: its short help, where it has one.
+    """
+
+    def __init__(self, name: str, path: str, *, help: str | None = None, short_help: str | None = None) -> None:  # noqa: A002
+        super().__init__(name, help=help, short_help=short_help)
+        self.path = path
+
+    def load(self) -> click.Command:
+        """Return the command itself."""
+        module, _, attribute = self.path.partition(":")
+        command: click.Command = getattr(import_module(module), attribute)
+        return command
+
+
+class DeferringGroup(click.Group):
+    """A group that loads the command that is called, and no other.
+
+    Physics, tables and pages take seconds to load; its help would take as long.
+    """
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the arguments name, loaded, and the arguments after its name."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command.load() if isinstance(command, DeferredCommand) else command, rest
+
+
+COMMANDS = (
+    DeferredCommand(
+        "build",
+        "handover.scenarios.build_command:build_command",
+        help="Build UNITs (all by default) as FMUs for other tools.",
+    ),
+    DeferredCommand(
+        "check", "handover.scenarios.check_command:check", short_help="Tell what is wrong with FMUs, whoever made them."
+    ),
+    DeferredCommand(
+        "export",
+        "handover.scenarios.export_command:export_command",
+        short_help="Write a SCENARIO as an SSP, for other tools.",
+    ),
+    DeferredCommand(
+        "list",
+        "handover.scenarios.list_command:list_command",
+        short_help="List scenarios and units, or what one of them takes and gives.",
+    ),
+    DeferredCommand(
+        "paper",
+        "handover.scenarios.paper_command:paper",
+        help="Carry out a paper's EXPERIMENT, and put what comes out beside what was published.",
+    ),
+    DeferredCommand(
+        "report", "handover.scenarios.report_command:report", short_help="Write the page of a run or of a campaign."
+    ),
+    DeferredCommand(
+        "resume", "handover.scenarios.resume_command:resume", short_help="Go on with a run from its last checkpoint."
+    ),
+    DeferredCommand(
+        "run",
+        "handover.scenarios.run_command:run",
+        help="Run a SCENARIO once and write summary, signals, figures and a report into a folder.",
+    ),
+    DeferredCommand(
+        "sweep",
+        "handover.scenarios.sweep_command:sweep",
+        help="Run a SCENARIO many times: all combinations of the given values, each --repeat times.",
+    ),
+    DeferredCommand(
+        "vsl-train",
+        "handover.scenarios.vsl_train_command:vsl_train",
+        help="Train the kinematics of the arm with variable-stiffness links on the arm's own FMU.",
+    ),
+)
+
+
+@click.group(
+    cls=DeferringGroup,
+    commands=COMMANDS,
+    help=_HELP,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(package_name="handover-cosim")
 def main() -> None:
     """Robots that hand objects over, co-simulated as Functional Mock-up Units."""
-
-
-@main.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
-@click.argument("name", required=False, metavar="[SCENARIO|UNIT]")
-def list_(name: str | None) -> None:
-    """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT."""
-    if name is None:
-        print_catalog()
-    elif name in UNITS:
-        print_unit(UNITS[name])
-    elif name in SCENARIOS:
-        print_scenario(SCENARIOS[name])
-    else:
-        raise BadCall(f"no scenario or unit {name!r}: {nearest(name, [*SCENARIOS, *UNITS])}")
-
-
-main.add_command(build_command)
-main.add_command(check)
-main.add_command(export_command)
-main.add_command(paper)
-main.add_command(report)
-main.add_command(resume)
-main.add_command(run)
-main.add_command(sweep)
-main.add_command(vsl_train)

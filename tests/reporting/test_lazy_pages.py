@@ -1,11 +1,71 @@
-"""What only pages and statistics need is not loaded by commands that write none."""
+"""What only some calls of the command need is not loaded by the others: who asks for help does not wait for plots."""
 
 import subprocess
 import sys
 
+import click
+import pytest
 
-def test_the_command_loads_neither_plots_nor_statistics():
-    heavy = ("scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page")
-    told = f"import sys, handover.scenarios.command; print([m for m in {heavy!r} if m in sys.modules])"
+from handover.scenarios.catalog import SCENARIOS, SYSTEMS
+from handover.scenarios.command import COMMANDS, main
+
+PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
+HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "pymunk"}
+HELP = HEAVY | {"numpy", "rich", "exudyn", "cosim", "fmus"}
+_CALL = """
+import sys
+from handover.scenarios.entry import main
+
+sys.argv[0] = "handover"
+try:
+    main()
+except SystemExit as e:
+    assert not e.code, e.code
+print(*sys.modules, file=sys.stderr)
+"""
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    done = subprocess.run([sys.executable, "-c", _CALL, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+def test_what_carries_runs_out_loads_neither_pages_nor_statistics():
+    told = "import sys, handover.scenarios.run_command, handover.scenarios.sweep_command; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert not (PAGES | {"matplotlib"}) & set(done.stdout.split())
+
+
+@pytest.mark.parametrize("option", ["--version", "--help"])
+def test_help_and_version_load_the_command_line_alone(option: str):
+    assert not HELP & loaded_by(option)
+
+
+@pytest.mark.parametrize("given", [(), ("helix_handover",), ("flyer_impedance",), ("VslArm",), ("StereoCamera",)])
+def test_a_list_loads_no_physics_plots_or_records(given: tuple[str, ...]):
+    seen = HEAVY - {"cv2"} if given == ("StereoCamera",) else HEAVY  # which draws its pictures by it
+    assert not seen & loaded_by("list", *given)
+
+
+def test_a_list_of_a_scenario_loads_no_other_robots():
+    assert not {"handover.scenarios.vsl", "handover.scenarios.free_flyer"} & loaded_by("list", "ir_grasp")
+
+
+@pytest.mark.parametrize("name", [c.name for c in COMMANDS])
+def test_a_command_is_in_the_help_as_it_tells_itself(name: str):
+    context = click.Context(main)
+    deferred = main.get_command(context, name)
+    loaded = main.resolve_command(context, [name])[1]
+    assert deferred is not None
+    assert loaded is not None
+    assert loaded is not deferred
+    assert loaded.name == name
+    for width in range(20, 120):
+        assert deferred.get_short_help_str(width) == loaded.get_short_help_str(width)
+
+
+def test_scenarios_have_the_names_by_which_they_are_listed():
+    assert [*SCENARIOS] == [experiment.name for experiment in SCENARIOS.values()]
+    assert [*SCENARIOS] == [experiment.name for system in SYSTEMS for experiment in system.scenarios]
+    assert "nothing" not in SCENARIOS

@@ -1,0 +1,90 @@
+"""The command `handover list`."""
+
+from typing import Any
+
+import click
+import numpy as np
+
+from handover.cosim.block_description import describe
+from handover.cosim.exceptions import nearest
+from handover.cosim.start_values import range_of
+from handover.cosim.variable import Causality, Kind, Variable
+from handover.fmus.catalog import UNITS, Entry
+from handover.scenarios.bad_call import BadCall
+from handover.scenarios.catalog import SCENARIOS, SYSTEMS
+from handover.scenarios.console import open_console, print_rows
+from handover.scenarios.experiment import Experiment
+
+
+@click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
+@click.argument("name", required=False, metavar="[SCENARIO|UNIT]")
+def list_command(name: str | None) -> None:
+    """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT."""
+    if name is None:
+        print_catalog()
+    elif name in UNITS:
+        print_unit(UNITS[name])
+    elif name in SCENARIOS:
+        print_scenario(SCENARIOS[name])
+    else:
+        raise BadCall(f"no scenario or unit {name!r}: {nearest(name, [*SCENARIOS, *UNITS])}")
+
+
+def print_catalog() -> None:
+    """Print the scenarios and the units of each robot system, a line each."""
+    console = open_console()
+    width = max(map(len, [*SCENARIOS, *UNITS]))
+    for system in SYSTEMS:
+        console.print(system.title, style="bold")
+        for heading, rows in (
+            ("scenarios", [(e.name, e.title) for e in system.scenarios]),
+            ("units", [(name, UNITS[name].summary) for name in system.units]),
+        ):
+            console.print(f"  {heading}", style="italic")
+            print_rows(console, [("", name.ljust(width), told) for name, told in rows])
+
+
+def print_scenario(experiment: type[Experiment[Any]]) -> None:
+    """Print a scenario's parameters with defaults and ranges, and its units."""
+    console = open_console()
+    console.print(f"{experiment.name}: {experiment.title}", style="bold")
+    console.print("Parameters, to be set with -p name=value")
+    print_rows(console, [(v.name, _plain(v.start), _allowed(v), v.description) for v in experiment.parameters()])
+    console.print("Units, to be replaced with --unit name=file.fmu")
+    print_rows(console, list(experiment.units.items()))
+
+
+def print_unit(unit: Entry) -> None:
+    """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
+    from handover.fmus.build import import_block  # what builds takes long to load
+
+    console = open_console()
+    d = describe(import_block(unit.block))
+    step = "sampled every" if d.period is not None else "stepped by, for instance,"
+    console.print(f"{unit.name}: {unit.summary}", style="bold")
+    console.print(f"{step} {float(unit.step) * 1000:.4g} ms")
+    for heading, variables in (("Parameters", d.parameters), ("Inputs", d.inputs), ("Outputs", d.outputs)):
+        if variables:
+            console.print(heading, style="bold")
+            print_rows(console, [(v.name, _type_of(v), _start_of(v), _allowed(v), v.description) for v in variables])
+
+
+def _allowed(v: Variable) -> str:
+    return " | ".join(n.lower() for n, _ in v.items) if v.items else range_of(v)
+
+
+def _type_of(v: Variable) -> str:
+    shape = f"[{','.join(map(str, v.shape))}]" if v.shape else ""
+    unit = v.unit.symbol if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
+    return f"{v.type_name}{shape} {unit}".rstrip()
+
+
+def _start_of(v: Variable) -> str:
+    told = "" if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else _plain(v.start)
+    return told if len(told) <= 40 else told[:37] + "..."
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return ",".join(f"{x:g}" for x in value.reshape(-1).tolist())
+    return f"{value:g}" if isinstance(value, float) else str(getattr(value, "name", value)).lower()
