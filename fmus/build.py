@@ -1,7 +1,6 @@
 """Turns a unit into a file: an FMU of FMI 2.0 or FMI 3.0 for co-simulation."""
 
 import hashlib
-import importlib
 import importlib.util
 import json
 import os
@@ -12,20 +11,19 @@ from dataclasses import asdict
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
-from typing import Any
 
 from handover.cosim.block_description import describe
 from handover.cosim.zip_writing import write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
-from handover.fmus.catalog import Entry, find_unit
+from handover.fmus.catalog import Entry, find_unit, import_block
 from handover.fmus.compile import cache_folder
 from handover.fmus.documentation import page
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import Form, Layout
 from handover.fmus.model_description import Model
-from handover.fmus.sources import Carried, UnknownBlock, closure
+from handover.fmus.sources import Carried, closure
 
 
 class UnknownVersion(ValueError):
@@ -180,19 +178,6 @@ def _model(entry: Entry, form: Form, token: str) -> Model:
         form=form,
         variable_step=description.period is None and getattr(block, "variable_step", True),
     )
-
-
-def import_block(path: str) -> type[Any]:
-    """Return the class that a path such as `handover.plants.tendon_arm:TendonArm` names.
-
-    Raises:
-        UnknownBlock: the module has no such class.
-    """
-    module, _, name = path.partition(":")
-    found = getattr(importlib.import_module(module), name, None)
-    if not isinstance(found, type):
-        raise UnknownBlock(path, f"module {module!r} has no class {name!r}")
-    return found
 
 
 def _content_key(entry: Entry, form: Form, carried: Carried) -> str:

@@ -6,6 +6,8 @@ Blocks are named, not imported: looking at the catalog loads no physics engine.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib import import_module
+from typing import Any
 
 from handover.cosim.exceptions import nearest
 
@@ -18,6 +20,16 @@ class UnknownUnit(LookupError):
         self.name, self.valid = name, valid
 
 
+class UnknownBlock(LookupError):
+    """There is no such block class; the message says what of its path is missing."""
+
+    def __init__(self, path: str, fault: str) -> None:
+        super().__init__(
+            f"{path!r} is not the path of a block, such as 'handover.plants.tendon_arm:TendonArm': {fault}"
+        )
+        self.path, self.fault = path, fault
+
+
 @dataclass(frozen=True)
 class Entry:
     """A unit.
@@ -27,17 +39,24 @@ class Entry:
         block: path of the block's class.
         step: the communication step that suits it, in seconds.
         summary: one line for lists.
+        deferred: modules that the block's constructor loads, not its module: they take long, and its ports are read
+            without them. What is to make many instances loads them beforehand.
     """
 
     name: str
     block: str
     step: Fraction
     summary: str
+    deferred: tuple[str, ...] = ()
 
 
 _ENTRIES = (
     Entry(
-        "TendonArm", "handover.plants.tendon_arm:TendonArm", Fraction(1, 50), "tendon-driven soft arm with a gripper"
+        "TendonArm",
+        "handover.plants.tendon_arm:TendonArm",
+        Fraction(1, 50),
+        "tendon-driven soft arm with a gripper",
+        ("handover.plants.tendon_chain",),
     ),
     Entry(
         "HandoverPartner",
@@ -90,8 +109,15 @@ _ENTRIES = (
         "handover.controllers.impedance_controller:ImpedanceController",
         Fraction(2, 125),
         "makes the gripper yield like a spring and damper",
+        ("control",),
     ),
-    Entry("PoseController", "handover.controllers.pose_controller:PoseController", Fraction(2, 125), "flies to a pose"),
+    Entry(
+        "PoseController",
+        "handover.controllers.pose_controller:PoseController",
+        Fraction(2, 125),
+        "flies to a pose",
+        ("control",),
+    ),
     Entry(
         "HandoverStateMachine",
         "handover.controllers.handover_state_machine:HandoverStateMachine",
@@ -118,3 +144,16 @@ def find_unit(name: str) -> Entry:
     if name not in UNITS:
         raise UnknownUnit(name, list(UNITS))
     return UNITS[name]
+
+
+def import_block(path: str) -> type[Any]:
+    """Return the class that a path such as `handover.plants.tendon_arm:TendonArm` names.
+
+    Raises:
+        UnknownBlock: the module has no such class.
+    """
+    module, _, name = path.partition(":")
+    found = getattr(import_module(module), name, None)
+    if not isinstance(found, type):
+        raise UnknownBlock(path, f"module {module!r} has no class {name!r}")
+    return found

@@ -13,21 +13,13 @@ from importlib import metadata
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
+from handover.fmus.catalog import UnknownBlock
+
 HOUSE = "handover"
 """The package of which every FMU carries sources."""
 
 SLAVE_SIDE = ("handover.fmus.slave", "handover.fmus.loader", "handover.fmus.server", "handover.fmus.interpreter")
 """Modules that every FMU carries, whatever its block imports."""
-
-
-class UnknownBlock(LookupError):
-    """There is no such block class; the message says what of its path is missing."""
-
-    def __init__(self, path: str, fault: str) -> None:
-        super().__init__(
-            f"{path!r} is not the path of a block, such as 'handover.plants.tendon_arm:TendonArm': {fault}"
-        )
-        self.path, self.fault = path, fault
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from handover.cosim.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
 from handover.cosim.units import Metre, Newton, Number
-from handover.plants.tendon_chain import TendonChain
-from handover.plants.tendon_design import TendonDesign
 from handover.plants.tendon_parameters import Params
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _R_WB = np.diag([1.0, -1.0, -1.0])
 _POINTS = 25
@@ -84,6 +84,9 @@ class TendonArm:
     variable_step: ClassVar[bool] = False
 
     def __init__(self, params: Params) -> None:
+        from handover.plants.tendon_chain import TendonChain  # Exudyn takes long to load, and ports are read without it
+        from handover.plants.tendon_design import TendonDesign
+
         self._params = params
         self._chain = TendonChain(TendonDesign(params))
         length = np.repeat(params.tendon_length, 3)
@@ -126,7 +129,7 @@ class TendonArm:
         self._chain.edge.set_state(system)
 
 
-def _world_quaternion(rotations: Rotation) -> Floats:
+def _world_quaternion(rotations: "Rotation") -> Floats:
     """Return q_W of the last of rotations in B that start at the identity and turn little from one to the next."""
     q_B = rotations.as_quat(scalar_first=True)
     flips = np.count_nonzero(np.sum(q_B[1:] * q_B[:-1], axis=1) < 0.0)

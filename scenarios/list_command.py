@@ -9,7 +9,7 @@ from handover.cosim.block_description import describe
 from handover.cosim.exceptions import nearest
 from handover.cosim.start_values import range_of
 from handover.cosim.variable import Causality, Kind, Variable
-from handover.fmus.catalog import UNITS, Entry
+from handover.fmus.catalog import UNITS, Entry, import_block
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.console import open_console, print_rows
@@ -56,8 +56,6 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
 
 def print_unit(unit: Entry) -> None:
     """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
-    from handover.fmus.build import import_block  # what builds takes long to load
-
     console = open_console()
     d = describe(import_block(unit.block))
     step = "sampled every" if d.period is not None else "stepped by, for instance,"

@@ -7,9 +7,8 @@ from pathlib import Path
 from handover.cosim.block_description import describe
 from handover.cosim.declared_fields import DeclarationError
 from handover.cosim.exceptions import one_line
-from handover.fmus.build import import_block
-from handover.fmus.catalog import Entry
-from handover.fmus.sources import UnknownBlock, closure
+from handover.fmus.catalog import Entry, UnknownBlock, import_block
+from handover.fmus.sources import closure
 from handover.scenarios.bad_call import BadCall
 
 _STEP = Fraction(1, 100)  # s, of a block that is not sampled

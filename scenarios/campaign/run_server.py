@@ -22,9 +22,7 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from handover.cosim.heartbeat import Heartbeat
-from handover.fmus.build import import_block
-from handover.fmus.catalog import UNITS
-from handover.fmus.sources import closure
+from handover.fmus.catalog import UNITS, import_block
 from handover.scenarios import supervisor
 from handover.scenarios.campaign.ordered_run import (
     answer_of,
@@ -80,8 +78,8 @@ class RunServer:
         for unit in SCENARIOS[scenario].units.values():
             with contextlib.suppress(Exception):  # a run that needs it will tell
                 import_block(UNITS[unit].block)
-                for package in closure(UNITS[unit].block).modules:  # also what is imported at first use only
-                    importlib.import_module(package)
+                for module in UNITS[unit].deferred:
+                    importlib.import_module(module)
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
 

@@ -17,8 +17,8 @@ from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.signals import Signals
 from handover.cosim.system import PortName, System
 from handover.cosim.variable import Kind, Variable
-from handover.fmus.build import build_block, cached, import_block
-from handover.fmus.catalog import UNITS
+from handover.fmus.build import build_block, cached
+from handover.fmus.catalog import UNITS, import_block
 
 TOLERANCE = 1e-12
 """Absolute for values up to 1, relative beyond."""

@@ -9,9 +9,9 @@ from workshop import Workshop
 from written_blocks import write_block
 
 from handover.fmus.build import UnknownVersion, UnusableName, UnusableStep, build_block, cached
-from handover.fmus.catalog import UNITS, Entry, UnknownUnit, find_unit
+from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit
 from handover.fmus.compile import UnknownPlatform, host_platform
-from handover.fmus.sources import UnknownBlock, closure
+from handover.fmus.sources import closure
 from handover.fmus.universal import universal
 
 

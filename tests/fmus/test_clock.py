@@ -17,8 +17,8 @@ from workshop import Workshop
 from handover.cosim.block_description import describe
 from handover.cosim.fmu_description import describe_fmu
 from handover.cosim.variable import Kind
-from handover.fmus.build import cached, import_block
-from handover.fmus.catalog import UNITS
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS, import_block
 from handover.fmus.layout import DuplicateName, Layout
 
 SAMPLED = "sampled:Sampled"

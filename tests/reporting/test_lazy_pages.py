@@ -10,8 +10,8 @@ from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.command import COMMANDS, main
 
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
-HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "pymunk"}
-HELP = HEAVY | {"numpy", "rich", "exudyn", "cosim", "fmus"}
+HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
+HELP = HEAVY | {"numpy", "rich", "pymunk", "cosim", "fmus"}
 _CALL = """
 import sys
 from handover.scenarios.entry import main
@@ -42,7 +42,9 @@ def test_help_and_version_load_the_command_line_alone(option: str):
     assert not HELP & loaded_by(option)
 
 
-@pytest.mark.parametrize("given", [(), ("helix_handover",), ("flyer_impedance",), ("VslArm",), ("StereoCamera",)])
+@pytest.mark.parametrize(
+    "given", [(), ("helix_handover",), ("flyer_impedance",), ("TendonArm",), ("PoseController",), ("StereoCamera",)]
+)
 def test_a_list_loads_no_physics_plots_or_records(given: tuple[str, ...]):
     seen = HEAVY - {"cv2"} if given == ("StereoCamera",) else HEAVY  # which draws its pictures by it
     assert not seen & loaded_by("list", *given)

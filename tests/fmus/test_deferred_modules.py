@@ -1,0 +1,33 @@
+"""What a catalogued block loads late is in its entry, so that a run server can load it once for all runs."""
+
+import subprocess
+import sys
+
+import pytest
+
+from handover.fmus.catalog import UNITS
+
+_MAKE = """
+import importlib, sys
+from handover.fmus.catalog import UNITS, import_block
+
+entry = UNITS[sys.argv[1]]
+block = import_block(entry.block)
+params = block.__init__.__annotations__["params"]
+for module in entry.deferred:
+    assert module not in sys.modules, f"{module} is loaded by the block's module already"
+for module in entry.deferred:
+    importlib.import_module(module)
+before = {*sys.modules}
+block(params())
+print(*{name.partition(".")[0] for name in {*sys.modules} - before} - sys.stdlib_module_names - {"numpy"})
+"""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if e.deferred else (pytest.mark.slow,)) for n, e in UNITS.items()]
+)
+def test_a_blocks_constructor_loads_nothing_but_what_its_entry_names(name: str):
+    done = subprocess.run([sys.executable, "-c", _MAKE, name], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not [name for name in done.stdout.split() if "cython" not in name]  # which numpy.random is compiled by
