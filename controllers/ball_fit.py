@@ -8,8 +8,8 @@ import numpy as np
 from handover.controllers.ball_outline import BallOutline
 from handover.controllers.normal_equations import covariance, least_squares
 from handover.controllers.stereo_rig import StereoRig
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
 
 _ITERATIONS = 6
 _LARGEST_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller

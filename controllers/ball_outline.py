@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.controllers.normal_equations import least_squares
 from handover.controllers.region import Pixels, Region
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _GREEN_FROM = (38, 60, 25)  # hue (180 a turn), saturation, value
 _GREEN_UNTIL = (85, 255, 255)

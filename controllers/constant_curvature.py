@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _SERIES_BELOW = 0.05  # rad; both forms are exact to 1e-13 there
 _TENDON_ANGLES = np.radians([0.0, 120.0, 240.0])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.sampled_loop import LinearPlant
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,8 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Vector3, Vector4, output, port
-from handover.cosim.units import Metre, MetrePerSecond, Newton, NewtonMetre, Number, Radian, RadianPerSecond
+from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.units import (
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonMetre,
+    Number,
+    Radian,
+    RadianPerSecond,
+)
 
 
 @dataclass(kw_only=True)

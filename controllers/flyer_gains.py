@@ -7,7 +7,7 @@ import numpy as np
 from handover.controllers.flyer_behaviour import Behaviour
 from handover.controllers.flyer_body import FlyerBody, positive_definite
 from handover.controllers.sampled_loop import LinearController, without_memory
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

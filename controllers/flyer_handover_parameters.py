@@ -8,10 +8,10 @@ import numpy as np
 from handover.controllers.flyer_astrobee import ARM
 from handover.controllers.flyer_behaviour import Behaviour
 from handover.controllers.flyer_rotation import rows_of, unit_quaternion
-from handover.cosim.plain_rotation import triple, turned
-from handover.cosim.ports import Floats, Vector3, Vector4, parameter
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import Metre, MetrePerSecond, Number, Radian, Second
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.plain_rotation import triple, turned
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, Second
 
 NAME = "HandoverStateMachine"
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from handover.controllers.flyer_body import FlyerBody
 from handover.controllers.sampled_loop import LinearController
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from handover.controllers.flyer_rotation import quaternion_about, rotation_vector, rows_of, seen_from
-from handover.cosim.plain_rotation import Quaternion, Triple, norm, product, turned
+from handover.cosim.blocks.plain_rotation import Quaternion, Triple, norm, product, turned
 
 _PEAK_SPEED = 1.875  # of s(x) = 10 x^3 - 15 x^4 + 6 x^5, from 0 to 1 in unit time
 _PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)

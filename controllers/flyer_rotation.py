@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from handover.cosim.plain_rotation import Quaternion, Rows, Triple, inverse, product
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.plain_rotation import Quaternion, Rows, Triple, inverse, product
+from handover.cosim.blocks.ports import Floats
 
 
 class UnusableOrientation(ValueError):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from handover.controllers.flyer_body import FlyerBody
 from handover.controllers.sampled_loop import LinearController, SampledLoop, largest_stable
-from handover.cosim.refusal import Refusal
+from handover.cosim.blocks.block import Refusal
 
 _LONGEST_DELAY = 0.5  # s, up to which a stable one is looked for
 

@@ -2,7 +2,7 @@
 
 import math
 
-from handover.cosim.plain_rotation import Triple, norm
+from handover.cosim.blocks.plain_rotation import Triple, norm
 
 
 class VelocityMonitor:

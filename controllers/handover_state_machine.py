@@ -12,9 +12,9 @@ import numpy as np
 from handover.controllers.flyer_handover_parameters import NAME, HandoverTask, Params, UnusableHandover
 from handover.controllers.flyer_rotation import angle_between, rows_of, unit_quaternion
 from handover.controllers.flyer_velocity_monitor import VelocityMonitor
-from handover.cosim.plain_rotation import Quaternion, Triple, cross, norm, triple, turned
-from handover.cosim.ports import Vector3, Vector4, output, port
-from handover.cosim.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
+from handover.cosim.blocks.plain_rotation import Quaternion, Triple, cross, norm, triple, turned
+from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
 __all__ = [
     "HandoverPhase",

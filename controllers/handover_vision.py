@@ -16,9 +16,8 @@ from handover.controllers.normal_equations import covariance
 from handover.controllers.region import Pixels, Region
 from handover.controllers.ring_fit import RingFit, RingPose
 from handover.controllers.stereo_rig import StereoRig
-from handover.cosim.geometry import looking_at, quaternion_of
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import (
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.ports import (
     BLACK_1280X720,
     Floats,
     Matrix3,
@@ -30,7 +29,7 @@ from handover.cosim.ports import (
     parameter,
     port,
 )
-from handover.cosim.units import Metre, Number, Pixel, SquareMetre
+from handover.cosim.blocks.units import Metre, Number, Pixel, SquareMetre
 
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
 _P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])

@@ -15,8 +15,8 @@ from handover.controllers.vsl_default_model import DEFAULT_MODEL
 from handover.controllers.vsl_kinematics import Elbow, VslKinematics
 from handover.controllers.vsl_model import VslModel
 from handover.controllers.vsl_model_text import UnusableModel, parse_model, read_model
-from handover.cosim.ports import Floats, Vector2, Vector3, output, parameter, port
-from handover.cosim.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.blocks.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "HybridKinematics", "Inputs", "Method", "Outputs", "Params", "UnusableModel"]
 

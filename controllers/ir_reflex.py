@@ -15,9 +15,9 @@ from handover.controllers.reflex_move import Move, Reading, X
 from handover.controllers.reflex_parameters import Params, Strategy, UnusableReflex
 from handover.controllers.reflex_probing import Probing
 from handover.controllers.reflex_visibility import Recovery, Visibility, displaced
-from handover.cosim.ports import Floats, Vector2, Vector3, output, port
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import Metre, Number, Radian, SquareMetre, Tick
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
+from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre, Tick
 
 __all__ = [
     "Inputs",

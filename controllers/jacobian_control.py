@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from handover.controllers.constant_curvature import linearise
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _STIFFENING = 100.0
 _RANK_TOLERANCE = 1e-9

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.marker_ring import SIDES
 from handover.controllers.region import Pixels, Region
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _ZOOM = 3  # enlargement of a region; corners of enlarged markers come out twice as exact
 _NEAR = 5.0  # marker sides around the largest marker found; the ring is smaller than that

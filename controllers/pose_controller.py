@@ -16,9 +16,20 @@ from handover.controllers.flyer_profile import Bounds, Profile, Reference, profi
 from handover.controllers.flyer_rotation import angle_between, rotation_vector, rows_of, seen_from, unit_quaternion
 from handover.controllers.flyer_stability import UnusableController, stability_faults
 from handover.controllers.sampled_loop import SampledLoop
-from handover.cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, norm, rows, triple, turned, turned_back
-from handover.cosim.ports import Matrix3, Vector3, parameter
-from handover.cosim.units import (
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Quaternion,
+    Rows,
+    Triple,
+    cross,
+    norm,
+    rows,
+    triple,
+    turned,
+    turned_back,
+)
+from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
+from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
     Metre,

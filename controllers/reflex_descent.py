@@ -8,7 +8,7 @@ import numpy as np
 from handover.controllers.reflex_gauss_newton import bounded_step, broyden_update, cost
 from handover.controllers.reflex_move import X
 from handover.controllers.reflex_parameters import Params
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Verdict(enum.Enum):

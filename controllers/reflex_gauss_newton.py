@@ -7,7 +7,7 @@ and steps and updates are those of least norm in z.
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _RANK_TOLERANCE = 1e-12
 

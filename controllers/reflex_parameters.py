@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.reflex_calibration import Calibration
-from handover.cosim.ports import Vector2, Vector3, Vector4, parameter
-from handover.cosim.refusal import Refusal
-from handover.cosim.start_values import parameter_faults
-from handover.cosim.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
+from handover.cosim.blocks.start_values import parameter_faults
+from handover.cosim.blocks.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
 
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
 

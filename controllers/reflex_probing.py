@@ -3,7 +3,7 @@
 import numpy as np
 
 from handover.controllers.reflex_move import X
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Probing:

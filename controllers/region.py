@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 Pixels = NDArray[np.uint8]
 """A picture, shape (h, w, 3), blue, green, red, or one channel, shape (h, w)."""

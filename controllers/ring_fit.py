@@ -9,9 +9,8 @@ import numpy as np
 from handover.controllers.marker_reader import Markers
 from handover.controllers.marker_ring import MarkerRing
 from handover.controllers.normal_equations import least_squares
-from handover.cosim.geometry import rotation_by
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole, rotation_by
+from handover.cosim.blocks.ports import Floats
 
 _ITERATIONS = 12
 _SETTLED = 1e-7  # m and rad

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _LASTING = math.exp(-1.0)  # a pole nearer to zero, as those of a delay are, is all but gone within a sample
 _WHOLE = 1e-9  # of a period: what a delay of whole periods may be off by rounding

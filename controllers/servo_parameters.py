@@ -5,9 +5,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from handover.cosim.ports import Vector3, Vector6, Vector9, parameter
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import Metre, Number, Second, SquareMetre
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
+from handover.cosim.blocks.units import Metre, Number, Second, SquareMetre
 
 _ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
 

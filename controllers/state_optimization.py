@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from handover.controllers.constant_curvature import linearise
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _STEP_TOLERANCE = 1e-7  # rad and m; the constraint is then met to the square of it
 _MAX_ITERATIONS = 60

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ import numpy as np
 
 from handover.controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics, place
 from handover.controllers.vsl_path import Path, Segment, segments_of
-from handover.cosim.ports import Floats, Vector2, Vector3, output, parameter, port
-from handover.cosim.refusal import Refusal
-from handover.cosim.start_values import parameter_faults
-from handover.cosim.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.blocks.start_values import parameter_faults
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "Inputs", "Outputs", "Params", "Path", "TrajectoryPlanner", "UnusablePath"]
 

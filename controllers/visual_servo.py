@@ -15,8 +15,8 @@ from handover.controllers.jacobian_control import Limits, blend, control_step
 from handover.controllers.kalman import PositionFilter
 from handover.controllers.servo_parameters import Params, UnusableParameters
 from handover.controllers.state_optimization import optimise_state
-from handover.cosim.ports import Floats, Matrix3, Vector3, Vector9, output, port
-from handover.cosim.units import Metre, Number, SquareMetre
+from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
+from handover.cosim.blocks.units import Metre, Number, SquareMetre
 
 __all__ = ["Inputs", "Outputs", "Params", "Phase", "UnusableParameters", "VisualServo"]
 

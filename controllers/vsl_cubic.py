@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 DEGREE = 3
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.vsl_cubic import Cubic, all_powers, factors_of, hull_directions, monomials
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 PENALTIES = tuple(10.0**e for e in range(-10, 1))
 """Penalties tried, per training point and squared coefficient of standardised inputs (own choice)."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Elbow(enum.IntEnum):

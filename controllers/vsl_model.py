@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.controllers.vsl_cubic import Cubic
 from handover.controllers.vsl_kinematics import VslKinematics
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 FORWARD_INPUTS = ("q_meas[1]", "q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
 INVERSE_INPUTS = ("q_ref[1]", "q_ref[2]", "q_ref[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")

@@ -11,7 +11,7 @@ import numpy as np
 from handover.controllers.vsl_cubic import DEGREE, Cubic, hull_directions
 from handover.controllers.vsl_kinematics import Elbow, VslKinematics
 from handover.controllers.vsl_model import FORWARD_INPUTS, INVERSE_INPUTS, VALUES, VslModel
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 FORMAT, VERSION = "handover-vsl-model", 1
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Path(enum.IntEnum):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.fmu_description import FmuDescription, FmuPort
-from handover.cosim.ports import Floats
 from handover.cosim.state_calls import Call
 
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.failures import NotFinite
 from handover.cosim.fmu_description import FmuPort, indices_of
 from handover.cosim.signal_buffer import Views, joined
-from handover.cosim.variable import Kind
 
 
 class FiniteCheck:

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
+from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.capabilities import Capabilities, capabilities_of
 from handover.cosim.events.fmu_clock import FmuClock, clocks_of, without_clocks
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu_xml import XmlElement
-from handover.cosim.units import UNKNOWN, BaseExponents, Unit
-from handover.cosim.variable import Causality, Declared, Kind
-from handover.cosim.width import Width
 
 if TYPE_CHECKING:
     from handover.cosim.fmpy_edge import ModelDescription, ModelVariable

@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.start_values import numbers_of
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.directional_derivatives import derivatives_along
 from handover.cosim.events.discarded_step import discarded_step
 from handover.cosim.events.event_failures import StepDiscarded
@@ -16,12 +19,9 @@ from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
 from handover.cosim.fmu_description import FmuDescription, FmuPort
 from handover.cosim.heartbeat import Abandoned, Heartbeat
 from handover.cosim.native_step import NativeStep
-from handover.cosim.ports import Floats
 from handover.cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
-from handover.cosim.start_values import numbers_of
 from handover.cosim.state_calls import State, StateCalls
 from handover.cosim.stepping.rate_buffer import RateBuffer
-from handover.cosim.variable import Kind
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5

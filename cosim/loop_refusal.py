@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from handover.cosim.algebraic_loop import AlgebraicLoop
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.group import Group
 from handover.cosim.system import System
-from handover.cosim.variable import Kind
 
 _CURE = (
     "what would help: units that save their state (canGetAndSetFMUState) in their place, the algorithm jacobi, in "

@@ -5,10 +5,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu_description import FmuPort
-from handover.cosim.variable import Kind
-from handover.cosim.width import Width
 
 
 @dataclass(frozen=True)

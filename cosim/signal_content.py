@@ -2,9 +2,9 @@
 
 import ctypes
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu_description import FmuPort
 from handover.cosim.signal_buffer import Views
-from handover.cosim.variable import Kind
 
 
 def content_of(port: FmuPort, views: Views) -> bytes:

@@ -8,15 +8,15 @@ from numbers import Rational
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.blocks.start_values import fault_of
+from handover.cosim.blocks.units import Unit
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.events.event_wiring import clock_mismatch, event_faults, once_faults
 from handover.cosim.events.fmu_clock import FmuClock
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.linear import Linear
-from handover.cosim.start_values import fault_of
 from handover.cosim.unit_conversion import conversion, pass_as_they_are
-from handover.cosim.units import Unit
-from handover.cosim.variable import Kind
 
 
 @dataclass(frozen=True)

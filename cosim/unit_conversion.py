@@ -2,8 +2,8 @@
 
 from fractions import Fraction
 
+from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.linear import Linear
-from handover.cosim.units import UNKNOWN, Unit
 
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 _LONG = 10**13

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats, Raster
-from handover.cosim.variable import Causality, Variable
+from handover.cosim.blocks.ports import Floats, Raster
+from handover.cosim.blocks.variable import Causality, Variable
 from handover.fmus.layout import Buffer, Layout, Slot, capacity
 
 ALIGNMENT = 64

@@ -12,7 +12,7 @@ from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
 
-from handover.cosim.block_description import describe
+from handover.cosim.blocks.description import describe
 from handover.cosim.zip_writing import write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries

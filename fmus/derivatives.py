@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.variable import Causality
+from handover.cosim.blocks.variable import Causality
 from handover.fmus.buffers import Buffers
 from handover.fmus.layout import Buffer, Slot
 

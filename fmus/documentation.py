@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup, escape
 
-from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.fmus.docstring import parse
 from handover.fmus.layout import SAMPLE_CLOCK, Form
 from handover.fmus.model_description import Model, enumerations

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Raster
-from handover.cosim.variable import Causality, Variable
-from handover.cosim.width import Width
+from handover.cosim.blocks.ports import Raster, Width
+from handover.cosim.blocks.variable import Causality, Variable
 from handover.fmus.buffers import Buffers, to_signed
 from handover.fmus.layout import Buffer, Slot, capacity
 from handover.fmus.parameters import read_value

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from handover.cosim.variable import Causality, Kind, Variable
-from handover.cosim.width import Width
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.fmus.layout import Form, HostVariable
 from handover.fmus.model_description import (
     GENERATOR,

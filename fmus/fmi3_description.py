@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
 from handover.fmus.model_description import (
     GENERATOR,

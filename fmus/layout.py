@@ -10,9 +10,9 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from handover.cosim.block_description import Description
-from handover.cosim.variable import Causality, Kind, Variable
-from handover.cosim.width import Width
+from handover.cosim.blocks.description import Description
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from handover.cosim.block_description import Description
-from handover.cosim.units import Unit
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.description import Description
+from handover.cosim.blocks.units import Unit
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus.layout import Form, Layout
 
 GENERATOR = "handover-cosim"

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.start_values import fault_of
-from handover.cosim.variable import Variable
-from handover.cosim.width import Width
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.start_values import fault_of
+from handover.cosim.blocks.variable import Variable
 from handover.fmus.buffers import Buffers, to_unsigned
 from handover.fmus.layout import Buffer, Slot
 

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from handover.cosim.block_description import describe
-from handover.cosim.eventful_block import UnfitAdvance
+from handover.cosim.blocks.block import UnfitAdvance
+from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers, UnfitState, join, split
 from handover.fmus.derivatives import derivative_reader
 from handover.fmus.exchange import input_reader, output_writer
@@ -25,7 +25,7 @@ class Slave:
         memory: where the variables lie, see `Buffers`.
     """
 
-    _block: Any  # a handover.cosim.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
+    _block: Any  # a handover.cosim.blocks.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
 
     def __init__(self, block: type[Any], form: str, memory: Callable[[int], Any] | None = None) -> None:
         self._type = block

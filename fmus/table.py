@@ -5,7 +5,7 @@ A header, then the binary buffers, the variables by value reference, and their n
 
 import struct
 
-from handover.cosim.variable import Causality
+from handover.cosim.blocks.variable import Causality
 from handover.fmus.buffers import Buffers
 from handover.fmus.layout import TIME, Buffer, Form, Type, type_of
 

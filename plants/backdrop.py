@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
 from handover.plants.sketch import Pixels
 
 _WALL = 1.7  # m; x of a wall opposite the cameras

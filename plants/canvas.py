@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.backdrop import Backdrop
 from handover.plants.sketch import Decal, Pixels, Sketch
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 _NO_SETTINGS = "EXUDYN_NO_USER_SETTINGS"
 

@@ -2,7 +2,17 @@
 
 from dataclasses import dataclass
 
-from handover.cosim.plain_rotation import ZERO, Quaternion, Rows, Triple, cross, inverse, product, turned, turned_back
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Quaternion,
+    Rows,
+    Triple,
+    cross,
+    inverse,
+    product,
+    turned,
+    turned_back,
+)
 from handover.plants.floating_rotation import IDENTITY, along, between, matrix_of, minus, plus
 
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handover.cosim.plain_rotation import ZERO, Rows, Triple, cross, norm, product, turned, turned_back
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.plain_rotation import ZERO, Rows, Triple, cross, norm, product, turned, turned_back
+from handover.cosim.blocks.ports import Floats
 from handover.plants.floating_attachment import Attachment, Frame, Palm
 from handover.plants.floating_rotation import along, matrix_of, turn_by, unit
 from handover.plants.rigid_body import RigidBody

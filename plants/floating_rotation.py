@@ -1,9 +1,9 @@
-"""Poses of floating bodies in plain floats, beside what `handover.cosim.plain_rotation` has."""
+"""Poses of floating bodies in plain floats, beside what `handover.cosim.blocks.plain_rotation` has."""
 
 import math
 
-from handover.cosim.plain_rotation import Quaternion, Rows, Triple
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.plain_rotation import Quaternion, Rows, Triple
+from handover.cosim.blocks.ports import Floats
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 

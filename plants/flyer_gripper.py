@@ -1,6 +1,6 @@
 """The gripper of a free-flyer: two fingers that close along z of G around an object, and a palm behind them."""
 
-from handover.cosim.plain_rotation import Rows, Triple, cross, inverse, product, turned, turned_back
+from handover.cosim.blocks.plain_rotation import Rows, Triple, cross, inverse, product, turned, turned_back
 from handover.plants.floating_attachment import Attachment, Frame, Palm, Stiffness
 from handover.plants.floating_rotation import matrix_of, minus, plus
 from handover.plants.flyer_hand_parameters import Params

@@ -2,7 +2,7 @@
 
 import pickle
 
-from handover.cosim.plain_rotation import (
+from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Quaternion,
     Triple,

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Floats, Vector3, Vector4, parameter
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import (
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.blocks.units import (
     Hertz,
     Kilogram,
     Metre,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.plain_rotation import Quaternion, Triple, norm, product, triple, turned
+from handover.cosim.blocks.plain_rotation import Quaternion, Triple, norm, product, triple, turned
 from handover.plants.floating_attachment import Frame
 from handover.plants.floating_rotation import along, between, minus, plus, quaternion
 from handover.plants.flyer_hand_parameters import Motion, Params, StartHolder

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.plain_rotation import Triple, triple, turned
-from handover.cosim.ports import Matrix3, Vector3, Vector4, output, parameter, port
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import (
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.plain_rotation import Triple, triple, turned
+from handover.cosim.blocks.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
     Metre,

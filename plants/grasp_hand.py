@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

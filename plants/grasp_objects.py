@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Thing(enum.IntEnum):

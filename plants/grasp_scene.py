@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Vector2, Vector3, Vector8, output, port
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import Metre, Newton, Number, Radian, Tick
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
+from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.grasp_hand import FINGERS
 from handover.plants.grasp_parameters import SEES_NOTHING, Params, UnusableScene
 from handover.plants.grasp_world import DT, Command, GraspWorld, beginning

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import FINGERS, HIGHEST, LOWEST
 
 PULLEYS: Final = np.array([r for f in FINGERS for r in f.pulleys])

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from typing import Final
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import FINGERS, HIGHEST, LOWEST, PALM, SENSOR_PLACE, Finger, finger_points
 from handover.plants.grasp_objects import Disc
 from handover.plants.grasp_parameters import Params

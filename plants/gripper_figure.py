@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.limb import Limb, rod
 
 _METAL = (86.0, 82.0, 78.0)

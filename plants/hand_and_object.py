@@ -10,9 +10,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.plain_rotation import ZERO, Triple, cross, norm, triple, turned
-from handover.cosim.ports import Floats, Vector3, Vector4, Vector14, output, port
-from handover.cosim.units import Metre, MetrePerSecond, Newton, NewtonMetre, Number, Radian, RadianPerSecond
+from handover.cosim.blocks.plain_rotation import ZERO, Triple, cross, norm, triple, turned
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector14, output, port
+from handover.cosim.blocks.units import (
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonMetre,
+    Number,
+    Radian,
+    RadianPerSecond,
+)
 from handover.plants.floating_attachment import Attachment, Frame
 from handover.plants.floating_object import FloatingObject
 from handover.plants.floating_rotation import along, between, matrix_of, minus, plus, quaternion, unit

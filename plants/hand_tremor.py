@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class _Step(NamedTuple):

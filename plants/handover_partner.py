@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats, Vector3, Vector4, output, parameter, port
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import (
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.units import (
     Hertz,
     Kilogram,
     Metre,

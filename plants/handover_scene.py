@@ -4,9 +4,8 @@ from typing import Protocol
 
 import numpy as np
 
-from handover.cosim.geometry import rotation_of
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole, rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.plants.gripper_figure import gripper
 from handover.plants.hand_figure import hand
 from handover.plants.light import Light

@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_left
 
-from handover.cosim.refusal import Refusal
+from handover.cosim.blocks.block import Refusal
 
 _TOP = 4095  # of a 12-bit converter
 

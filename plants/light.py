@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True)

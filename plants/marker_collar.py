@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
 from handover.plants.light import Light
 from handover.plants.sketch import Decal, Pixels, Sketch
 

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Floats, Vector3, output, parameter
-from handover.cosim.units import Newton, NewtonMetre, Second
+from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
+from handover.cosim.blocks.units import Newton, NewtonMetre, Second
 
 
 class Axis(enum.IntEnum):

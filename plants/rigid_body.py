@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from handover.cosim.plain_rotation import ZERO, Quaternion, Triple, rows, turned, turned_back
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.plain_rotation import ZERO, Quaternion, Triple, rows, turned, turned_back
+from handover.cosim.blocks.ports import Floats
 from handover.plants.floating_rotation import matrix_of
 
 UNIT_TOLERANCE = 1e-6

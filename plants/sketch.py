@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 Pixels = NDArray[np.uint8]
 """Picture or part of one, shape (h, w, 3), blue, green, red; a decal's texture has a fourth channel, its opacity."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
 from handover.plants.light import Light
 from handover.plants.sketch import Sketch
 

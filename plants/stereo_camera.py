@@ -8,9 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.geometry import looking_at, quaternion_of
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import (
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.ports import (
     Picture1280x720,
     Polyline25,
     Vector3,
@@ -20,7 +19,7 @@ from handover.cosim.ports import (
     parameter,
     port,
 )
-from handover.cosim.units import Levels, Metre, Number, Pixel, Second
+from handover.cosim.blocks.units import Levels, Metre, Number, Pixel, Second
 from handover.plants.backdrop import Backdrop
 from handover.plants.canvas import Canvas
 from handover.plants.handover_scene import HandoverScene

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
-from handover.cosim.units import Metre, Newton, Number
+from handover.cosim.blocks.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
+from handover.cosim.blocks.units import Metre, Newton, Number
 from handover.plants.tendon_parameters import Params
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.exudyn_edge import ExudynEdge
 from handover.plants.tendon_design import TendonDesign
 from handover.plants.tendon_tangent import TendonTangent

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.tendon_parameters import Params, UnusableArm
 
 _MOTOR_MASS = 1e3  # kg: a servo that a tendon's pull hardly moves (5 N: 8 um)

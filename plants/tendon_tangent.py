@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.tendon_design import TendonDesign
 
 _I = np.eye(3)

@@ -10,8 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Vector3, output, parameter, port
-from handover.cosim.units import Newton, NewtonMetre, Second
+from handover.cosim.blocks.ports import Vector3, output, parameter, port
+from handover.cosim.blocks.units import Newton, NewtonMetre, Second
 
 _Command = list[float]
 _COMMANDS = ("f_pose", "tau_pose", "f_impedance", "tau_impedance")

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Floats, Polyline25, Vector2, Vector3, output, port
-from handover.cosim.refusal import Refusal
-from handover.cosim.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
+from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl_chain import Complexes, VslChain
 from handover.plants.vsl_dynamics import NoConvergence, VslDynamics
 from handover.plants.vsl_parameters import HIGHEST_PRESSURE, TURN, Link, Motion, Params, UnusableVslArm

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl_chain import Complexes, Pose, VslChain
 from handover.plants.vsl_parameters import Params
 from handover.plants.vsl_statics import VslStatics

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Vector2, Vector3, parameter
-from handover.cosim.refusal import Refusal
-from handover.cosim.start_values import parameter_faults
-from handover.cosim.units import (
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Vector2, Vector3, parameter
+from handover.cosim.blocks.start_values import parameter_faults
+from handover.cosim.blocks.units import (
     Ampere,
     Kilogram,
     Metre,

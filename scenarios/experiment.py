@@ -7,10 +7,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
-from handover.cosim.declared_fields import declared_variables
+from handover.cosim.blocks.declarations import declared_variables
+from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.signals import Signals
 from handover.cosim.system import System
-from handover.cosim.variable import Causality, Variable
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.camera_picture import CameraPicture
 from handover.scenarios.reporting.published_value import PublishedValue

@@ -5,10 +5,10 @@ from typing import Any
 import click
 import numpy as np
 
-from handover.cosim.block_description import describe
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.start_values import range_of
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import nearest
-from handover.cosim.start_values import range_of
-from handover.cosim.variable import Causality, Kind, Variable
 from handover.fmus.catalog import UNITS, Entry, import_block
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS

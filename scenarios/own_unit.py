@@ -4,8 +4,8 @@ import sys
 from fractions import Fraction
 from pathlib import Path
 
-from handover.cosim.block_description import describe
-from handover.cosim.declared_fields import DeclarationError
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.blocks.description import describe
 from handover.cosim.exceptions import one_line
 from handover.fmus.catalog import Entry, UnknownBlock, import_block
 from handover.fmus.sources import closure

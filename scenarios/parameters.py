@@ -5,9 +5,9 @@ from typing import Any, cast
 
 import numpy as np
 
+from handover.cosim.blocks.start_values import fault_of, range_of
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.exceptions import nearest
-from handover.cosim.start_values import fault_of, range_of
-from handover.cosim.variable import Kind, Variable
 from handover.scenarios.experiment import Experiment
 
 

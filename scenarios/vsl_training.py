@@ -15,9 +15,9 @@ from handover.controllers.vsl_fit import Fit, fit_cubic
 from handover.controllers.vsl_kinematics import Elbow, VslKinematics
 from handover.controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, turned
 from handover.controllers.vsl_model_text import model_text
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu_description import FmuPort
-from handover.cosim.ports import Floats
-from handover.cosim.variable import Kind
 from handover.scenarios.vsl_training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
 
 SPLIT = (0.70, 0.15, 0.15)

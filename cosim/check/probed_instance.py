@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.check.journal import Journal
 from handover.cosim.fmu_description import FmuDescription, FmuPort
 from handover.cosim.instance import Instance
 from handover.cosim.signal_buffer import SignalBuffer
-from handover.cosim.variable import Kind
 
 _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
 

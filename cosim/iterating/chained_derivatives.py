@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.group import Group
 from handover.cosim.iterating.interface import Interface
-from handover.cosim.ports import Floats
 from handover.cosim.system import Connection
-from handover.cosim.variable import Kind
 
 
 class ChainedDerivatives:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
 from handover.cosim.iterating.magnitudes import Magnitudes
-from handover.cosim.ports import Floats
 
 
 class FixedPoint:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.group import Group
 from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
@@ -9,7 +10,6 @@ from handover.cosim.iterating.group_stepping import MakeSolver
 from handover.cosim.iterating.interface import Interface
 from handover.cosim.iterating.interface_solver import Unsolved
 from handover.cosim.iterating.not_converged import not_converged
-from handover.cosim.ports import Floats
 
 
 class InitialValues:

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats, Width
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.iterating.magnitudes import Magnitudes
-from handover.cosim.ports import Floats
 from handover.cosim.system import Connection
-from handover.cosim.variable import Kind
-from handover.cosim.width import Width
 
 _SMALL = 1e-3
 """The least magnitude of a signal of which neither its nominal one nor any other value is known."""

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
 from handover.cosim.iterating.magnitudes import Magnitudes
-from handover.cosim.ports import Floats
 
 _SINGULAR = 1e-7
 """Least singular value of I - dg/dx, in magnitudes, at which differences of g still tell a solution from none."""

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.iterating.magnitudes import Magnitudes
-from handover.cosim.ports import Floats
 
 Map = Callable[[Floats], Floats]
 """g: takes the values that go into units and gives back the values that come out; n numbers to n numbers."""

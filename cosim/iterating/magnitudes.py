@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Magnitudes:

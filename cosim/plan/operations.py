@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.ports import Width
 from handover.cosim.linear import Linear
 from handover.cosim.native_step import NativeStep
 from handover.cosim.signal_buffer import NativeCall, Views
-from handover.cosim.width import Width
 
 SIZE = 72
 _COPY, _CHECK, _ACCESS, _KEEP, _STEP, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", ""

@@ -8,10 +8,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.record.record_block import RecordBlock
 from handover.cosim.signals import Column
-from handover.cosim.variable import Kind
-from handover.cosim.width import Width
 
 _WIDE: dict[Any, Any] = {pa.float64(): np.float64, pa.int64(): np.int64, pa.uint64(): np.uint64, pa.bool_(): np.bool_}
 _TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}

@@ -3,9 +3,9 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
 
+from handover.cosim.blocks.units import Unit
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu_description import FmuPort
-from handover.cosim.units import Unit
-from handover.cosim.variable import Kind
 
 Items = tuple[tuple[str, int], ...]
 

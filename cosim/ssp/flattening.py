@@ -4,6 +4,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu_description import FmuDescription
 from handover.cosim.linear import Linear
@@ -13,7 +14,6 @@ from handover.cosim.ssp.connector_faults import GIVES, TAKES, connector_faults
 from handover.cosim.ssp.given_values import Given
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
-from handover.cosim.units import UNKNOWN, Unit
 
 _log = logging.getLogger(__name__)
 

@@ -3,13 +3,13 @@
 import xml.etree.ElementTree as ET
 from typing import Any
 
+from handover.cosim.blocks.start_values import numbers_of
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu_description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names, ports_of
 from handover.cosim.ssp.described_types import DescribedTypes, add_dimensions
 from handover.cosim.ssp.xml_writing import document, root_element
-from handover.cosim.start_values import numbers_of
 from handover.cosim.system import PlacedUnit
-from handover.cosim.variable import Kind
 
 
 def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+from handover.cosim.blocks.units import Unit
 from handover.cosim.linear import Linear
 from handover.cosim.ssp.parameter_set import SspValue
-from handover.cosim.units import Unit
 
 
 @dataclass(frozen=True)

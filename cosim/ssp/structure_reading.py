@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
+from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.fmu_xml import XmlElement
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE, local, told
@@ -25,7 +26,6 @@ from handover.cosim.ssp.structure import (
     SspNestedSystem,
     SspStructure,
 )
-from handover.cosim.units import UNKNOWN, Unit
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"

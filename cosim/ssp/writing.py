@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
 from handover.cosim.fmu_description import FmuPort
 from handover.cosim.linear import Linear
@@ -15,7 +16,6 @@ from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
 from handover.cosim.ssp.parameter_writing import bound_values, parameter_set
 from handover.cosim.ssp.xml_writing import document, root_element
 from handover.cosim.system import Connection, PlacedUnit, System, proposed_step
-from handover.cosim.variable import Kind
 from handover.cosim.zip_writing import write_archive
 
 

@@ -1,5 +1,5 @@
 /* How an instance gets on in time: steps, and event mode between them. A block may have events of its own
- * (cosim/eventful_block.py); what a sampled block does in a step, and at its ticks, is in sampling.c. */
+ * (cosim/blocks/block.py); what a sampled block does in a step, and at its ticks, is in sampling.c. */
 #include <math.h>
 
 #include "log.h"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
 from handover.scenarios.campaign.point_layout import PointLayout, layout_of
 from handover.scenarios.campaign.statistics import Interval

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.catalog import SCENARIOS

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.plan import MOST_RUNS
 from handover.scenarios.experiment import Experiment
 from handover.scenarios.parameters import BadParameter, parse_value, text_of, texts_by_name

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
 from handover.scenarios.shown_unit import shown_unit
 

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.run_row import RunRow
 from handover.scenarios.chosen import scenario_named

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment import Figure
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch

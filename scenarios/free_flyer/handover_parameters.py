@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Vector3, parameter
-from handover.cosim.units import Metre, Newton, Second
+from handover.cosim.blocks.ports import Vector3, parameter
+from handover.cosim.blocks.units import Metre, Newton, Second
 from handover.scenarios.free_flyer.behaviour import Behaviour
 
 

@@ -4,8 +4,8 @@ import enum
 from dataclasses import dataclass
 from fractions import Fraction
 
-from handover.cosim.ports import parameter
-from handover.cosim.units import Newton, NewtonMetre, Second
+from handover.cosim.blocks.ports import parameter
+from handover.cosim.blocks.units import Newton, NewtonMetre, Second
 from handover.scenarios.free_flyer.behaviour import Behaviour
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Motion, errors_of
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from handover.scenarios.free_flyer.thrust_plots import plot_thrust

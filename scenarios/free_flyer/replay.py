@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
 from handover.scenarios.paper import paper_values
 from handover.scenarios.record import Record

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.system import PlacedUnit, System
 from handover.scenarios.paper import paper_values
 

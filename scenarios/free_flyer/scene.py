@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment import Figure
 from handover.scenarios.paper import paper_values
 from handover.scenarios.plotting import figure

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from handover.controllers.constant_curvature import forward_kinematics
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.paper import paper_values
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1)

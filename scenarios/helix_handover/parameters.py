@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.ports import Floats, parameter
-from handover.cosim.units import Metre, Number, Second
+from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.units import Metre, Number, Second
 from handover.scenarios.paper import paper_values
 
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.plants.gripper_figure import gripper
 from handover.plants.hand_figure import hand
 from handover.plants.limb import Limb

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.geometry import looking_at, quaternion_of
-from handover.cosim.pinhole import Pinhole
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.scenarios.paper import paper_values
 
 

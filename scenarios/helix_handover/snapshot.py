@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.signals import Signals
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.rig import camera_of

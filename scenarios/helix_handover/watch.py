@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.signals import Signals
 from handover.scenarios.experiment import Metric, Outcome, Watch
 from handover.scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch

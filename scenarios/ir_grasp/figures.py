@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import FINGERS, finger_points, palm_outline, sensor_rays
 from handover.plants.grasp_objects import outlines
 from handover.scenarios.experiment import Figure

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 from handover.controllers.reflex_parameters import Strategy
-from handover.cosim.ports import parameter
-from handover.cosim.units import Metre, Radian
+from handover.cosim.blocks.ports import parameter
+from handover.cosim.blocks.units import Metre, Radian
 from handover.plants.grasp_objects import Thing
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot

@@ -3,7 +3,7 @@
 import numpy as np
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
 from handover.plants.grasp_objects import outlines
 from handover.scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import PALM
 from handover.plants.grasp_objects import SOLIDS, Thing, outlines
 from handover.scenarios.ir_grasp.parameters import Parameters

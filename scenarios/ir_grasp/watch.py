@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.signals import Signals
 from handover.plants.grasp_objects import SOLIDS
 from handover.plants.grasp_parameters import SEES_NOTHING

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.helix_handover.parameters import Tuning
 from handover.scenarios.paper import paper_values

@@ -10,7 +10,7 @@ from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from handover.controllers.visual_servo import Phase
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment import Figure
 from handover.scenarios.plotting import COLOURS, figure
 from handover.scenarios.published.helix_1_arm import Helix1Arm

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import Statistic
 from handover.scenarios.helix_handover.parameters import Place, Tuning
 from handover.scenarios.published.comparison_table import ComparisonTable

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import time_interval
 
 

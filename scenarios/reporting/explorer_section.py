@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.page import template
 from handover.scenarios.reporting.plot_html import json_html

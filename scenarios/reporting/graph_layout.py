@@ -7,7 +7,7 @@ from typing import Any, cast
 import networkx as nx
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 Pair = tuple[str, str]
 

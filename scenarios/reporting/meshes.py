@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 class Mesh(NamedTuple):

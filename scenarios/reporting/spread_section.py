@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
 from handover.scenarios.campaign.point_layout import PointLayout
 from handover.scenarios.reporting.plot_html import json_html, plot_html

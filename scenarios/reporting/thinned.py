@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tsdownsample import MinMaxLTTBDownsampler
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 Rows = NDArray[np.int64]
 

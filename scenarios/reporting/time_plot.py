@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

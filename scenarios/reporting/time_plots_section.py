@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.plot_html import COLOURS, plot_html
 from handover.scenarios.reporting.section import Section

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment import Figure
 from handover.scenarios.plotting import COLOURS, figure, shade_phases
 from handover.scenarios.record import Record

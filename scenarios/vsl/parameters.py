@@ -7,8 +7,8 @@ import numpy as np
 from handover.controllers.trajectory_planner import Elbow, Path
 from handover.controllers.vsl_kinematics import place
 from handover.controllers.vsl_path import segments_of
-from handover.cosim.ports import Floats, Vector3, parameter
-from handover.cosim.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
+from handover.cosim.blocks.ports import Floats, Vector3, parameter
+from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from handover.plants.vsl_parameters import HIGHEST_PRESSURE, Link, Motion
 
 

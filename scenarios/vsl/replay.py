@@ -3,7 +3,7 @@
 import numpy as np
 
 from handover.controllers.vsl_path import segments_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl_parameters import Params as ArmParams
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.meshes import ball, prism

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.signals import Signals
 from handover.scenarios.experiment import Metric, Outcome, Watch
 from handover.scenarios.vsl.parameters import Parameters

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from handover.controllers.handover_vision import HandoverVision, Outputs, Params
 from handover.controllers.handover_vision import Inputs as Pictures
-from handover.cosim.geometry import quaternion_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import quaternion_of
+from handover.cosim.blocks.ports import Floats
 from handover.plants.stereo_camera import Inputs, StereoCamera
 from handover.plants.stereo_camera import Params as CameraParams
 

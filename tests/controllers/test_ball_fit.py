@@ -4,9 +4,8 @@ import pytest
 from handover.controllers.ball_fit import BallFit
 from handover.controllers.ball_outline import BallOutline
 from handover.controllers.stereo_rig import StereoRig
-from handover.cosim.geometry import looking_at, quaternion_of
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.ports import Floats
 
 RADIUS = 0.025
 P_WO = np.array([0.12, 0.1, -0.63])

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from handover.controllers.constant_curvature import forward_kinematics, linearise, segment_transform, tendon_lengths
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 D_GRIPPER, D_TENDON = 0.10, 0.035
 angles = st.floats(-np.pi / 2, np.pi / 2)

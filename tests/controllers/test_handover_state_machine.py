@@ -19,8 +19,8 @@ from handover.controllers.handover_state_machine import (
     Params,
     UnusableHandover,
 )
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 
 P = HandoverPhase
 T = 0.016

@@ -6,10 +6,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handover.controllers.handover_vision import HandoverVision, Inputs, Outputs, Params
-from handover.cosim.block_description import describe
-from handover.cosim.geometry import quaternion_of
-from handover.cosim.pinhole import UnusableCalibration
-from handover.cosim.ports import BLACK_1280X720, Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.geometry import UnusableCalibration, quaternion_of
+from handover.cosim.blocks.ports import BLACK_1280X720, Floats
 from handover.plants.stereo_camera import Inputs as Scene
 from handover.plants.stereo_camera import Params as CameraParams
 from handover.plants.stereo_camera import StereoCamera

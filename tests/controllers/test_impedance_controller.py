@@ -13,9 +13,9 @@ from handover.controllers.flyer_behaviour import Behaviour
 from handover.controllers.flyer_rotation import UnusableOrientation
 from handover.controllers.flyer_stability import UnusableController
 from handover.controllers.impedance_controller import ImpedanceController, Inputs, Outputs, Params
-from handover.cosim.block_description import describe
-from handover.cosim.geometry import quaternion_of, rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.geometry import quaternion_of, rotation_of
+from handover.cosim.blocks.ports import Floats
 
 control: Any = untyped_control
 T = 0.016

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from handover.controllers.constant_curvature import forward_kinematics
 from handover.controllers.jacobian_control import ControlStep, Limits, blend, control_step, keep_limits
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 D_GRIPPER = 0.10
 LIMITS = Limits(

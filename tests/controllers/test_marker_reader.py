@@ -4,7 +4,7 @@ import pytest
 
 from handover.controllers.marker_reader import MarkerReader
 from handover.controllers.region import Pixels, Region
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 H = np.array([[1.4, 0.12, 301.7], [-0.2, 1.35, 222.4], [0.0008, 0.0004, 1.0]])  # mm on the marker to px
 

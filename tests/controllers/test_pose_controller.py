@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from handover.controllers.flyer_profile import Bounds, profile_between
 from handover.controllers.flyer_stability import UnusableController
 from handover.controllers.pose_controller import Inputs, Outputs, Params, PoseController
-from handover.cosim.block_description import describe
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer import FreeFlyer
 from handover.plants.free_flyer import Inputs as FlyerInputs
 from handover.plants.free_flyer import Params as FlyerParams

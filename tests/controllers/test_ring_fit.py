@@ -5,9 +5,8 @@ from handover.controllers.marker_reader import Markers
 from handover.controllers.marker_ring import MarkerRing
 from handover.controllers.normal_equations import covariance
 from handover.controllers.ring_fit import RingFit
-from handover.cosim.geometry import looking_at, quaternion_of
-from handover.cosim.pinhole import Pinhole
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.ports import Floats
 
 RING = MarkerRing(0.034, 0.020)
 R_WB = np.diag([1.0, -1.0, -1.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handover.controllers.sampled_loop import LinearController, LinearPlant, SampledLoop, largest_stable, without_memory
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 T = 0.016
 ROLLER = LinearPlant(A=np.zeros((1, 1)), B=np.eye(1), E=np.eye(1), C=np.eye(1))  # x' = u + d

@@ -4,7 +4,7 @@ from scipy.optimize import NonlinearConstraint, minimize
 
 from handover.controllers.constant_curvature import forward_kinematics, linearise
 from handover.controllers.state_optimization import StateEstimate, optimise_state
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 D_GRIPPER = 0.10
 A_POSE = np.repeat([1.0, 1.05, 1.1], 3)

@@ -16,7 +16,7 @@ from handover.controllers.trajectory_planner import (
 )
 from handover.controllers.vsl_kinematics import VslKinematics
 from handover.controllers.vsl_path import Line, QuarterArc
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 DT = 0.02

@@ -10,8 +10,8 @@ import pytest
 
 from handover.controllers.constant_curvature import forward_kinematics, tendon_lengths
 from handover.controllers.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 
 W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 Q_CALIB = np.array([0, 0, 0.12, 0, 0, 0.24, 0, 0, 0.24])

@@ -13,7 +13,7 @@ from handover.controllers.vsl_fit import fit_cubic, rounded
 from handover.controllers.vsl_kinematics import Elbow, VslKinematics
 from handover.controllers.vsl_model import VslModel, inputs_of, turned
 from handover.controllers.vsl_model_text import UnusableModel, model_text, parse_model, read_model
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 RNG = np.random.default_rng(5)
 X = RNG.uniform([-1.0, 0.0, 5e4], [2.0, 0.1, 2e5], (200, 3))

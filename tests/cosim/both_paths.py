@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
@@ -12,7 +13,6 @@ from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.signals import Signals
 from handover.cosim.system import System
-from handover.cosim.variable import Kind
 
 Build = Callable[[], System]
 

@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Int8, Raster, Single, UInt16, UInt64, Vector2, output, parameter, port
-from handover.cosim.units import Kilogram, Metre, MetrePerSecond, Newton, NewtonPerMetre, Number
+from handover.cosim.blocks.ports import Int8, Raster, Single, UInt16, UInt64, Vector2, output, parameter, port
+from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Newton, NewtonPerMetre, Number
 
 TinyPicture = Annotated[NDArray[np.uint8], Raster(4, 2)]
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu_description import FmuPort
 from handover.cosim.signals import Signals
-from handover.cosim.variable import Causality, Kind
-from handover.cosim.width import Width
 
 _KINDS = {"f": Kind.REAL, "i": Kind.INTEGER, "u": Kind.INTEGER, "b": Kind.BOOLEAN}
 

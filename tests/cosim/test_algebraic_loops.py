@@ -9,13 +9,13 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.algebraic_loop import algebraic_loops
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import ScheduleError, UnitRefused
 from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
 from handover.cosim.iterating.not_converged import NotConverged
 from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.ports import Floats
 from handover.cosim.schedule import Schedule
 from handover.cosim.signals import Signals
 from handover.cosim.system import System

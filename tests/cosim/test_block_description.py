@@ -8,12 +8,22 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from handover.cosim.block_description import describe
-from handover.cosim.declared_fields import DeclarationError, declared_variables
-from handover.cosim.ports import BLACK_1280X720, Int8, Picture1280x720, Single, UInt64, Vector3, output, parameter, port
-from handover.cosim.units import Metre, Newton
-from handover.cosim.variable import Causality, Kind, Variable
-from handover.cosim.width import Width
+from handover.cosim.blocks.declarations import DeclarationError, declared_variables
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import (
+    BLACK_1280X720,
+    Int8,
+    Picture1280x720,
+    Single,
+    UInt64,
+    Vector3,
+    Width,
+    output,
+    parameter,
+    port,
+)
+from handover.cosim.blocks.units import Metre, Newton
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 
 
 class Phase(enum.IntEnum):

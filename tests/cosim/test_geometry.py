@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.geometry import quaternion_of, rotation_by, rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import quaternion_of, rotation_by, rotation_of
+from handover.cosim.blocks.ports import Floats
 
 RANDOM = np.random.default_rng(0)
 HALF_TURNS = [np.eye(4)[k] * sign for k in range(4) for sign in (-1.0, 1.0)]

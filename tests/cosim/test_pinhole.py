@@ -2,9 +2,8 @@ import cv2
 import numpy as np
 import pytest
 
-from handover.cosim.geometry import looking_at, quaternion_of
-from handover.cosim.pinhole import Pinhole, UnusableCalibration
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.geometry import Pinhole, UnusableCalibration, looking_at, quaternion_of
+from handover.cosim.blocks.ports import Floats
 
 P_WC = np.array([-0.95, 0.25, -0.6])
 Q_WC = quaternion_of(looking_at(P_WC, np.array([0.0, 0.0, -0.6])))

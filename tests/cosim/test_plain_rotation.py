@@ -4,8 +4,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.plain_rotation import Quaternion, cross, inverse, norm, product, rows, triple, turned, turned_back
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.plain_rotation import (
+    Quaternion,
+    cross,
+    inverse,
+    norm,
+    product,
+    rows,
+    triple,
+    turned,
+    turned_back,
+)
+from handover.cosim.blocks.ports import Floats
 
 
 def scalars(q: Floats) -> Quaternion:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from signals_of import signals_of
 
+from handover.cosim.blocks.units import Unit
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.units import Unit
-from handover.cosim.variable import Kind
 from handover.scenarios.record import Record
 
 ROWS = 700

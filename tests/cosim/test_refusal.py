@@ -1,4 +1,4 @@
-from handover.cosim.refusal import Refusal
+from handover.cosim.blocks.block import Refusal
 
 
 class Hot(Refusal):

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu_description import FmuDescription, FmuPort
 from handover.cosim.schedule import Schedule
 from handover.cosim.system import PlacedUnit, PortName, System
-from handover.cosim.variable import Causality, Kind
 
 
 def description(feedthrough: bool, presumed: bool, sampled: bool) -> FmuDescription:

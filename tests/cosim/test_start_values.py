@@ -4,9 +4,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.cosim.start_values import fault_of, numbers_of, range_of
-from handover.cosim.units import BaseExponents, Unit
-from handover.cosim.variable import Causality, Kind, Variable
+from handover.cosim.blocks.start_values import fault_of, numbers_of, range_of
+from handover.cosim.blocks.units import BaseExponents, Unit
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 
 METRE = Unit("m", BaseExponents(m=1))
 

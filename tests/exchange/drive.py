@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.block_description import Description
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.description import Description
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus.layout import element_names
 from handover.plants.stereo_camera import Inputs, Params, StereoCamera
 

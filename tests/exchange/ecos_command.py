@@ -19,7 +19,7 @@ from drive import STEPS, inputs, parameters, scalars
 from notary import ENTRIES
 from reference import description, variables
 
-from handover.cosim.variable import Kind
+from handover.cosim.blocks.variable import Kind
 from handover.fmus.catalog import UNITS
 from handover.fmus.layout import element_names
 

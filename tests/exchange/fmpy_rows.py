@@ -7,8 +7,8 @@ from typing import Any
 import fmpy
 import numpy as np
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu_description import FmuPort, describe_fmu, indices_of
-from handover.cosim.variable import Kind
 
 HOST: Any = fmpy
 

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Floats, Shape, output, port
+from handover.cosim.blocks.ports import Floats, Shape, output, port
 
 ENTRIES = 160
 """As many numbers as any unit of the catalog has real outputs, and some more."""

@@ -6,8 +6,8 @@ from typing import Any
 
 from drive import inputs
 
-from handover.cosim.block_description import describe
-from handover.cosim.ports import output
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import output
 from handover.fmus.catalog import UNITS
 
 

@@ -10,13 +10,13 @@ import drive
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.block_description import Description, describe
+from handover.cosim.blocks.description import Description, describe
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.fmu_description import describe_fmu
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.signals import Signals
 from handover.cosim.system import PortName, System
-from handover.cosim.variable import Kind, Variable
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS, import_block
 

@@ -12,7 +12,7 @@ import pytest
 from drive import STEPS, inputs, parameters
 from reference import FMI2_UNITS, Record, References, description, expect_same, variables
 
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus import interpreter
 from handover.fmus.binaries import FMI2_FOLDERS
 from handover.fmus.build import cached

@@ -8,7 +8,7 @@ import pytest
 from ecos_command import Ecos
 from reference import FMI2_UNITS, References, expect_same, variables
 
-from handover.cosim.variable import Kind
+from handover.cosim.blocks.variable import Kind
 from handover.fmus import interpreter
 from handover.fmus.build import build_block, cached
 

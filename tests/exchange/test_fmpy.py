@@ -10,7 +10,7 @@ import pytest
 from drive import STEPS, inputs, parameters, scalars
 from reference import FMI2_UNITS, Record, References, description, expect_same, variables
 
-from handover.cosim.variable import Kind, Variable
+from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.layout import element_names

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmpy_edge import unpack
 from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
 from handover.cosim.fmu_description import FmuPort, describe_fmu
-from handover.cosim.variable import Kind
 
 Digests = dict[str, str]
 """A digest of every output's bytes, by name."""

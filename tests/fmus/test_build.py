@@ -83,7 +83,7 @@ def test_imports_are_followed_but_those_for_type_checkers(tmp_path: Path, monkey
     monkeypatch.syspath_prepend(tmp_path)
     block = write_block(tmp_path, "followed", "1.0", helper="followed_helper")
     carried = closure(block)
-    assert {"followed.py", "followed_helper.py", "handover/cosim/ports.py"} <= carried.files.keys()
+    assert {"followed.py", "followed_helper.py", "handover/cosim/blocks/ports.py"} <= carried.files.keys()
     assert "cv2" not in carried.modules
 
 

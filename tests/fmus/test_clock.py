@@ -14,9 +14,9 @@ from saved_states import deserialise, save, serialised
 from state_runs import varied
 from workshop import Workshop
 
-from handover.cosim.block_description import describe
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu_description import describe_fmu
-from handover.cosim.variable import Kind
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, import_block
 from handover.fmus.layout import DuplicateName, Layout

@@ -15,9 +15,9 @@ from sample_units.scalars import Scalars
 from saved_states import deserialise, save, serialised
 from workshop import Workshop
 
-from handover.cosim.block_description import describe
-from handover.cosim.declared_fields import DeclarationError
-from handover.cosim.eventful_block import EndlessEvents, UnfitAdvance, step_through_events
+from handover.cosim.blocks.block import EndlessEvents, UnfitAdvance, step_through_events
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.blocks.description import describe
 
 BALL = "bouncing_ball:BouncingBall"
 G, E, HEIGHT, RELEASE = 9.81, 0.7, 1.0, 0.25

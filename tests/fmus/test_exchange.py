@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sample_units import every_kind, eye
 
-from handover.cosim.block_description import describe
+from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers
 from handover.fmus.exchange import UnfitOutput, output_writer
 from handover.fmus.layout import Layout

@@ -15,10 +15,10 @@ from fmpy.validation import validate_fmu
 from sample_units import declarations
 from workshop import Workshop
 
-from handover.cosim.block_description import Description, describe
+from handover.cosim.blocks.description import Description, describe
+from handover.cosim.blocks.ports import parameter
+from handover.cosim.blocks.units import Number
 from handover.cosim.fmu_description import describe_fmu
-from handover.cosim.ports import parameter
-from handover.cosim.units import Number
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import DuplicateName, Form, Layout

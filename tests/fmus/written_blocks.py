@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
-from handover.cosim.ports import output, parameter
-from handover.cosim.units import Number
+from handover.cosim.blocks.ports import output, parameter
+from handover.cosim.blocks.units import Number
 
 if TYPE_CHECKING:
     import cv2

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
 from handover.plants.rigid_body import TurnsTooFast
 

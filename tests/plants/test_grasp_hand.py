@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import FINGERS, JOINTS, PALM, SENSOR_PLACE, finger_points, palm_outline, sensor_rays
 from handover.plants.grasp_tendon import GEARS, PULLEYS, STIFFNESS, resting_posture, taken_up
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_objects import SOLIDS, Disc, Slab, Solid, Thing, outlines
 
 

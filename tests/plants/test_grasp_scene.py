@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
 from handover.plants.grasp_objects import SOLIDS, Thing
 from handover.plants.grasp_parameters import SEES_NOTHING, Params, UnusableScene

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.cosim.block_description import describe
+from handover.cosim.blocks.description import describe
 from handover.plants.grasp_objects import Thing
 from handover.plants.grasp_parameters import Params
 from handover.plants.grasp_scene import GraspScene, Inputs, Outputs

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.grasp_wrist import follow
 
 SPEED, ACCELERATION, LAG, DT = 0.3, 10.0, 0.02, 1e-3

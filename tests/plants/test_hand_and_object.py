@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 from handover.plants.hand_and_object import (
     Activity,
     HandAndObject,

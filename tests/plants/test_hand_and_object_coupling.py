@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer import FreeFlyer
 from handover.plants.free_flyer import Inputs as FlyerInputs
 from handover.plants.free_flyer import Outputs as FlyerOutputs

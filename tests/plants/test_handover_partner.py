@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 from handover.plants.handover_partner import HandoverPartner, Holder, Inputs, Outputs, Params, UnusablePartner
 from handover.plants.tendon_arm import Inputs as ArmInputs
 from handover.plants.tendon_arm import TendonArm

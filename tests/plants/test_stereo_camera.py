@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.cosim.block_description import describe
-from handover.cosim.pinhole import Pinhole, UnusableCalibration
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.geometry import Pinhole, UnusableCalibration
 from handover.plants.sketch import Pixels
 from handover.plants.stereo_camera import BadCover, Inputs, Params, StereoCamera
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.cosim.block_description import describe
-from handover.cosim.geometry import rotation_of
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
 from handover.plants.exudyn_edge import SolverFailure
 from handover.plants.tendon_arm import Inputs, Outputs, StepSizeError, TendonArm
 from handover.plants.tendon_parameters import Params, UnusableArm

@@ -1,7 +1,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.tendon_design import TendonDesign
 from handover.plants.tendon_parameters import Params
 from handover.plants.tendon_tangent import TendonTangent

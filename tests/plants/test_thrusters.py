@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.thrusters import Inputs, Outputs, Params, Thrusters
 
 DT = 0.016

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.cosim.block_description import describe
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl_arm import Inputs as ArmInputs
 from handover.plants.vsl_arm import Outputs as ArmOutputs
 from handover.plants.vsl_arm import UnusableInput, VslArm

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl_chain import Pose, VslChain
 from handover.plants.vsl_dynamics import NoConvergence, VslDynamics
 from handover.plants.vsl_parameters import Link, Motion, Params

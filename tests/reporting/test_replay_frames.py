@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.replay_frames import MOST, frame_rows, phase_changes
 

@@ -9,7 +9,7 @@ from opened_page import opened, wait_until
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.record import Record

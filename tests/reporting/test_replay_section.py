@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.record import Record
 from handover.scenarios.reporting.meshes import prism
 from handover.scenarios.reporting.replay import Body, Line, Replay

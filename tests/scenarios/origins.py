@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.declared_fields import declared_variables
-from handover.cosim.variable import Causality
+from handover.cosim.blocks.declarations import declared_variables
+from handover.cosim.blocks.variable import Causality
 
 
 def assert_every_default_has_its_origin(told: dict[str, dict[str, Any]], params: type[Any]) -> None:

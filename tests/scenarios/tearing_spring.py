@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from handover.cosim.ports import output, parameter
-from handover.cosim.units import Metre, Second
+from handover.cosim.blocks.ports import output, parameter
+from handover.cosim.blocks.units import Metre, Second
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -182,8 +182,8 @@ def test_build_writes_the_files_it_names(tmp_path: Path):
 OWN = """
 from dataclasses import dataclass
 from fractions import Fraction
-from handover.cosim.ports import output
-from handover.cosim.units import Metre
+from handover.cosim.blocks.ports import output
+from handover.cosim.blocks.units import Metre
 
 @dataclass(frozen=True)
 class Params: ...

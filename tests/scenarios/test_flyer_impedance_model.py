@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.free_flyer.behaviour import Behaviour
 from handover.scenarios.free_flyer.impedance_model import Errors, Motion, errors_of
 

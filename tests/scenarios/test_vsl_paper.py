@@ -14,9 +14,9 @@ from handover.controllers.hybrid_kinematics import Params as KinematicsParams
 from handover.controllers.trajectory_planner import Elbow
 from handover.controllers.trajectory_planner import Params as PlannerParams
 from handover.controllers.vsl_path import Path, QuarterArc, segments_of
-from handover.cosim.declared_fields import declared_variables
-from handover.cosim.ports import Floats
-from handover.cosim.variable import Causality
+from handover.cosim.blocks.declarations import declared_variables
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl_parameters import Params as ArmParams
 from handover.scenarios import vsl_training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters

@@ -18,9 +18,9 @@ from handover.controllers.vsl_default_model import DEFAULT_MODEL
 from handover.controllers.vsl_kinematics import Elbow, VslKinematics
 from handover.controllers.vsl_model import VslModel
 from handover.controllers.vsl_model_text import parse_model, read_model
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.master import Master
-from handover.cosim.ports import Floats
 from handover.cosim.signals import Signals
 from handover.cosim.system import System
 from handover.cosim.zip_writing import write_archive

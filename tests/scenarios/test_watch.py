@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from handover.controllers.visual_servo import Phase
+from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu_description import FmuPort
 from handover.cosim.signals import Signals
-from handover.cosim.variable import Causality, Kind
 from handover.plants.handover_partner import Holder
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.rig import camera_of

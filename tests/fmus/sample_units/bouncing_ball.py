@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from handover.cosim.eventful_block import step_through_events
-from handover.cosim.ports import output, parameter, port
-from handover.cosim.units import Metre, MetrePerSecond, Number, Second
+from handover.cosim.blocks.block import step_through_events
+from handover.cosim.blocks.ports import output, parameter, port
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Second
 
 MISSED = 1e-9  # what a host's sum of steps may miss the release by, s
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Vector3, output
-from handover.cosim.units import Metre
+from handover.cosim.blocks.ports import Vector3, output
+from handover.cosim.blocks.units import Metre
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Vector2, output, parameter, port
-from handover.cosim.units import BaseExponents, Metre, Number, Unit
+from handover.cosim.blocks.ports import Vector2, output, parameter, port
+from handover.cosim.blocks.units import BaseExponents, Metre, Number, Unit
 
 Kilometre = Annotated[float, Unit("km", BaseExponents(m=1), factor=1000.0)]
 Degree = Annotated[float, Unit("deg", BaseExponents(rad=1), factor=np.pi / 180)]

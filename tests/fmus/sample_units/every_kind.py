@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Floats, Matrix3, Vector3, output, parameter, port
-from handover.cosim.units import Metre, MetrePerSecond, Number, SquareMetre
+from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, output, parameter, port
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, SquareMetre
 
 
 class Mood(enum.IntEnum):

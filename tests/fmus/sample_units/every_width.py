@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import (
+from handover.cosim.blocks.ports import (
     Int8,
     Int16,
     Int32,
@@ -22,7 +22,7 @@ from handover.cosim.ports import (
     parameter,
     port,
 )
-from handover.cosim.units import Metre, Second
+from handover.cosim.blocks.units import Metre, Second
 
 
 @dataclass(frozen=True, kw_only=True)

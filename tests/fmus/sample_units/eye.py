@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import BLACK_1280X720, Picture1280x720, output, parameter, port
+from handover.cosim.blocks.ports import BLACK_1280X720, Picture1280x720, output, parameter, port
 
 
 @dataclass(frozen=True, kw_only=True)

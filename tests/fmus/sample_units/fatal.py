@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from handover.cosim.ports import output, parameter, port
-from handover.cosim.units import Number
+from handover.cosim.blocks.ports import output, parameter, port
+from handover.cosim.blocks.units import Number
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from handover.cosim.ports import output, parameter, port
-from handover.cosim.units import Number, Second
+from handover.cosim.blocks.ports import output, parameter, port
+from handover.cosim.blocks.units import Number, Second
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.cosim.ports import Vector3, output, parameter, port
-from handover.cosim.units import Metre, Number, Radian
+from handover.cosim.blocks.ports import Vector3, output, parameter, port
+from handover.cosim.blocks.units import Metre, Number, Radian
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
-from handover.cosim.ports import output, parameter, port
-from handover.cosim.units import Number
+from handover.cosim.blocks.ports import output, parameter, port
+from handover.cosim.blocks.units import Number
 
 
 class Deed(enum.IntEnum):

@@ -5,9 +5,8 @@ import enum
 import math
 from typing import Any
 
-from handover.cosim.ports import Raster
-from handover.cosim.units import ONE, Unit
-from handover.cosim.width import Width
+from handover.cosim.blocks.ports import Raster, Width
+from handover.cosim.blocks.units import ONE, Unit
 
 
 class Kind(enum.Enum):

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.declared_fields import declared_variables
-from handover.cosim.variable import Causality, Declared, Kind
+from handover.cosim.blocks.declarations import declared_variables
+from handover.cosim.blocks.variable import Causality, Declared, Kind
 
 
 def fault_of(port: Declared, value: Any) -> str | None:

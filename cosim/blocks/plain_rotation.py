@@ -5,7 +5,7 @@ Quaternions have their scalar part first; a matrix is its nine entries, row by r
 
 import math
 
-from handover.cosim.ports import Floats
+from handover.cosim.blocks.ports import Floats
 
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

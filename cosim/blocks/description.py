@@ -1,4 +1,7 @@
-"""What a block class declares: everything that is told of its variables elsewhere comes from here."""
+"""What a block class declares: everything that is told of its variables elsewhere comes from here.
+
+Whether a class has what a block has, looked at before its ports are.
+"""
 
 import dataclasses
 import functools
@@ -7,11 +10,56 @@ import sys
 import typing
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
-from handover.cosim.block_form import check_form
-from handover.cosim.declared_fields import DeclarationError, declared_variables
-from handover.cosim.variable import Causality, Variable
+from handover.cosim.blocks.declarations import DeclarationError, declared_variables
+from handover.cosim.blocks.variable import Causality, Variable
+
+_ATTRIBUTES = ("feedthrough", "period")
+_METHODS = ("outputs", "step", "get_state", "set_state")
+
+
+def check_form(block: type[Any]) -> None:
+    """Check a block class's attributes and methods.
+
+    Raises:
+        DeclarationError: some are missing, all of which are told, or an attribute is of a type that it cannot be of.
+    """
+    missing = [name for name in _ATTRIBUTES if not hasattr(block, name)]
+    missing += [name for name in _METHODS if not callable(getattr(block, name, None))]
+    if missing:
+        what = "a block has these" if len(missing) > 1 else "a block has this"
+        raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see handover.cosim.blocks.block.Block")
+    for name, fault in (("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))):
+        if fault:
+            raise DeclarationError(block.__name__, name, fault)
+
+
+def _period_fault(period: object) -> str:
+    if period is None:
+        return ""
+    if isinstance(period, Fraction):
+        return "" if period > 0 else f"{period} s is not positive"
+    try:
+        exact = Fraction(str(period))
+    except (ValueError, ZeroDivisionError):
+        exact = Fraction(0)
+    cure = repr(exact if exact > 0 else Fraction(1, 100))
+    return f"{period!r} is not a fraction of seconds; {cure} is right, or None for a block that is not sampled"
+
+
+def _feedthrough_fault(block: type[Any]) -> str:
+    given: object = block.feedthrough
+    example = 'such as {"y": ("u",)}, or {} where no input acts on an output at once'
+    if not isinstance(given, Mapping):
+        return f"{given!r} is not a mapping of outputs' names to tuples of inputs' names, {example}"
+    for y, us in cast("Mapping[object, object]", given).items():
+        if isinstance(us, str):
+            return f"{y!r}: {us!r} is a text, not a tuple of inputs' names; ({us!r},) is right"
+        if not isinstance(us, (tuple, list)):
+            return f"{y!r}: {us!r} is not a tuple of inputs' names, {example}"
+    return ""
+
 
 _EVENT_METHODS = ("advance", "handle_event", "next_event")
 
@@ -97,9 +145,7 @@ def _has_events(block: type[Any]) -> bool:
     present = [name for name in _EVENT_METHODS if hasattr(block, name)]
     for name in _EVENT_METHODS:
         if present and name not in present:
-            fault = (
-                f"a block that has {present[0]} has this method too; see handover.cosim.eventful_block.EventfulBlock"
-            )
+            fault = f"a block that has {present[0]} has this method too; see handover.cosim.blocks.block.EventfulBlock"
             raise DeclarationError(block.__name__, name, fault)
     if present and block.period is not None:
         raise DeclarationError(block.__name__, "period", "a block with events is not sampled: its period is None")

@@ -1,0 +1,169 @@
+"""What a plant or a controller is.
+
+A block is a plain class with three dataclasses of declared fields (`Params`, `Inputs`, `Outputs`); they are found by
+the annotations of `__init__` and `step`, and read by `handover.cosim.blocks.description.describe`.
+
+What a block offers that knows the derivatives of its outputs by its inputs.
+
+What a block offers whose course has events: instants at which something changes at once.
+
+What a block does not take.
+"""
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Block(Protocol):
+    """A plant or a controller with declared ports, advanced in steps.
+
+    What a block may offer besides: `handover.cosim.blocks.block.EventfulBlock`,
+    `handover.cosim.blocks.block.DifferentiableBlock`.
+
+    Class attributes: `feedthrough` names, by output, the inputs that act on it at once (within the same communication
+    point); `period` is the sampling period of a block that is sampled, in seconds, else None.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]]
+    period: ClassVar[Fraction | None]
+
+    def __init__(self, params: Any) -> None: ...
+    def outputs(self, t: float, u: Any) -> Any:
+        """Return the outputs at the start; no time passes."""
+        ...
+
+    def step(self, t: float, dt: float, u: Any) -> Any:
+        """Advance from t by dt with u held and return the outputs at t + dt.
+
+        A sampled block is stepped by its period only, once at each tick, with the inputs of that instant; a host sees
+        the outputs at once, and they hold until the next tick.
+        """
+        ...
+
+    def get_state(self) -> bytes:
+        """Return the complete state: what follows `set_state` is the same, bit for bit."""
+        ...
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state that `get_state` gave."""
+        ...
+
+
+class DifferentiableBlock(Block, Protocol):
+    """A block with exact derivatives of its real outputs by its real inputs.
+
+    They are of `outputs` as a function of u, with the block's state as it is; at a kink either side's will do. A block
+    is taken for one by having the method.
+    """
+
+    def directional_derivative(
+        self, t: float, u: Any, du: Mapping[str, float | NDArray[np.float64]]
+    ) -> Mapping[str, float | NDArray[np.float64]]:
+        """Return the outputs' derivatives in the direction du: dy = (dy/du) du.
+
+        Args:
+            t: time, s.
+            u: inputs where the derivative is taken.
+            du: direction by input's name, a float or an array of the input's shape, per unit of the direction's
+                parameter; inputs that are not named do not change.
+
+        Returns:
+            Derivatives by output's name, of the output's shape; those that are not named are zero.
+        """
+        ...
+
+
+MOST_EVENTS = 1000
+"""Most events in a row at one instant."""
+
+
+class UnfitAdvance(ValueError):
+    """A block's `advance` went backwards, or farther than it was to."""
+
+    def __init__(self, block: str, reached: float, dt: float) -> None:
+        super().__init__(f"{block}.advance came {reached!r} s far; it was to advance by at most {dt!r} s")
+        self.reached, self.dt = reached, dt
+
+
+class EndlessEvents(RuntimeError):
+    """A block has one event after the other without time passing."""
+
+    def __init__(self, block: str, t: float) -> None:
+        super().__init__(f"{block} has had {MOST_EVENTS} events at t = {t!r} s; it must come to rest, or get on")
+        self.t = t
+
+
+class EventfulBlock(Block, Protocol):
+    """A block with events of its own, such as an impact. It has all three methods and no period.
+
+    `step` handles the events within [t, t + dt) by itself, as `step_through_events` does; one at t + dt is left to what
+    follows, be it the next step or `handle_event`. With `advance` and `handle_event` a host sees each event.
+    """
+
+    def advance(self, t: float, dt: float, u: Any) -> tuple[float, Any]:
+        """Advance from t with u held, by dt or to the first event.
+
+        Returns:
+            How far it came, s: dt, or less where an event is; 0 if one is due at t. And the outputs there, as they are
+            before the event changes anything.
+        """
+        ...
+
+    def handle_event(self, t: float, u: Any) -> Any:
+        """Change what the event changes that is due at t, and return the outputs after it; no time passes.
+
+        The instant of an event known beforehand may have been missed by what a host's sum of steps is off, 1e-9 s.
+        """
+        ...
+
+    def next_event(self, t: float) -> float | None:
+        """Return the time of the next event that is known beforehand, or None.
+
+        A host with event mode lets a step end there. Events that depend on inputs need not be told.
+        """
+        ...
+
+
+def step_through_events(block: EventfulBlock, t: float, dt: float, u: Any) -> Any:
+    """Advance from t by dt with u held, handle the events on the way, and return the outputs at t + dt.
+
+    Raises:
+        UnfitAdvance: the block went backwards, or farther than it was to.
+        EndlessEvents: there are more than MOST_EVENTS events in a row and no time passes.
+    """
+    passed, idle = 0.0, 0
+    while True:
+        left = dt - passed
+        reached, y = block.advance(t + passed, left, u)
+        if not 0.0 <= reached <= left:
+            raise UnfitAdvance(type(block).__name__, reached, left)
+        passed += reached
+        if reached == left:
+            return y
+        idle = 0 if reached > 0.0 else idle + 1
+        if idle > MOST_EVENTS:
+            raise EndlessEvents(type(block).__name__, t + passed)
+        y = block.handle_event(t + passed, u)
+        if passed >= dt:
+            return y
+
+
+class Refusal(ValueError):
+    """Parameters of which a block cannot be made, or inputs that it cannot take; nothing has changed.
+
+    An FMU's log tells a refusal in one line, with no traceback. Subclasses name their block.
+
+    Attributes:
+        faults: all that is wrong, each with what would be right.
+    """
+
+    block: str
+    is_refusal: ClassVar[bool] = True
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__(f"{self.block}: " + "; ".join(faults))
+        self.faults = list(faults)
