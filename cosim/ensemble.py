@@ -12,13 +12,13 @@ from pathlib import Path
 from handover.cosim.endings import Endings
 from handover.cosim.exceptions import CosimError
 from handover.cosim.finite_check import FiniteCheck
-from handover.cosim.fmpy_edge import unpack
-from handover.cosim.heartbeat import Abandoned, Heartbeat
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.calls import State
+from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
+from handover.cosim.fmu.instance import Instance
 from handover.cosim.saved_states import SavedStates
 from handover.cosim.schedule import Slot
 from handover.cosim.signals import Signals
-from handover.cosim.state_calls import State
 from handover.cosim.stepping.linear_inputs import LinearInputs
 from handover.cosim.system import System
 from handover.cosim.wiring import Feeding, feedings, finite_checks

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.failures import NotFinite
-from handover.cosim.fmu_description import FmuPort, indices_of
-from handover.cosim.signal_buffer import Views, joined
+from handover.cosim.fmu.buffers import Views, joined
+from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.fmu.failures import NotFinite
 
 
 class FiniteCheck:

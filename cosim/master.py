@@ -9,8 +9,8 @@ from typing import TypeVar
 from handover.cosim.endings import Endings
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.exceptions import UnitFailure, UnitRefused
-from handover.cosim.failures import UnitHung
-from handover.cosim.heartbeat import Abandoned, Heartbeat
+from handover.cosim.fmu.failures import UnitHung
+from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.iterating.iteration_count import IterationCount
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.method import Method

@@ -7,8 +7,8 @@ from handover.cosim.ensemble import Ensemble
 from handover.cosim.events.event_ensemble import EventEnsemble
 from handover.cosim.events.event_options import has_events, refuse_off_grid
 from handover.cosim.events.event_stepper import EventStepper
+from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.group import Group, groups_of_data_flow
-from handover.cosim.heartbeat import Heartbeat
 from handover.cosim.iterating.fixed_point import FixedPoint
 from handover.cosim.iterating.initial_values import InitialValues
 from handover.cosim.iterating.interface import Interface

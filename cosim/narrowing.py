@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.description import FmuPort
 
 
 @dataclass(frozen=True)

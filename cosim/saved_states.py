@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from handover.cosim.state_calls import State
+from handover.cosim.fmu.calls import State
 from handover.cosim.stepping.linear_inputs import Memory
 
 

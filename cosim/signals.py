@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu_description import FmuPort, indices_of
-from handover.cosim.signal_buffer import Views
+from handover.cosim.fmu.buffers import Views
+from handover.cosim.fmu.description import FmuPort, indices_of
 
 
 @dataclass(frozen=True)

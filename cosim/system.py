@@ -12,9 +12,9 @@ from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.events.event_wiring import clock_mismatch, event_faults, once_faults
-from handover.cosim.events.fmu_clock import FmuClock
 from handover.cosim.exceptions import WiringError, nearest
-from handover.cosim.fmu_description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.clocks import FmuClock
+from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.linear import Linear
 from handover.cosim.unit_conversion import conversion, pass_as_they_are
 

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from handover.cosim.failures import UnitHung
-from handover.cosim.heartbeat import Call, Heartbeat
-from handover.cosim.stillness import Stillness
+from handover.cosim.fmu.failures import UnitHung
+from handover.cosim.fmu.heartbeat import Call, Heartbeat, Stillness
 
 T = TypeVar("T")
 

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from handover.cosim.finite_check import FiniteCheck
-from handover.cosim.fmu_description import FmuPort
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.buffers import Copy, joined
+from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.instance import Instance
 from handover.cosim.linear import Linear
 from handover.cosim.narrowing import Narrowing, narrows
 from handover.cosim.scaled_copy import ScaledCopy
-from handover.cosim.signal_buffer import Copy, joined
 from handover.cosim.system import PortName, System
 
 _log = logging.getLogger(__name__)

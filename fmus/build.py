@@ -13,7 +13,7 @@ from numbers import Rational
 from pathlib import Path
 
 from handover.cosim.blocks.description import describe
-from handover.cosim.zip_writing import write_archive
+from handover.cosim.fmu.archive import write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_block

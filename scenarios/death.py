@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.failures import UnitCrashed, UnitHung
-from handover.cosim.heartbeat import Call, Heartbeat
+from handover.cosim.fmu.failures import UnitCrashed, UnitHung
+from handover.cosim.fmu.heartbeat import Call, Heartbeat
 from handover.cosim.record.complete_record import complete_record
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Outcome

@@ -7,7 +7,7 @@ from handover.scenarios.exit_status import ABORTED
 from handover.scenarios.standard_streams import open_standard_streams
 
 if TYPE_CHECKING:
-    from handover.cosim.heartbeat import Heartbeat
+    from handover.cosim.fmu.heartbeat import Heartbeat
     from handover.scenarios.forked_child import ChildEnd
 
 _SUPERVISED = ("run", "resume")

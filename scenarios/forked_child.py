@@ -11,8 +11,7 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple, NoReturn
 
-from handover.cosim.heartbeat import Heartbeat
-from handover.cosim.stillness import Stillness
+from handover.cosim.fmu.heartbeat import Heartbeat, Stillness
 
 _LOOK = 0.25  # s
 _GRACE = 5.0

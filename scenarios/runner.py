@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from handover.cosim.checkpoint import check_states, remove_checkpoint
 from handover.cosim.checkpointer import Checkpointer
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.failures import UnitHung
+from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.from_then_on import FromThenOn
 from handover.cosim.master import Master
 from handover.cosim.observer import Observer

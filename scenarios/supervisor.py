@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.forked_child import ChildEnd, ForkedChild
 
 ORDERS = (

@@ -3,7 +3,7 @@
 import sys
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.death import Death
 from handover.scenarios.exit_status import UNIT_FAILED
 from handover.scenarios.forked_child import ChildEnd

@@ -17,7 +17,7 @@ from handover.controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, 
 from handover.controllers.vsl_model_text import model_text
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.description import FmuPort
 from handover.scenarios.vsl_training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
 
 SPLIT = (0.70, 0.15, 0.15)

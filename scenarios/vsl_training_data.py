@@ -12,9 +12,9 @@ from handover.controllers.vsl_kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused
-from handover.cosim.fmpy_edge import unpack
-from handover.cosim.fmu_description import FmuDescription, describe_fmu
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.instance import Instance
 
 RADII = (0.22, 0.42)
 """Distances of the wanted tip from J1's axis, m: the published paths with 2 cm around them (assumed)."""

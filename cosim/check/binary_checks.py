@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 
 from handover.cosim.check.finding import Finding, fault, warning
-from handover.cosim.fmpy_edge import library_path, platform_folder
-from handover.cosim.fmu_archive import FmuArchive
-from handover.cosim.library_format import HEAD, platforms_of, shortage
+from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.fmpy_edge import library_path, platform_folder
+from handover.cosim.fmu.library_format import HEAD, platforms_of, shortage
 
 _FMI2_FOLDERS = {
     "linux32": ("x86-linux",),

@@ -15,7 +15,8 @@ from handover.cosim.check.structure_checks import structure_findings
 from handover.cosim.check.variable_checks import variable_findings
 from handover.cosim.check.watched_process import watch
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmpy_edge import (
+from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.fmpy_edge import (
     checked_xml,
     library_path,
     platform_folder,
@@ -23,8 +24,7 @@ from handover.cosim.fmpy_edge import (
     required_functions,
     version_of,
 )
-from handover.cosim.fmu_archive import FmuArchive
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 
 _STEP = 0.01  # seconds, where the FMU asks for none
 

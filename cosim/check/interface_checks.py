@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 
 from handover.cosim.check.finding import Finding, fault, note, warning
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 
 _KINDS = {
     "ModelExchange": "model exchange",

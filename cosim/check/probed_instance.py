@@ -10,9 +10,9 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.check.journal import Journal
-from handover.cosim.fmu_description import FmuDescription, FmuPort
-from handover.cosim.instance import Instance
-from handover.cosim.signal_buffer import SignalBuffer
+from handover.cosim.fmu.buffers import SignalBuffer
+from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.instance import Instance
 
 _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
 

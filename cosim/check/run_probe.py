@@ -6,7 +6,7 @@ from typing import Any
 
 from handover.cosim.check.journal import Journal
 from handover.cosim.check.smoke_run import SmokeRun
-from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.fmu.description import describe_fmu
 
 
 def main(task: Mapping[str, Any]) -> None:

@@ -12,7 +12,7 @@ from handover.cosim.check.finding import Finding, fault, warning
 from handover.cosim.check.journal import Journal
 from handover.cosim.check.probed_instance import ProbedInstance
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
-from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.fmu.description import FmuDescription, FmuPort
 
 STEPS = 10
 _MOST_LINES = 24  # of a unit's log

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from handover.cosim.check.finding import Finding, fault
-from handover.cosim.fmpy_edge import problems_of
-from handover.cosim.fmu_archive import DESCRIPTION
+from handover.cosim.fmu.archive import DESCRIPTION
+from handover.cosim.fmu.fmpy_edge import problems_of
 
 _SCHEMA = re.compile(
     r"^(?:Fatal )?(?:ERROR|Error|WARNING) \(line (\d+), column \d+\): (.*)$", re.DOTALL | re.IGNORECASE

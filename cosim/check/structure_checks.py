@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from handover.cosim.check.described_variable import DescribedVariable
 from handover.cosim.check.finding import Finding, fault
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 
 _FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
 

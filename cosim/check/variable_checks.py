@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from handover.cosim.check.described_variable import REALS, DescribedVariable
 from handover.cosim.check.finding import Finding, fault, warning
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 
 _CLASSES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 

@@ -8,13 +8,12 @@ from pathlib import Path
 
 from handover.cosim.endings import Endings
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.events.event_instance import EventInstance
-from handover.cosim.events.step_end import StepEnd
 from handover.cosim.exceptions import CosimError
-from handover.cosim.heartbeat import Heartbeat
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.calls import State, StepEnd
+from handover.cosim.fmu.event_instance import EventInstance
+from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.cosim.fmu.instance import Instance
 from handover.cosim.schedule import Slot
-from handover.cosim.state_calls import State
 from handover.cosim.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)

@@ -7,8 +7,8 @@ from fractions import Fraction
 from typing import Any
 
 from handover.cosim.events.event_ensemble import EventEnsemble
-from handover.cosim.events.event_failures import UnsettledEvents
 from handover.cosim.events.event_iteration import MOST_ITERATIONS, EventIteration
+from handover.cosim.fmu.failures import UnsettledEvents
 from handover.cosim.schedule import Schedule, Slot
 from handover.cosim.stepping.coupling import Coupling
 

@@ -4,8 +4,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from handover.cosim.events.fmu_clock import FmuClock
-from handover.cosim.fmu_description import FmuDescription
+from handover.cosim.fmu.clocks import FmuClock
+from handover.cosim.fmu.description import FmuDescription
 
 
 def clock_mismatch(a: FmuClock | None, b: FmuClock | None) -> str | None:

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.ensemble import Ensemble
+from handover.cosim.fmu.calls import State
 from handover.cosim.iterating.interface import Interface
 from handover.cosim.iterating.interface_solver import InterfaceSolver, Unsolved
 from handover.cosim.iterating.iteration_count import IterationCount
 from handover.cosim.iterating.not_converged import not_converged
 from handover.cosim.schedule import Slot
-from handover.cosim.state_calls import State
 
 
 class IteratedStep:

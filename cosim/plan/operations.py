@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Width
+from handover.cosim.fmu.buffers import NativeCall, Views
+from handover.cosim.fmu.calls import NativeStep
 from handover.cosim.linear import Linear
-from handover.cosim.native_step import NativeStep
-from handover.cosim.signal_buffer import NativeCall, Views
 
 SIZE = 72
 _COPY, _CHECK, _ACCESS, _KEEP, _STEP, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", ""

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.finite_check import FiniteCheck
+from handover.cosim.fmu.buffers import Copy, OutputBuffer, SignalBuffer, Views
 from handover.cosim.master_options import Algorithm
 from handover.cosim.narrowing import Narrowing
 from handover.cosim.plan import operations
 from handover.cosim.plan.memory import KeptMemory, Segment
 from handover.cosim.schedule import Schedule, Slot
-from handover.cosim.signal_buffer import Copy, OutputBuffer, SignalBuffer, Views
 
 Judge = Callable[[int, float], None]
 """Takes what an operation that stopped the plan answered, and when, and raises what the general path would."""

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from handover.cosim.ensemble import Ensemble
+from handover.cosim.fmu.heartbeat import Abandoned
 from handover.cosim.from_then_on import FromThenOn
-from handover.cosim.heartbeat import Abandoned
 from handover.cosim.observer import Observer
 from handover.cosim.plan import memory
 from handover.cosim.plan.plan_maker import PlanMaker

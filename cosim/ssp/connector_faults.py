@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu_description import FmuDescription, FmuPort
+from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.ssp.changes import converted
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, variable_names
 from handover.cosim.ssp.structure import SspComponent, SspConnector

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.description import FmuPort
 
 Items = tuple[tuple[str, int], ...]
 

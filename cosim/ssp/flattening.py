@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu_description import FmuDescription
+from handover.cosim.fmu.description import FmuDescription
 from handover.cosim.linear import Linear
 from handover.cosim.ssp.changes import chained, converted
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names

@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.description import FmuPort
 from handover.cosim.linear import Linear
 from handover.cosim.ssp.changes import applied, converted
 from handover.cosim.ssp.connected_ports import Entry, entry_names

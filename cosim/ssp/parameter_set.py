@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.linear import Linear
 from handover.cosim.ssp.namespaces import local, told
 from handover.cosim.ssp.part import SspPart

@@ -5,7 +5,7 @@ from typing import Any
 
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names, ports_of
 from handover.cosim.ssp.described_types import DescribedTypes, add_dimensions
 from handover.cosim.ssp.xml_writing import document, root_element

@@ -10,7 +10,7 @@ from typing import Any
 import fmpy
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu_xml import UnsafeXml, XmlElement, parse_xml
+from handover.cosim.fmu.xml import UnsafeXml, XmlElement, parse_xml
 from handover.cosim.ssp.namespaces import shortened, tag, told
 
 _etree: Any = importlib.import_module("lxml.etree")  # has no types, nor have its classes

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
-from handover.cosim.fmu_description import FmuDescription, describe_fmu
+from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.connected_ports import find_entry, taken_apart
 from handover.cosim.ssp.flattening import FlatSystem, components_of, flatten

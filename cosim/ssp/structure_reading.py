@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE, local, told
 from handover.cosim.ssp.parameter_set import (

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.archive import write_archive
+from handover.cosim.fmu.description import FmuPort
 from handover.cosim.linear import Linear
 from handover.cosim.ssp.connected_ports import entry_names
 from handover.cosim.ssp.described_types import DescribedTypes, add_dimensions
@@ -16,7 +17,6 @@ from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
 from handover.cosim.ssp.parameter_writing import bound_values, parameter_set
 from handover.cosim.ssp.xml_writing import document, root_element
 from handover.cosim.system import Connection, PlacedUnit, System, proposed_step
-from handover.cosim.zip_writing import write_archive
 
 
 def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = None) -> Path:

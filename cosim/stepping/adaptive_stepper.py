@@ -8,7 +8,7 @@ from typing import Any
 
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.exceptions import ScheduleError, UnitFailure, nearest
-from handover.cosim.failures import NotFinite, UnitDiscarded
+from handover.cosim.fmu.failures import NotFinite, UnitDiscarded
 from handover.cosim.iterating.not_converged import NotConverged
 from handover.cosim.schedule import Schedule, Slot
 from handover.cosim.stepping.adaptive_step import AdaptiveStep

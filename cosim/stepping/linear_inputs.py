@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.instance import Instance
 from handover.cosim.linear import Linear
 from handover.cosim.stepping.trace import Moments, Trace
 from handover.cosim.system import Connection, PortName, System

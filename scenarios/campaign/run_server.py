@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.fmus.catalog import UNITS, import_block
 from handover.scenarios import supervisor
 from handover.scenarios.campaign.ordered_run import (

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from native_units import native_fmu
 
-from handover.cosim.heartbeat import Heartbeat
+from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.system import System
 
 

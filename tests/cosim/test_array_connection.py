@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.events.event_instance import EventInstance
 from handover.cosim.exceptions import WiringError
+from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.signals import Signals

@@ -10,7 +10,7 @@ from called import Called, fed_by
 from endless_blocks import GO_ON
 from native_units import native_fmu
 
-from handover.cosim.failures import UnitHung
+from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.record.recorder import Recorder

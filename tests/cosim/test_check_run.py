@@ -12,7 +12,7 @@ from handover.cosim.check.check_report import CheckReport
 from handover.cosim.check.finding import Level
 from handover.cosim.check.load_probe import load_fault
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmpy_edge import unpack
+from handover.cosim.fmu.fmpy_edge import unpack
 from handover.fmus.compile import host_platform
 
 pytestmark = pytest.mark.skipif(not host_platform().endswith("linux"), reason="signals and messages of Linux")

@@ -9,7 +9,7 @@ from native_units import native_fmu
 from two_masses import TwoMasses
 
 from handover.cosim.exceptions import ScheduleError
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.instance import Instance
 from handover.cosim.iterating.not_converged import NotConverged
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions

@@ -6,8 +6,8 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from handover.cosim.events.event_failures import StepDiscarded
 from handover.cosim.exceptions import UnitFailure
+from handover.cosim.fmu.failures import StepDiscarded
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.system import System

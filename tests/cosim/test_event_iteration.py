@@ -6,9 +6,8 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from handover.cosim.events.event_failures import UnsettledEvents
 from handover.cosim.events.event_iteration import MOST_ITERATIONS
-from handover.cosim.failures import UnitEnded
+from handover.cosim.fmu.failures import UnitEnded, UnsettledEvents
 from handover.cosim.master import Master
 from handover.cosim.system import System
 

@@ -7,7 +7,7 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
-from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.ssp.writing import write_ssp

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from handover.cosim.fmpy_edge import unpack
-from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
-from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

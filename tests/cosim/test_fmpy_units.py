@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.fmpy_edge import unpack
-from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
-from handover.cosim.fmu_description import FmuDescription, describe_fmu
+from handover.cosim.fmu.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
 
 def loaded(d: FmuDescription, folder: Path) -> Any:

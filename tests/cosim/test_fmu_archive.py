@@ -11,9 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from handover.cosim.archive_faults import archive_faults
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu_archive import FmuArchive
+from handover.cosim.fmu.archive import FmuArchive, archive_faults
 
 PLAIN = {"modelDescription.xml": b"<fmiModelDescription/>" * 20, "resources/table.csv": b"1,2,3\n" * 100}
 

@@ -8,7 +8,7 @@ import pytest
 from called import Called, fed_by
 from native_units import native_fmu
 
-from handover.cosim.failures import UnitHung
+from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 

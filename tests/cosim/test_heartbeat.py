@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from handover.cosim.heartbeat import Heartbeat
-from handover.cosim.stillness import Stillness
+from handover.cosim.fmu.heartbeat import Heartbeat, Stillness
 
 
 def test_a_call_is_told_by_names_and_time_while_it_is_under_way():

@@ -10,7 +10,7 @@ from fmu_of import FmuOf
 from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
+from handover.cosim.fmu.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
 from handover.cosim.master_options import Algorithm
 from handover.cosim.system import System
 

@@ -8,10 +8,10 @@ from both_paths import PLAIN, expect_alike
 from fmu_of import FmuOf
 from native_units import native_fmu
 
+from handover.cosim.fmu.buffers import SignalBuffer
 from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm
-from handover.cosim.signal_buffer import SignalBuffer
 from handover.cosim.system import System
 
 SECOND = Fraction(1)

@@ -9,7 +9,7 @@ from called import Called
 from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.instance import Instance
+from handover.cosim.fmu.instance import Instance
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.stepping.adaptive_step import AdaptiveStep

@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.signal_buffer import joined
+from handover.cosim.fmu.buffers import joined
 
 
 def carry_out(copies: list[tuple[NDArray[Any], NDArray[Any]]]) -> None:

@@ -9,7 +9,7 @@ from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import InvalidFmu, WiringError
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system import System, mismatch, proposed_step
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)

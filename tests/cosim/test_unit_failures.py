@@ -12,7 +12,15 @@ from called import Called, fed_by
 from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure, UnitRefused
-from handover.cosim.failures import NotFinite, UnitCrashed, UnitDiscarded, UnitEnded, UnitError, UnitFatal, UnitHung
+from handover.cosim.fmu.failures import (
+    NotFinite,
+    UnitCrashed,
+    UnitDiscarded,
+    UnitEnded,
+    UnitError,
+    UnitFatal,
+    UnitHung,
+)
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.record.recorder import Recorder

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from handover.cosim.failures import UnitHung
-from handover.cosim.heartbeat import Abandoned, Heartbeat
+from handover.cosim.fmu.failures import UnitHung
+from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.watchdog import Watchdog
 
 

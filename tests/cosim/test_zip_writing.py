@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from handover.cosim.zip_writing import write_archive
+from handover.cosim.fmu.archive import write_archive
 
 FILES = {"a.txt": b"a" * 100, "binaries/b": b"b" * 100}
 PLACES = ("zip_writing.py", "zipfile.py", "zipfile/__init__.py")

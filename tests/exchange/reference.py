@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.cosim.fmu_description import describe_fmu
+from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.signals import Signals

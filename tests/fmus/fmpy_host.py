@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmpy_edge import unpack
-from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
-from handover.cosim.fmu_description import FmuPort, describe_fmu
+from handover.cosim.fmu.description import FmuPort, describe_fmu
+from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
 Digests = dict[str, str]
 """A digest of every output's bytes, by name."""

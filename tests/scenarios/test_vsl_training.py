@@ -20,10 +20,10 @@ from handover.controllers.vsl_model import VslModel
 from handover.controllers.vsl_model_text import parse_model, read_model
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmu.archive import write_archive
 from handover.cosim.master import Master
 from handover.cosim.signals import Signals
 from handover.cosim.system import System
-from handover.cosim.zip_writing import write_archive
 from handover.fmus.build import build_block, cached
 from handover.scenarios import vsl_train_command
 from handover.scenarios.vsl_train_command import vsl_train

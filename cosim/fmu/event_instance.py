@@ -8,16 +8,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from handover.cosim.events.clock_calls import ClockCalls
-from handover.cosim.events.clock_timer import ClockTimer
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.failures import UnitEnded
-from handover.cosim.fmpy_loading import load_fmi3
-from handover.cosim.fmu_description import FmuDescription, FmuPort
-from handover.cosim.heartbeat import Heartbeat
-from handover.cosim.instance import Instance
-from handover.cosim.signal_buffer import SignalBuffer, Views
-from handover.cosim.signal_content import content_of
+from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
+from handover.cosim.fmu.clock_calls import ClockCalls, ClockTimer
+from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.failures import UnitEnded
+from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.cosim.fmu.instance import Instance
+from handover.cosim.fmu.loading import load_fmi3
 
 
 class EventInstance(Instance):

@@ -1,6 +1,6 @@
 """The typed edge to FMPy: reading model descriptions, and unpacking.
 
-FMUs are loaded in `handover.cosim.fmpy_loading`.
+FMUs are loaded in `handover.cosim.fmu.loading`.
 """
 
 from pathlib import Path
@@ -13,9 +13,9 @@ from fmpy.model_description import ValidationError
 from fmpy.validation import validate_model_description
 
 from handover.cosim.exceptions import InvalidFmu, one_line
-from handover.cosim.fmu_archive import DESCRIPTION, FmuArchive
-from handover.cosim.fmu_xml import UnsafeXml, XmlElement, check_xml, parse_xml
-from handover.cosim.library_format import HEAD, shortage
+from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.library_format import HEAD, shortage
+from handover.cosim.fmu.xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,7 +13,7 @@ class FmuClock:
 
     `variability` is the standard's `intervalVariability`. A time-based clock ticks whenever `interval` seconds have
     passed, first at `shift`; where `interval` is None the unit is asked for it, see
-    `handover.cosim.events.clock_timer`.
+    `handover.cosim.fmu.clock_calls`.
     """
 
     name: str

@@ -1,4 +1,9 @@
-"""Preallocated buffers through which an FMU's variables of one type are set or read in one call."""
+"""Preallocated buffers through which an FMU's variables of one type are set or read in one call.
+
+What a port's buffer holds, as bytes: to see whether it has changed.
+
+First time derivatives of inputs, for FMI 2 units that interpolate.
+"""
 
 import ctypes
 from collections.abc import Callable, Iterable, Sequence
@@ -8,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.fmu_description import FmuPort
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.fmu.description import FmuPort
 
 _POINTER: Callable[[Any], Any] = ctypes.POINTER
 
@@ -185,3 +191,24 @@ def _arrays(fmi_type: str, fmi: int, n: int) -> tuple[Views, tuple[Any, ...]]:
 
 def _pointer(array: NDArray[Any], c_type: Any) -> Any:
     return ctypes.cast(array.ctypes.data, _POINTER(c_type))
+
+
+def content_of(port: FmuPort, views: Views) -> bytes:
+    """Return what a port holds; of strings and binaries the text and the bytes, not where they lie."""
+    if port.kind is Kind.STRING:
+        texts = (ctypes.string_at(int(a)) if a else b"" for a in views[0])
+        return b"\0".join(texts)
+    if port.kind is Kind.BINARY:
+        pairs = zip(views[0], views[1], strict=True)
+        return b"".join(int(n).to_bytes(8, "little") + ctypes.string_at(int(a), int(n)) for a, n in pairs)
+    return views[0].tobytes()
+
+
+class RateBuffer(SignalBuffer):
+    """A buffer for the derivatives of real inputs, per second; calling it sets them all."""
+
+    def __init__(self, function: Callable[..., int], component: Any, ports: Sequence[FmuPort]) -> None:
+        super().__init__("fmi2SetRealInputDerivatives", function, component, 2, ports)
+        instance, references, count, values = self._arguments
+        orders = (ctypes.c_int * count)(*(1 for _ in range(count)))
+        self._arguments = (instance, references, count, orders, values)

@@ -3,12 +3,14 @@
 FMI 2 knows no arrays, and in FMI 3 some tools do without: scalar variables named `p[1]`, `p[2]`, ... (or `R[1,1]`, ...)
 that agree in type, causality, unit and timing are taken together as one array port `p`, so that units of both standards
 and forms can stand in for each other.
+
+What an FMU can do beyond stepping: the capability flags of its co-simulation interface.
 """
 
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +18,62 @@ from typing import TYPE_CHECKING, Any
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Declared, Kind
-from handover.cosim.capabilities import Capabilities, capabilities_of
-from handover.cosim.events.fmu_clock import FmuClock, clocks_of, without_clocks
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu_xml import XmlElement
+from handover.cosim.fmu.clocks import FmuClock, clocks_of, without_clocks
+from handover.cosim.fmu.xml import XmlElement
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capabilities:
+    """Capability flags, in one wording for both standards; what a standard does not know is False.
+
+    Attributes:
+        varies_step: its communication step may change during a run.
+        saves_state, serialises_state: its state can be fetched and set again, also as bytes.
+        interpolates_inputs: it takes derivatives of its inputs (FMI 2).
+        output_derivatives: the highest order of output derivatives that it gives.
+        directional_derivatives: it gives directional derivatives.
+        event_mode, returns_early: it has event mode, and may end a step before its end (FMI 3).
+        once_per_process: a process may hold one instance of it only.
+    """
+
+    varies_step: bool = False
+    saves_state: bool = False
+    serialises_state: bool = False
+    interpolates_inputs: bool = False
+    output_derivatives: int = 0
+    directional_derivatives: bool = False
+    event_mode: bool = False
+    returns_early: bool = False
+    once_per_process: bool = False
+
+
+def capabilities_of(root: XmlElement, fmi: int) -> Capabilities:
+    """Read the flags off a model description."""
+    element = next(root.named("CoSimulation"), None)
+    if element is None:
+        return Capabilities()
+    flag = _flags(element)
+    state = "FMUstate" if fmi == 2 else "FMUState"
+    return Capabilities(
+        varies_step=flag("canHandleVariableCommunicationStepSize"),
+        saves_state=flag(f"canGetAndSet{state}"),
+        serialises_state=flag(f"canSerialize{state}"),
+        interpolates_inputs=fmi == 2 and flag("canInterpolateInputs"),
+        output_derivatives=int(element.get("maxOutputDerivativeOrder", "0")),
+        directional_derivatives=flag("providesDirectionalDerivative" + ("" if fmi == 2 else "s")),
+        event_mode=fmi == 3 and flag("hasEventMode"),
+        returns_early=fmi == 3 and flag("mightReturnEarlyFromDoStep"),
+        once_per_process=flag("canBeInstantiatedOnlyOncePerProcess"),
+    )
+
+
+def _flags(element: XmlElement) -> Callable[[str], bool]:
+    return lambda name: element.get(name) in ("true", "1")
+
 
 if TYPE_CHECKING:
-    from handover.cosim.fmpy_edge import ModelDescription, ModelVariable
+    from handover.cosim.fmu.fmpy_edge import ModelDescription, ModelVariable
 
 _KINDS = {
     "Real": Kind.REAL,
@@ -112,10 +163,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, or a clock
             that cannot tick.
     """
-    from handover.cosim.fmpy_edge import (  # FMPy takes long to load, and wiring knows no file yet
-        mime_types,
-        read_description,
-    )
+    from handover.cosim.fmu.fmpy_edge import mime_types, read_description
 
     md, root = read_description(path)
     is_fmi2 = md.fmiVersion == "2.0"
@@ -169,7 +217,7 @@ def _unit(u: Any) -> Unit:
 
 def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = _KINDS.get(v.type)
-    if kind is None:  # clocks, see `handover.cosim.events.fmu_clock`, and whatever later standards bring
+    if kind is None:  # clocks, see `handover.cosim.fmu.clocks`, and whatever later standards bring
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)

@@ -1,18 +1,100 @@
-"""An FMU's zip archive, looked through before anything is taken out of it."""
+"""An FMU's zip archive, looked through before anything is taken out of it.
 
+Why a zip archive is not to be unpacked: its members would lead out of a folder, fill the disk, or not be read.
+
+Writes the zip files of FMUs and SSPs.
+"""
+
+import io
+import os
+import re
+import stat
+import uuid
 import zipfile
 import zlib
-from pathlib import Path
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path, PurePosixPath
 from typing import ClassVar
 
-from handover.cosim.archive_faults import STANDARD_METHODS, archive_faults, listed
 from handover.cosim.exceptions import InvalidFmu, one_line
+
+STANDARD_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Compressions that the standards know."""
+
+_METHODS = (*STANDARD_METHODS, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+_MIB = 1 << 20
+_MOST_FILES = 100_000
+_MOST_BYTES = 16 << 30
+_SUSPECT_BYTES, _SUSPECT_RATIO = 256 * _MIB, 200  # libraries and tables shrink to a tenth, rarely to a hundredth
+_MOST_TOLD = 5
+
+
+def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
+    """Return why members of an archive of `size` bytes are not to be unpacked, a line for each kind of fault."""
+    names = [m.orig_filename for m in members]
+    plain = {n for n in names if not n.endswith("/")}
+    kinds: tuple[tuple[str, Iterable[str]], ...] = (
+        ("paths that lead out of it; they must be relative, with slashes", filter(_leads_out, names)),
+        ("the same path twice", (n for n, count in Counter(names).items() if count > 1)),
+        ("symbolic links or devices; store the files themselves", (m.orig_filename for m in members if _special(m))),
+        ("encrypted files; store them without a password", (m.orig_filename for m in members if m.flag_bits & 0x1)),
+        (
+            "files in a compression that cannot be read; use deflate",
+            (m.orig_filename for m in members if m.compress_type not in _METHODS),
+        ),
+        ("files that are folders of other files", (n for n in plain if plain & _parents(n))),
+    )
+    found = ((what, sorted(set(paths))) for what, paths in kinds)
+    return [
+        *(f"the archive holds {what}: {listed(paths)}" for what, paths in found if paths),
+        *_size_faults(members, size),
+    ]
+
+
+def _size_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
+    if len(members) > _MOST_FILES:
+        return [f"the archive holds {len(members)} files; at most {_MOST_FILES} are unpacked"]
+    total = sum(m.file_size for m in members)
+    if total > _MOST_BYTES:
+        return [f"the archive would unpack to {total / 2**30:.0f} GiB; at most {_MOST_BYTES >> 30} GiB are unpacked"]
+    if total > _SUSPECT_BYTES and total > _SUSPECT_RATIO * size:
+        told = f"{size / _MIB:.1f} MiB would unpack to {total / _MIB:.0f} MiB"
+        return [f"the archive looks like a zip bomb: {told}; at most {_SUSPECT_RATIO} times as much is believed"]
+    return []
+
+
+def _leads_out(name: str) -> bool:
+    windows = "\\" in name or ":" in name  # other systems take these for letters; Windows goes elsewhere
+    return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or not name.strip("./")
+
+
+def _special(member: zipfile.ZipInfo) -> bool:
+    kind = stat.S_IFMT(member.external_attr >> 16)
+    return kind not in (0, stat.S_IFREG, stat.S_IFDIR)
+
+
+def _parents(name: str) -> set[str]:
+    return {str(p) for p in PurePosixPath(name).parents}
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return the first of some paths, shortened and without what would steer a terminal."""
+    shown = [_shown(n) for n in names]
+    more = f", and {len(shown) - _MOST_TOLD} more" if len(shown) > _MOST_TOLD else ""
+    return ", ".join(shown[:_MOST_TOLD]) + more
+
+
+def _shown(name: str) -> str:
+    shown = re.sub(r"[^\x20-\x7e]", lambda m: m[0].encode("unicode_escape").decode(), name)
+    return shown if len(shown) <= 100 else shown[:97] + "..."
+
 
 DESCRIPTION = "modelDescription.xml"
 NO_FILE_FAULT = "not a regular file"
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError, ValueError)
-_MIB = 1 << 20
+
 _MOST_TEXT = 512 * _MIB  # of one XML file
 
 
@@ -154,3 +236,46 @@ def _no_zip(begin: bytes, kind: str) -> str:
     if begin.startswith(b"PK\x03\x04"):
         return "the archive is damaged: it begins as a zip archive, but its end is missing; copy or fetch it again"
     return f"not an {kind}: an {kind} is a zip archive, and this file is not one"
+
+
+DATE = (1980, 1, 1, 0, 0, 0)
+UNIX = 3
+"""Who made the members, so that their permissions count."""
+
+
+def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
+    """Write a zip file whose bytes depend on the files' names and contents alone.
+
+    It appears complete or not at all, so two processes may write the same one at once.
+    """
+    content = _packed(files)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}-{uuid.uuid4().hex}")
+    try:
+        part.write_bytes(content)
+        part.chmod(0o644)
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    return path
+
+
+def _packed(files: Mapping[str, bytes]) -> bytes:
+    memory = io.BytesIO()
+    archive = _Archive(memory, "w", zipfile.ZIP_DEFLATED)
+    for name in sorted(files):
+        member = zipfile.ZipInfo(name, DATE)
+        member.compress_type = zipfile.ZIP_DEFLATED
+        member.create_system = UNIX
+        member.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+        archive.writestr(member, files[name])
+    archive.close()
+    return memory.getvalue()
+
+
+class _Archive(zipfile.ZipFile):
+    """Dropped as it is where an exception, such as Ctrl-C, leaves it: to close it then fails amid a member."""
+
+    def __del__(self) -> None:
+        pass

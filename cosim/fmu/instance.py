@@ -9,19 +9,13 @@ from typing import Any
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.directional_derivatives import derivatives_along
-from handover.cosim.events.discarded_step import discarded_step
-from handover.cosim.events.event_failures import StepDiscarded
-from handover.cosim.events.step_end import StepEnd
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from handover.cosim.failures import STATUS, UnitEnded, failure_of
-from handover.cosim.fmpy_loading import load_fmi2, load_fmi3
-from handover.cosim.fmu_description import FmuDescription, FmuPort
-from handover.cosim.heartbeat import Abandoned, Heartbeat
-from handover.cosim.native_step import NativeStep
-from handover.cosim.signal_buffer import OutputBuffer, SignalBuffer, Views
-from handover.cosim.state_calls import State, StateCalls
-from handover.cosim.stepping.rate_buffer import RateBuffer
+from handover.cosim.fmu.buffers import OutputBuffer, RateBuffer, SignalBuffer, Views
+from handover.cosim.fmu.calls import NativeStep, State, StateCalls, StepEnd, derivatives_along, discarded_step
+from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.failures import STATUS, StepDiscarded, UnitEnded, failure_of
+from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
+from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
