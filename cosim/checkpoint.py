@@ -12,7 +12,7 @@ from typing import Any
 
 from handover.cosim.exceptions import CosimError, one_line
 from handover.cosim.master import Master
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 _FORMAT = 1
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from handover.cosim.checkpoint import take_checkpoint, write_checkpoint
 from handover.cosim.master import Master
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 
 _log = logging.getLogger(__name__)
 

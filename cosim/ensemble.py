@@ -17,10 +17,10 @@ from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.saved_states import SavedStates
-from handover.cosim.schedule import Slot
-from handover.cosim.signals import Signals
 from handover.cosim.stepping.linear_inputs import LinearInputs
-from handover.cosim.system import System
+from handover.cosim.system.schedule import Slot
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 from handover.cosim.wiring import Feeding, feedings, finite_checks
 
 

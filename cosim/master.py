@@ -14,16 +14,15 @@ from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.iterating.iteration_count import IterationCount
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.method import Method
-from handover.cosim.observer import Observer
 from handover.cosim.plan.plan_stepper import PlanStepper
-from handover.cosim.signals import Signals
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
 from handover.cosim.stepping.coupling import Coupling
 from handover.cosim.stepping.gauss_seidel import GaussSeidel
 from handover.cosim.stepping.pacing import Pacer
 from handover.cosim.stepping.step_statistics import StepStatistics
 from handover.cosim.stepping.stepper import Stepper
-from handover.cosim.system import System
+from handover.cosim.system.signals import Observer, Signals
+from handover.cosim.system.system import System
 from handover.cosim.watchdog import Watchdog
 
 T = TypeVar("T")

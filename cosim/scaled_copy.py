@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.linear import Linear
+from handover.cosim.system.conversion import Linear
 
 
 class ScaledCopy:

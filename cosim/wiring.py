@@ -8,10 +8,10 @@ from handover.cosim.finite_check import FiniteCheck
 from handover.cosim.fmu.buffers import Copy, joined
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.linear import Linear
 from handover.cosim.narrowing import Narrowing, narrows
 from handover.cosim.scaled_copy import ScaledCopy
-from handover.cosim.system import PortName, System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import PortName, System
 
 _log = logging.getLogger(__name__)
 

@@ -10,8 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.check_report import CheckReport, Section
-from handover.cosim.check.finding import Finding, Level
+from handover.cosim.check.finding import CheckReport, Finding, Level, Section
 from handover.cosim.fmu.archive import NO_FILE_FAULT, folder_fault
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.console import open_console

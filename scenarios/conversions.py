@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from handover.cosim.linear import Linear
-from handover.cosim.system import System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import System
 
 
 def conversions_of(system: System) -> list[dict[str, Any]]:

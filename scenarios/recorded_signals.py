@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.scenarios.record import Record
 
 

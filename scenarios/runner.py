@@ -7,11 +7,9 @@ from handover.cosim.checkpoint import check_states, remove_checkpoint
 from handover.cosim.checkpointer import Checkpointer
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitHung
-from handover.cosim.from_then_on import FromThenOn
 from handover.cosim.master import Master
-from handover.cosim.observer import Observer
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Outcome, Watch
 from handover.scenarios.interruption import Interruption

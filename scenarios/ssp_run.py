@@ -8,9 +8,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
-from handover.cosim.signals import Signals
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 from handover.scenarios import supervisor
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from handover.cosim.system import Connection, System
+from handover.cosim.system.system import Connection, System
 
 
 def told_system(system: System, *, adaptive: bool) -> dict[str, Any]:

@@ -11,7 +11,7 @@ FOLDERS = ("cosim", "plants", "controllers", "fmus", "scenarios")
 
 PROGRAM = """
 import importlib
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.plants.hand_tremor import HandTremor
 from handover.scenarios.catalog import SCENARIOS
 from handover.fmus.catalog import UNITS

@@ -1,30 +1,163 @@
-"""Checks one file: archive, description, interface, binaries, loading, and a short run."""
+"""Checks one file: archive, description, interface, binaries, loading, and a short run.
+
+The standard's own validation: FMPy's, by the standard's schema and rules, in this project's words.
+
+Which machines an FMU has libraries for, and whether they are what their folders say, before one is loaded.
+"""
 
 import math
+import re
 import tempfile
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path, PurePosixPath
 
-from handover.cosim.check.binary_checks import binary_findings, platforms_in
-from handover.cosim.check.check_report import CheckReport, Section
 from handover.cosim.check.described_variable import variables_of
-from handover.cosim.check.finding import Finding, Level, fault, warning
-from handover.cosim.check.interface_checks import default_start, default_step, interface_findings, says
-from handover.cosim.check.standard_checks import standard_findings
-from handover.cosim.check.structure_checks import structure_findings
-from handover.cosim.check.variable_checks import variable_findings
-from handover.cosim.check.watched_process import watch
+from handover.cosim.check.description_checks import (
+    default_start,
+    default_step,
+    interface_findings,
+    says,
+    structure_findings,
+    variable_findings,
+)
+from handover.cosim.check.finding import CheckReport, Finding, Level, Section, fault, warning
+from handover.cosim.check.isolated_process import watch
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
 from handover.cosim.fmu.fmpy_edge import (
     checked_xml,
     library_path,
     platform_folder,
+    problems_of,
     read_description,
     required_functions,
     version_of,
 )
+from handover.cosim.fmu.library_format import HEAD, platforms_of, shortage
 from handover.cosim.fmu.xml import XmlElement
+
+_SCHEMA = re.compile(
+    r"^(?:Fatal )?(?:ERROR|Error|WARNING) \(line (\d+), column \d+\): (.*)$", re.DOTALL | re.IGNORECASE
+)
+_SETS = re.compile(
+    r"(?P<list>\S+) does not contain the expected set of variables\. "
+    r"Expected \{(?P<expected>.*)\} but was \{(?P<given>.*)\}\.",
+    re.DOTALL,
+)
+_CURES = {
+    "Exactly one independent variable must be defined.": 'one Float64 with causality="independent" is wanted, the time'
+}
+_MOST_NAMES = 20
+_OUTPUTS = "ModelStructure/Outputs must have exactly one entry"  # said by structure_checks, which names them
+
+
+def standard_findings(path: Path, own: Sequence[Finding]) -> list[Finding]:
+    """Return what FMPy's validation finds in an FMU that may be read; `own` is what has been found without it."""
+    problems, stopped = problems_of(path)
+    told = " ".join(f.line for f in own)
+    findings = [
+        _finding(p)
+        for p in dict.fromkeys(problems)
+        if not (p.startswith(_OUTPUTS) and "ModelStructure does not list" in told)
+    ]
+    if stopped and not findings and not own:
+        findings.append(fault(f"the description cannot be understood: {stopped}", where=DESCRIPTION))
+    return findings
+
+
+def _finding(problem: str) -> Finding:
+    if sets := _SETS.fullmatch(problem):
+        expected, given = (_names(sets[group]) for group in ("expected", "given"))
+        parts = [
+            f"{verb} {_listed(names)}"
+            for verb, names in (("lacks", expected - given), ("should not have", given - expected))
+            if names
+        ]
+        return fault(f"{sets['list']} {' and '.join(parts)}", where=DESCRIPTION)
+    match = _SCHEMA.match(problem)
+    where = f"{DESCRIPTION}, line {match[1]}" if match else DESCRIPTION
+    lines = [line.strip() for line in (match[2] if match else problem).splitlines() if line.strip()]
+    what = _shortened(lines[0] if len(lines) > 3 else " ".join(lines))
+    return fault(what.rstrip("."), where=where, cure=_CURES.get(problem, ""))
+
+
+def _names(text: str) -> set[str]:
+    return {name for part in text.split(", ") if (name := part.strip())}
+
+
+def _listed(names: set[str]) -> str:
+    """Return names in the order in which people count, y2 before y10."""
+    ordered = sorted(names, key=lambda name: [part.zfill(9) for part in re.split(r"(\d+)", name)])
+    more = f" and {len(ordered) - _MOST_NAMES} more" if len(ordered) > _MOST_NAMES else ""
+    return ", ".join(ordered[:_MOST_NAMES]) + more
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 400 else text[:397] + "..."
+
+
+_FMI2_FOLDERS = {
+    "linux32": ("x86-linux",),
+    "linux64": ("x86_64-linux",),
+    "win32": ("x86-windows",),
+    "win64": ("x86_64-windows",),
+    "darwin64": ("x86_64-darwin", "aarch64-darwin"),
+}
+_SUFFIXES = (".so", ".dll", ".dylib")
+
+
+def platforms_in(archive: FmuArchive) -> list[str]:
+    """Return the folders of `binaries/` that hold a shared library."""
+    return sorted({p.parts[1] for p in _libraries(archive)})
+
+
+def binary_findings(archive: FmuArchive, fmi: int, identifier: str) -> Iterator[Finding]:
+    """Yield what is wrong with the libraries' names, folders, formats and lengths."""
+    wanted = library_path(fmi, identifier)
+    if wanted not in archive.names:
+        yield _missing(archive, fmi, identifier)
+    for library in _libraries(archive):
+        if library.stem == identifier:
+            yield from _format_findings(archive, library, fmi, here=str(library) == wanted)
+        if short := shortage(archive.head(str(library), HEAD), archive.size(str(library))):
+            tell = fault if library.parts[1] == platform_folder(fmi) else warning
+            yield tell(short, where=str(library))
+
+
+def _libraries(archive: FmuArchive) -> list[PurePosixPath]:
+    paths = [PurePosixPath(n) for n in archive.names if n.startswith("binaries/") and n.endswith(_SUFFIXES)]
+    return [p for p in paths if len(p.parts) == 3]
+
+
+def _missing(archive: FmuArchive, fmi: int, identifier: str) -> Finding:
+    """Tell why there is no library for this machine: of another name, in another standard's folder, or not at all."""
+    folder, has = platform_folder(fmi), platforms_in(archive)
+    wanted = library_path(fmi, identifier)
+    here = [p.name for p in _libraries(archive) if p.parts[1] == folder]
+    other = platform_folder(5 - fmi)
+    if here:
+        what = f"no library is named like the modelIdentifier {identifier!r}; there is {', '.join(here)}"
+        return fault(what, where=f"binaries/{folder}", cure=f"{wanted} is wanted")
+    if other in has:
+        what = f"the library for this machine is in the folder of FMI {5 - fmi}.0, {other}"
+        return fault(what, where="binaries", cure=f"{wanted} is wanted")
+    sources = any(n.startswith("sources/") and not n.endswith("/") for n in archive.names)
+    what = f"no library for this machine ({folder}); there are libraries for {', '.join(has) or 'none'}"
+    if sources:
+        return fault(what, where="binaries", cure="it carries C sources: compile it, for instance with `fmpy compile`")
+    return fault(what, where="binaries", cure=f"export it for this platform too: {wanted}")
+
+
+def _format_findings(archive: FmuArchive, library: PurePosixPath, fmi: int, *, here: bool) -> Iterator[Finding]:
+    made_for = platforms_of(archive.head(str(library), HEAD))
+    folder = library.parts[1]
+    meant = _FMI2_FOLDERS.get(folder, ()) if fmi == 2 else ("-".join(folder.split("-")[:2]),)  # an ABI may follow
+    if here and not made_for:
+        yield fault("not a shared library", where=str(library))
+    elif meant and not set(made_for) & set(meant):
+        tell = fault if here else warning
+        yield tell(f"made for {' and '.join(made_for) or 'no known platform'}, not for {folder}", where=str(library))
+
 
 _STEP = 0.01  # seconds, where the FMU asks for none
 
@@ -137,7 +270,7 @@ class _Check:
             "step": step,
             **capabilities,
         }
-        watched = watch("handover.cosim.check.run_probe", task, self.scratch, self.timeout)
+        watched = watch("handover.cosim.check.smoke_run", task, self.scratch, self.timeout)
         parts = [f"{watched.facts['steps']} steps of {step:g} s"] if "steps" in watched.facts else []
         if "ended" in watched.facts:
             done = ("state restored", capabilities["keeps_state"]), ("second instance", capabilities["allows_two"])

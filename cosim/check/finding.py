@@ -1,7 +1,13 @@
-"""One thing that a check has found."""
+"""One thing that a check has found.
+
+What a check of one file came to.
+"""
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 
 class Level(enum.IntEnum):
@@ -53,3 +59,66 @@ def warning(what: str, *, where: str = "", cure: str = "") -> Finding:
 def note(what: str, *, where: str = "", cure: str = "") -> Finding:
     """Return a finding that is good to know."""
     return Finding(level=Level.NOTE, what=what, where=where, cure=cure)
+
+
+@dataclass(frozen=True)
+class Section:
+    """One group of checks.
+
+    Attributes:
+        name: its name.
+        told: what was looked at, in a few words; of a group that was not reached, why.
+        findings: what was found.
+        reached: whether it was carried out.
+    """
+
+    name: str
+    told: str
+    findings: tuple[Finding, ...] = ()
+    reached: bool = True
+
+    @property
+    def level(self) -> Level:
+        """The level of the worst finding."""
+        return max((f.level for f in self.findings), default=Level.OK)
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """The sections of one file's check, in the order in which they were carried out."""
+
+    path: Path
+    sections: Sequence[Section]
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is no fault."""
+        return self.count(Level.FAULT) == 0
+
+    @property
+    def ran(self) -> bool:
+        """Whether the unit ran without a fault; the run is the last section."""
+        return self.sections[-1].reached and self.sections[-1].level is not Level.FAULT
+
+    def count(self, level: Level) -> int:
+        """Return the number of findings of a level."""
+        return sum(f.level is level for s in self.sections for f in s.findings)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the report as JSON's kinds of values."""
+        return {
+            "file": str(self.path),
+            "passed": self.passed,
+            "checks": [
+                {
+                    "name": s.name,
+                    "result": s.level.name.lower() if s.reached else "not reached",
+                    "told": s.told,
+                    "findings": [
+                        {"level": f.level.name.lower(), "where": f.where, "what": f.what, "cure": f.cure, "log": f.log}
+                        for f in s.findings
+                    ],
+                }
+                for s in self.sections
+            ],
+        }

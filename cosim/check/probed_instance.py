@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.check.journal import Journal
+from handover.cosim.check.isolated_process import Journal
 from handover.cosim.fmu.buffers import SignalBuffer
 from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.instance import Instance

@@ -1,4 +1,7 @@
-"""A short run of one unit through the calls that a master makes."""
+"""A short run of one unit through the calls that a master makes.
+
+The smoke run's process, see `watched_process`.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,10 +12,10 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.check.finding import Finding, fault, warning
-from handover.cosim.check.journal import Journal
+from handover.cosim.check.isolated_process import Journal
 from handover.cosim.check.probed_instance import ProbedInstance
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 
 STEPS = 10
 _MOST_LINES = 24  # of a unit's log
@@ -187,3 +190,21 @@ def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
         wrong := [x for x in values.tolist() if x not in [value for _, value in port.items]]
     ):
         yield warning(f"{wrong[0]} is no item of its type", where=where)
+
+
+def main(task: Mapping[str, Any]) -> None:
+    """Run the FMU `task["fmu"]`, unpacked in `task["folder"]`."""
+    journal = Journal(Path(task["journal"]))
+    run = SmokeRun(
+        describe_fmu(Path(task["fmu"])),
+        Path(task["folder"]),
+        journal,
+        start=task["start"],
+        step=task["step"],
+        keeps_state=task["keeps_state"],
+        serialises=task["serialises"],
+        allows_two=task["allows_two"],
+    )
+    run.carry_out()
+    journal.begins("unloading the library")
+    journal.ends()

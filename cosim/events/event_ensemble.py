@@ -13,8 +13,8 @@ from handover.cosim.fmu.calls import State, StepEnd
 from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.schedule import Slot
-from handover.cosim.system import PlacedUnit, System
+from handover.cosim.system.schedule import Slot
+from handover.cosim.system.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
 

@@ -3,7 +3,7 @@
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.stepping.extrapolation import Extrapolation
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 
 def has_events(system: System, options: MasterOptions) -> bool:

@@ -9,8 +9,8 @@ from typing import Any
 from handover.cosim.events.event_ensemble import EventEnsemble
 from handover.cosim.events.event_iteration import MOST_ITERATIONS, EventIteration
 from handover.cosim.fmu.failures import UnsettledEvents
-from handover.cosim.schedule import Schedule, Slot
 from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.system.schedule import Schedule, Slot
 
 
 @dataclass

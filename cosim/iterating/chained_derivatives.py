@@ -7,9 +7,9 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.group import Group
 from handover.cosim.iterating.interface import Interface
-from handover.cosim.system import Connection
+from handover.cosim.system.loops import Group
+from handover.cosim.system.system import Connection
 
 
 class ChainedDerivatives:

@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.group import Group
 from handover.cosim.iterating.interface import Interface
 from handover.cosim.iterating.interface_solver import InterfaceSolver
 from handover.cosim.iterating.iterated_step import IteratedStep
 from handover.cosim.iterating.iteration_count import IterationCount
-from handover.cosim.schedule import Slot
+from handover.cosim.system.loops import Group
+from handover.cosim.system.schedule import Slot
 
 MakeSolver = Callable[[Interface], InterfaceSolver]
 """Makes a solver for the inputs that lead back in a circle."""

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.group import Group
 from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
 from handover.cosim.iterating.group_stepping import MakeSolver
 from handover.cosim.iterating.interface import Interface
 from handover.cosim.iterating.interface_solver import Unsolved
 from handover.cosim.iterating.not_converged import not_converged
+from handover.cosim.system.loops import Group
 
 
 class InitialValues:

@@ -8,7 +8,7 @@ from handover.cosim.blocks.ports import Floats, Width
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.iterating.magnitudes import Magnitudes
-from handover.cosim.system import Connection
+from handover.cosim.system.system import Connection
 
 _SMALL = 1e-3
 """The least magnitude of a signal of which neither its nominal one nor any other value is known."""

@@ -10,7 +10,7 @@ from handover.cosim.iterating.interface import Interface
 from handover.cosim.iterating.interface_solver import InterfaceSolver, Unsolved
 from handover.cosim.iterating.iteration_count import IterationCount
 from handover.cosim.iterating.not_converged import not_converged
-from handover.cosim.schedule import Slot
+from handover.cosim.system.schedule import Slot
 
 
 class IteratedStep:

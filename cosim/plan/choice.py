@@ -7,9 +7,9 @@ from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.plan.memory import loop
 from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.plan.plan_stepper import PlanStepper
-from handover.cosim.schedule import Schedule
 from handover.cosim.stepping.coupling import Coupling
 from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.system.schedule import Schedule
 
 _log = logging.getLogger(__name__)
 

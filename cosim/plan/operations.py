@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Width
 from handover.cosim.fmu.buffers import NativeCall, Views
 from handover.cosim.fmu.calls import NativeStep
-from handover.cosim.linear import Linear
+from handover.cosim.system.conversion import Linear
 
 SIZE = 72
 _COPY, _CHECK, _ACCESS, _KEEP, _STEP, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", ""

@@ -13,7 +13,7 @@ from handover.cosim.master_options import Algorithm
 from handover.cosim.narrowing import Narrowing
 from handover.cosim.plan import operations
 from handover.cosim.plan.memory import KeptMemory, Segment
-from handover.cosim.schedule import Schedule, Slot
+from handover.cosim.system.schedule import Schedule, Slot
 
 Judge = Callable[[int, float], None]
 """Takes what an operation that stopped the plan answered, and when, and raises what the general path would."""

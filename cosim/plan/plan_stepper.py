@@ -9,15 +9,13 @@ from typing import Any
 
 from handover.cosim.ensemble import Ensemble
 from handover.cosim.fmu.heartbeat import Abandoned
-from handover.cosim.from_then_on import FromThenOn
-from handover.cosim.observer import Observer
 from handover.cosim.plan import memory
 from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.record.record_block import RecordBlock
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.schedule import Schedule
-from handover.cosim.signals import Signals
 from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.system.schedule import Schedule
+from handover.cosim.system.signals import FromThenOn, Observer, Signals
 
 _STRETCH = 0.05
 """Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.record.record_block import RecordBlock
-from handover.cosim.signals import Column
+from handover.cosim.system.signals import Column
 
 _WIDE: dict[Any, Any] = {pa.float64(): np.float64, pa.int64(): np.int64, pa.uint64(): np.uint64, pa.bool_(): np.bool_}
 _TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: pa.int64(), Kind.BOOLEAN: pa.bool_()}

@@ -10,7 +10,7 @@ from handover.cosim.record.complete_record import finish_record, rewind_stream, 
 from handover.cosim.record.record_block import RecordBlock
 from handover.cosim.record.record_columns import RecordColumns, record_columns
 from handover.cosim.record.record_stream import RecordStream, stream_batches
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 
 
 class Recorder:

@@ -1,8 +1,7 @@
 """Linear changes of values one after another, and those that units need."""
 
 from handover.cosim.blocks.units import Unit
-from handover.cosim.linear import Linear
-from handover.cosim.unit_conversion import conversion, pass_as_they_are
+from handover.cosim.system.conversion import Linear, conversion, pass_as_they_are
 
 
 def applied(change: Linear, number: float) -> float:

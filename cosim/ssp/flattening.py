@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuDescription
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.changes import chained, converted
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names
 from handover.cosim.ssp.connector_faults import GIVES, TAKES, connector_faults
 from handover.cosim.ssp.given_values import Given
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
+from handover.cosim.system.conversion import Linear
 
 _log = logging.getLogger(__name__)
 

@@ -9,10 +9,10 @@ import numpy as np
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.changes import applied, converted
 from handover.cosim.ssp.connected_ports import Entry, entry_names
 from handover.cosim.ssp.parameter_set import SspValue
+from handover.cosim.system.conversion import Linear
 
 _TRUTHS = {"true": True, "1": True, "false": False, "0": False}
 

@@ -6,10 +6,10 @@ SSP 1.0 knows no arrays: `a.p[1]` feeds `b.p[1]`, `a.p[2]` feeds `b.p[2]`, and s
 from collections.abc import Mapping, Sequence
 
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.connected_ports import entry_names, find_entry
 from handover.cosim.ssp.flattening import FlatConnection, Node
-from handover.cosim.system import PortName
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import PortName
 
 Wire = tuple[PortName, PortName, Linear | None]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.fmu.xml import XmlElement
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.namespaces import local, told
 from handover.cosim.ssp.part import SspPart
+from handover.cosim.system.conversion import Linear
 
 _LISTS = ("String", "Enumeration", "Binary")
 """Types whose values are not numbers between blanks."""

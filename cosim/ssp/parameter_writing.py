@@ -9,7 +9,7 @@ from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names, ports_of
 from handover.cosim.ssp.described_types import DescribedTypes, add_dimensions
 from handover.cosim.ssp.xml_writing import document, root_element
-from handover.cosim.system import PlacedUnit
+from handover.cosim.system.system import PlacedUnit
 
 
 def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:

@@ -14,7 +14,7 @@ from handover.cosim.ssp.flattening import FlatSystem, components_of, flatten
 from handover.cosim.ssp.given_values import start_values
 from handover.cosim.ssp.grouping import Grouping
 from handover.cosim.ssp.structure_reading import read_structure
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 _MOST_DENOMINATOR = 10**6
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from handover.cosim.blocks.units import Unit
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.parameter_set import SspValue
+from handover.cosim.system.conversion import Linear
 
 
 @dataclass(frozen=True)

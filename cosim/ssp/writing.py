@@ -10,13 +10,13 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
 from handover.cosim.fmu.archive import write_archive
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.connected_ports import entry_names
 from handover.cosim.ssp.described_types import DescribedTypes, add_dimensions
 from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
 from handover.cosim.ssp.parameter_writing import bound_values, parameter_set
 from handover.cosim.ssp.xml_writing import document, root_element
-from handover.cosim.system import Connection, PlacedUnit, System, proposed_step
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import Connection, PlacedUnit, System, proposed_step
 
 
 def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = None) -> Path:

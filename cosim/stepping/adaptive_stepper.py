@@ -10,14 +10,14 @@ from handover.cosim.ensemble import Ensemble
 from handover.cosim.exceptions import ScheduleError, UnitFailure, nearest
 from handover.cosim.fmu.failures import NotFinite, UnitDiscarded
 from handover.cosim.iterating.not_converged import NotConverged
-from handover.cosim.schedule import Schedule, Slot
 from handover.cosim.stepping.adaptive_step import AdaptiveStep
 from handover.cosim.stepping.coupling import Coupling
 from handover.cosim.stepping.pi_controller import PiController
 from handover.cosim.stepping.step_error import StepError, WorstSignal
 from handover.cosim.stepping.step_statistics import StepStatistics
 from handover.cosim.stepping.step_too_small import StepTooSmall
-from handover.cosim.system import System
+from handover.cosim.system.schedule import Schedule, Slot
+from handover.cosim.system.system import System
 
 _TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
 """What a shorter step may cure."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from handover.cosim.schedule import Slot
+from handover.cosim.system.schedule import Slot
 
 
 class Coupling(Protocol):

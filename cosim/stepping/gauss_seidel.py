@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.group import Group
 from handover.cosim.iterating.group_stepping import GroupStepping, MakeSolver
 from handover.cosim.iterating.iteration_count import IterationCount
-from handover.cosim.schedule import Slot
+from handover.cosim.system.loops import Group
+from handover.cosim.system.schedule import Slot
 
 
 class GaussSeidel:

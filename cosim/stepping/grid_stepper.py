@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from handover.cosim.schedule import Schedule
 from handover.cosim.stepping.coupling import Coupling
 from handover.cosim.stepping.linear_inputs import LinearInputs
+from handover.cosim.system.schedule import Schedule
 
 
 class GridStepper:

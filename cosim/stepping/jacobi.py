@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.schedule import Slot
+from handover.cosim.system.schedule import Slot
 
 
 class Jacobi:

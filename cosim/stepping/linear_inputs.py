@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.linear import Linear
 from handover.cosim.stepping.trace import Moments, Trace
-from handover.cosim.system import Connection, PortName, System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import Connection, PortName, System
 
 Memory = Mapping[str, Any]
 """What is remembered of one unit: the tick at which it is, and its outputs' moments by port."""

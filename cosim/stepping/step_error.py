@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.ensemble import Ensemble
-from handover.cosim.signals import Column
 from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.system.signals import Column
 
 Values = NDArray[np.float64]
 

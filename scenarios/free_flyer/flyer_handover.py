@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch

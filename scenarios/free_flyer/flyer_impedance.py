@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch

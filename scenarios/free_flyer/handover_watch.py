@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment import Metric, Outcome, Watch
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.stability import stability_metrics

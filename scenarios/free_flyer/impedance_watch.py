@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment import Metric, Outcome, Watch
 from handover.scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Errors, Motion, errors_of
 from handover.scenarios.free_flyer.impedance_parameters import Parameters

@@ -3,7 +3,7 @@
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.system import PlacedUnit, System
+from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.paper import paper_values
 
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")

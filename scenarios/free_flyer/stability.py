@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment import Metric
 
 _SLOWEST = {"pose": "the slowest mode, the integrator's"}

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.published import published_of

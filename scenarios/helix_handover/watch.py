@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment import Metric, Outcome, Watch
 from handover.scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
 from handover.scenarios.helix_handover.parameters import Cover, Parameters

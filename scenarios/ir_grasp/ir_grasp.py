@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.published import published_of

@@ -6,7 +6,7 @@ import numpy as np
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.plants.grasp_objects import SOLIDS
 from handover.plants.grasp_parameters import SEES_NOTHING
 from handover.scenarios.experiment import Metric, Outcome, Watch

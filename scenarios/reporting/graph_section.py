@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.linear import Linear
+from handover.cosim.system.conversion import Linear
 from handover.scenarios.reporting.graph_layout import bent, places
 from handover.scenarios.reporting.page import template
 from handover.scenarios.reporting.plot_html import COLOURS, plot_html

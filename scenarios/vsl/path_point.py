@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def handover(
     from handover.cosim.master import Master
     from handover.cosim.master_options import Algorithm, MasterOptions
     from handover.cosim.record.recorder import Recorder
-    from handover.cosim.system import System
+    from handover.cosim.system.system import System
 
     system = System()
     units = [system.add(f"u{i}", fmu, period=H) for i in range(n)]

@@ -13,7 +13,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment import Experiment

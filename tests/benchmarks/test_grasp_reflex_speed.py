@@ -11,7 +11,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.master import Master
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.plants.grasp_objects import Thing
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp

@@ -17,8 +17,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.master import Master
-from handover.cosim.schedule import Schedule
-from handover.cosim.system import System
+from handover.cosim.system.schedule import Schedule
+from handover.cosim.system.system import System
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,8 +11,8 @@ from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 Build = Callable[[], System]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from native_units import native_fmu
 
 from handover.cosim.fmu.heartbeat import Heartbeat
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 
 class Called(Heartbeat):

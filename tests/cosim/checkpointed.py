@@ -8,12 +8,10 @@ from native_units import native_fmu
 
 from handover.cosim.checkpoint import read_checkpoint
 from handover.cosim.checkpointer import Checkpointer
-from handover.cosim.from_then_on import FromThenOn
 from handover.cosim.master import Master
-from handover.cosim.observer import Observer
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import FromThenOn, Observer, Signals
+from handover.cosim.system.system import System
 
 STOP, EVERY = Fraction(20), Fraction(7, 2)
 PASSED = 10.0

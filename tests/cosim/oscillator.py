@@ -11,8 +11,8 @@ from scipy.linalg import expm
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 STATES = ("a.x", "a.v", "b.x", "b.v")
 

@@ -4,8 +4,8 @@ from fractions import Fraction
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 Rows = dict[float, tuple[float, ...]]
 

@@ -12,13 +12,13 @@ from handover.cosim.checkpoint import read_checkpoint, take_checkpoint, write_ch
 from handover.cosim.exceptions import BadOptions, ScheduleError
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
 from handover.cosim.stepping.adaptive_step import AdaptiveStep
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
 from handover.cosim.stepping.extrapolation import Extrapolation
 from handover.cosim.stepping.step_statistics import StepStatistics
 from handover.cosim.stepping.step_too_small import StepTooSmall
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 H = Fraction(1, 100)
 

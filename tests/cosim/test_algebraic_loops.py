@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.algebraic_loop import algebraic_loops
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import ScheduleError, UnitRefused
 from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
 from handover.cosim.iterating.not_converged import NotConverged
-from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.schedule import Schedule
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.loops import algebraic_loops
+from handover.cosim.system.schedule import Schedule
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 CIRCLE = (-2.0, 0.5, 3.0)
 every = pytest.mark.parametrize("algorithm", [Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT, Algorithm.NEWTON])

@@ -10,8 +10,8 @@ from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 DATA = b"\x00\xff" + bytes(range(100))

@@ -8,8 +8,7 @@ import fmpy
 import pytest
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.check_report import CheckReport
-from handover.cosim.check.finding import Level
+from handover.cosim.check.finding import CheckReport, Level
 from handover.cosim.check.load_probe import load_fault
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.fmpy_edge import unpack

@@ -13,8 +13,8 @@ from handover.cosim.fmu.instance import Instance
 from handover.cosim.iterating.not_converged import NotConverged
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.observer import Observer
-from handover.cosim.system import System
+from handover.cosim.system.signals import Observer
+from handover.cosim.system.system import System
 
 both = pytest.mark.parametrize("algorithm", [Algorithm.FIXED_POINT, Algorithm.NEWTON])
 PERIOD = Fraction(1, 10)

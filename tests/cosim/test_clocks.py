@@ -8,7 +8,7 @@ from seen import grid, seen
 
 from handover.cosim.exceptions import UnitRefused
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 TENTH = Fraction(1, 10)

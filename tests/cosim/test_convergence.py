@@ -9,7 +9,7 @@ from oscillator import PLAIN
 
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.stepping.extrapolation import Extrapolation
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 HOLD, LINEAR = Extrapolation.HOLD, Extrapolation.LINEAR
 

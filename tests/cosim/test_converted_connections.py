@@ -9,11 +9,11 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import WiringError
-from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.scaled_copy import ScaledCopy
-from handover.cosim.system import PlacedUnit, System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import PlacedUnit, System
 
 QUANTITIES = ("angle", "length", "temperature")
 

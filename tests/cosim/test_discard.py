@@ -10,7 +10,7 @@ from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import StepDiscarded
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 REPEATING = MasterOptions(repeat_discarded=True)

@@ -10,8 +10,8 @@ from native_units import native_fmu
 from handover.cosim.checkpoint import Checkpoint, take_checkpoint
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 Row = tuple[float, ...]

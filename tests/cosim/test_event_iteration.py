@@ -9,7 +9,7 @@ from seen import grid, seen
 from handover.cosim.events.event_iteration import MOST_ITERATIONS
 from handover.cosim.fmu.failures import UnitEnded, UnsettledEvents
 from handover.cosim.master import Master
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 
 def followers(most: int) -> System:

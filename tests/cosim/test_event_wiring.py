@@ -13,7 +13,7 @@ from handover.cosim.master_options import MasterOptions
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.stepping.adaptive_step import AdaptiveStep
 from handover.cosim.stepping.extrapolation import Extrapolation
-from handover.cosim.system import PortName, System
+from handover.cosim.system.system import PortName, System
 
 
 def faults_of(s: System) -> tuple[str, ...]:

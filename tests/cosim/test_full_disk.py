@@ -10,7 +10,7 @@ from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.master import Master
 from handover.cosim.record.record_stream import RecordStream
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.record import Record
 
 

@@ -9,7 +9,7 @@ from native_units import native_fmu
 from seen import grid, seen
 
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 G, E = 9.81, 0.7

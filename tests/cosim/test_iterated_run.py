@@ -10,7 +10,7 @@ from native_units import native_fmu
 from two_masses import TwoMasses
 
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.command import main
 
 

@@ -9,13 +9,13 @@ import pytest
 from native_units import native_fmu
 from oscillator import PLAIN, STATES
 
-from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
 from handover.cosim.stepping.extrapolation import Extrapolation
 from handover.cosim.stepping.trace import Trace
-from handover.cosim.system import System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 LINEAR = MasterOptions(extrapolation=Extrapolation.LINEAR)
 LINEAR_JACOBI = MasterOptions(extrapolation=Extrapolation.LINEAR, algorithm=Algorithm.JACOBI)

@@ -13,8 +13,8 @@ from handover.cosim.exceptions import BadOptions, InvalidFmu, UnitFailure, UnitR
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 from handover.scenarios.record import Record
 
 FmuOf = Callable[..., Path]

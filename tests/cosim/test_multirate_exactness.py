@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.schedule import Schedule, Slot
 from handover.cosim.stepping.grid_stepper import GridStepper
-from handover.cosim.system import System
+from handover.cosim.system.schedule import Schedule, Slot
+from handover.cosim.system.system import System
 
 THIRD, SEVENTH = Fraction(1, 3000), Fraction(1, 7000)
 

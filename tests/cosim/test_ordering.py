@@ -1,4 +1,4 @@
-from handover.cosim.ordering import ordered, strongly_connected
+from handover.cosim.system.ordering import ordered, strongly_connected
 
 
 class Told:

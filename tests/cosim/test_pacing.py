@@ -9,7 +9,7 @@ from handover.cosim.exceptions import BadOptions
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.stepping.pacing import Pacer, PaceReport
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 
 class Clock:

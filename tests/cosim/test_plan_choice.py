@@ -14,7 +14,7 @@ from handover.cosim.plan import choice, memory
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.extrapolation import Extrapolation
 from handover.cosim.stepping.grid_stepper import GridStepper
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 
 def build(period: Fraction = Fraction(1, 10)) -> System:

@@ -9,10 +9,10 @@ from fmu_of import FmuOf
 from native_units import native_fmu
 
 from handover.cosim.fmu.buffers import SignalBuffer
-from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm
-from handover.cosim.system import System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import System
 
 SECOND = Fraction(1)
 algorithms = pytest.mark.parametrize("algorithm", PLAIN)

@@ -6,12 +6,12 @@ import pytest
 from fmu_of import FmuOf
 from native_units import native_fmu
 
-from handover.cosim.linear import Linear
 from handover.cosim.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.grid_stepper import GridStepper
 from handover.cosim.stepping.stepper import Stepper
-from handover.cosim.system import System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import System
 
 
 def build(fmu: FmuOf) -> System:

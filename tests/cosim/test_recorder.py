@@ -28,7 +28,7 @@ from fractions import Fraction
 from pathlib import Path
 from handover.cosim.master import Master
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 s = System()
 s.add("counter", Path({str(fmu("Counter"))!r}))
 with Master(s) as master, Recorder(Path({str(file)!r}), ["csv"]) as recorder:

@@ -11,7 +11,7 @@ from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.record import Record
 
 OPTIONS = {

@@ -13,7 +13,7 @@ from handover.cosim.fmu.instance import Instance
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 OPTIONS = {
     "newton": MasterOptions(algorithm=Algorithm.NEWTON),

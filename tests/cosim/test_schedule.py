@@ -7,8 +7,8 @@ import pytest
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.schedule import Schedule
-from handover.cosim.system import PlacedUnit, PortName, System
+from handover.cosim.system.schedule import Schedule
+from handover.cosim.system.system import PlacedUnit, PortName, System
 
 
 def description(feedthrough: bool, presumed: bool, sampled: bool) -> FmuDescription:

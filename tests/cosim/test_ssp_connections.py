@@ -9,8 +9,8 @@ import pytest
 from ssp_of import MM, component, connection, connectors, described, pack_ssp, system
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.linear import Linear
 from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.system.conversion import Linear
 
 VARIABLE = (
     '<ScalarVariable name="{}" valueReference="{}" causality="{}" variability="continuous"><Real {}/></ScalarVariable>'

@@ -14,12 +14,12 @@ from fmu_of import FmuOf
 from ssp_schemas import expect_valid
 
 from handover.cosim.exceptions import NotExportable, WiringError
-from handover.cosim.linear import Linear
 from handover.cosim.master import Master
-from handover.cosim.signals import Signals
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system import PortName, System
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PortName, System
 from handover.fmus.build import build_block
 
 KINDS = ("n", "odd", "light", "pair")

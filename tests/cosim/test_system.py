@@ -10,7 +10,7 @@ from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.system import System, mismatch, proposed_step
+from handover.cosim.system.system import System, mismatch, proposed_step
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 

@@ -5,8 +5,7 @@ import math
 import pytest
 
 from handover.cosim.blocks.units import BaseExponents, Unit
-from handover.cosim.linear import Linear
-from handover.cosim.unit_conversion import conversion, meant_by
+from handover.cosim.system.conversion import Linear, conversion, meant_by
 
 ANGLE, LENGTH, TEMPERATURE = BaseExponents(rad=1), BaseExponents(m=1), BaseExponents(K=1)
 RAD, METRE, KELVIN = Unit("rad", ANGLE), Unit("m", LENGTH), Unit("K", TEMPERATURE)

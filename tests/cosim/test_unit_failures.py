@@ -24,7 +24,7 @@ from handover.cosim.fmu.failures import (
 from handover.cosim.master import Master
 from handover.cosim.master_options import MasterOptions
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.record import Record
 
 COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "compiled"])

@@ -14,7 +14,7 @@ from native_units import native_fmu
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 Floats = NDArray[np.float64]
 SIGNALS = ("a.x", "a.v", "b.x", "b.v")

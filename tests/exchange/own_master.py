@@ -10,8 +10,8 @@ from reference import Record
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import PortName, System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PortName, System
 
 
 @dataclass(frozen=True)

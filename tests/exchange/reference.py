@@ -15,8 +15,8 @@ from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import PortName, System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PortName, System
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS, import_block
 

@@ -7,8 +7,8 @@ from click.testing import CliRunner
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
 from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.system.signals import Signals
 from handover.scenarios.command import main
 
 SCENARIO = "flyer_impedance"

@@ -8,8 +8,8 @@ from workshop import Workshop
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 
 G, E, RELEASE = 9.81, 0.7, 0.25
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]

@@ -10,7 +10,7 @@ from workshop import Workshop
 
 from handover.cosim.exceptions import UnitRefused
 from handover.cosim.master import Master
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 BLOCK = "every_kind:EveryKind"
 

@@ -15,7 +15,7 @@ from fmpy.validation import validate_fmu
 
 from handover.cosim.fmu.description import describe_fmu, indices_of
 from handover.cosim.master import Master
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block, cached
 from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
 from handover.scenarios.free_flyer.impedance_parameters import Parameters

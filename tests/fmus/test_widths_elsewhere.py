@@ -16,7 +16,7 @@ from workshop import Workshop
 from handover.cosim.exceptions import UnitRefused, WiringError
 from handover.cosim.master import Master
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 BLOCK = "every_width:EveryWidth"
 

@@ -9,8 +9,8 @@ from fmpy.validation import validate_fmu
 
 from handover.cosim.master import Master
 from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 from handover.fmus.build import build_block
 from handover.plants.push import Axis, Inputs, Params, Push
 

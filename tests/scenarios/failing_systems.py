@@ -10,7 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cosim"))
 native_fmu: Callable[..., Path] = importlib.import_module("native_units").native_fmu

@@ -9,7 +9,7 @@ import pytest
 from failing_systems import failing_ssp, native_fmu, start
 
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.fmus.build import build_block
 from handover.scenarios.record import Record
 

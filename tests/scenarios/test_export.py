@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 from handover.cosim.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.command import main

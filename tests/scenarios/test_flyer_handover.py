@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flyer_runs import metric, run
 
-from handover.cosim.schedule import Schedule
+from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.free_flyer.collaborative import Collaborative
 from handover.scenarios.free_flyer.failed_reception import FailedReception

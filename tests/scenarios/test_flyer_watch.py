@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from handover.controllers.handover_state_machine import HandoverPhase as Phase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.plants.hand_and_object import Holder
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.cosim.schedule import Schedule
+from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.helix_handover.helix_handover import HelixHandover
 from handover.scenarios.helix_handover.parameters import Parameters

@@ -11,7 +11,7 @@ import pytest
 from handover.controllers.ir_reflex import Phase, Stop
 from handover.controllers.reflex_parameters import Strategy
 from handover.cosim.master import Master
-from handover.cosim.schedule import Schedule
+from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.plants.grasp_objects import Thing
 from handover.scenarios.experiment import Outcome

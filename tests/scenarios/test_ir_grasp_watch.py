@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from handover.controllers.ir_reflex import Phase, Stop
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.signals import Signals
+from handover.cosim.system.signals import Signals
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.watch import GraspWatch
 

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
 from failing_systems import failing_ssp, native_fmu
 
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.scenarios.command import main
 from handover.scenarios.master_rows import master_rows
 from handover.scenarios.reporting.run_page import write_run_page

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from failing_systems import failing_ssp, native_fmu, start
 from flyer_runs import run
 
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.command import main
 from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system import System
+from handover.cosim.system.system import System
 from handover.fmus.build import build_block
 from handover.scenarios.command import main
 from handover.scenarios.record import Record

@@ -11,8 +11,8 @@ import pytest
 
 from handover.cosim.exceptions import UnitRefused
 from handover.cosim.master import Master
-from handover.cosim.observer import Observer
 from handover.cosim.record.recorder import Recorder
+from handover.cosim.system.signals import Observer
 from handover.fmus.build import cached
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Outcome

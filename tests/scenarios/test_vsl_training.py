@@ -22,8 +22,8 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import write_archive
 from handover.cosim.master import Master
-from handover.cosim.signals import Signals
-from handover.cosim.system import System
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
 from handover.fmus.build import build_block, cached
 from handover.scenarios import vsl_train_command
 from handover.scenarios.vsl_train_command import vsl_train

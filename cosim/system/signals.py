@@ -1,7 +1,12 @@
-"""The outputs of a running system by name: `signals["arm.p_WG"]`, or flattened to scalars for a record."""
+"""The outputs of a running system by name: `signals["arm.p_WG"]`, or flattened to scalars for a record.
+
+Who looks on while a run goes on.
+
+Observers of a run that goes on from where another process left it.
+"""
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,3 +72,20 @@ class Signals:
                 subscript = f"[{','.join(map(str, index))}]" if index else ""
                 made.append(Column(name + subscript, port, values, i))
         return made
+
+
+Observer = Callable[[float, Signals], None]
+"""Called at every communication point with the time in seconds and the signals that hold at that time."""
+
+
+@dataclass(frozen=True)
+class FromThenOn:
+    """An observer of a run that goes on from t_0 seconds: `observe` saw that point before, and sees what follows."""
+
+    t_0: float
+    observe: Callable[[float, Signals], None]
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Let `observe` look, unless it has seen this point."""
+        if t > self.t_0:
+            self.observe(t, signals)

@@ -6,10 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from handover.cosim.algebraic_loop import AlgebraicLoop, algebraic_loops
 from handover.cosim.exceptions import ScheduleError
-from handover.cosim.group import Group, groups_of_loops, in_order
-from handover.cosim.system import PlacedUnit, System
+from handover.cosim.system.loops import AlgebraicLoop, Group, algebraic_loops, groups_of_loops, in_order
+from handover.cosim.system.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
 

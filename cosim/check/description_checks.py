@@ -1,13 +1,138 @@
-"""What a model description says of its variables, as far as it matters in a run and FMPy does not look at it."""
+"""What an FMU says of itself as a whole: its kind, its names, what it can do and what it needs.
+
+Whether what a model description refers to is there: indices and value references of its variables.
+
+What a model description says of its variables, as far as it matters in a run and FMPy does not look at it.
+"""
 
 import math
+import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from handover.cosim.check.described_variable import REALS, DescribedVariable
-from handover.cosim.check.finding import Finding, fault, warning
+from handover.cosim.check.finding import Finding, fault, note, warning
 from handover.cosim.fmu.xml import XmlElement
+
+_KINDS = {
+    "ModelExchange": "model exchange",
+    "CoSimulation": "co-simulation",
+    "ScheduledExecution": "scheduled execution",
+}
+_IDENTIFIER = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+
+
+def interface_findings(root: XmlElement, fmi: int) -> Iterator[Finding]:
+    """Yield what is wrong with, or good to know of, an FMU's co-simulation interface and default experiment."""
+    version = root.get("fmiVersion")
+    if "-" in version:
+        yield warning(f"a draft of the standard, {version}", cure="its functions may differ from those of FMI 3.0")
+    co_simulation = next(root.named("CoSimulation"), None)
+    if co_simulation is None:
+        kinds = [told for tag, told in _KINDS.items() if next(root.named(tag), None) is not None]
+        yield fault(
+            f"an FMU for {' and '.join(kinds) or 'nothing'}, without a co-simulation interface",
+            where="modelDescription.xml",
+            cure="export it for co-simulation",
+        )
+        return
+    where = f"CoSimulation (line {co_simulation.line})"
+    identifier = co_simulation.get("modelIdentifier")
+    if not _IDENTIFIER.fullmatch(identifier):
+        yield fault(f"modelIdentifier {identifier!r} is not an identifier of C", where=where, cure="letters, digits, _")
+    yield from _capabilities(co_simulation, fmi)
+    for experiment in root.named("DefaultExperiment"):
+        yield from _experiment_findings(experiment)
+
+
+def default_step(root: XmlElement) -> float | None:
+    """Return the step size that an FMU asks for, or None."""
+    for experiment in root.named("DefaultExperiment"):
+        step = _number(experiment.get("stepSize"))
+        if 0 < step < math.inf:
+            return step
+    internal = [_number(c.get("fixedInternalStepSize")) for c in root.named("CoSimulation")]
+    return next((step for step in internal if 0 < step < math.inf), None)
+
+
+def default_start(root: XmlElement) -> float:
+    """Return the time at which an FMU asks to start, or 0."""
+    starts = [_number(e.get("startTime")) for e in root.named("DefaultExperiment")]
+    return next((t for t in starts if math.isfinite(t)), 0.0)
+
+
+def says(element: XmlElement, flag: str) -> bool:
+    """Tell whether a capability flag is set."""
+    return element.get(flag) in ("true", "1")
+
+
+def _capabilities(co_simulation: XmlElement, fmi: int) -> Iterator[Finding]:
+    if says(co_simulation, "needsExecutionTool"):
+        yield note(
+            "needs other software on each machine that runs it: the tool that it was exported from, or an interpreter"
+        )
+    if says(co_simulation, "canBeInstantiatedOnlyOncePerProcess"):
+        yield note("can be in a system only once: it allows one instance in a process")
+    if not says(co_simulation, f"canGetAndSetFMU{'state' if fmi == 2 else 'State'}"):
+        yield note("cannot be rolled back: its state can be neither kept nor restored")
+
+
+def _experiment_findings(experiment: XmlElement) -> Iterator[Finding]:
+    where = f"DefaultExperiment (line {experiment.line})"
+    step = experiment.attributes.get("stepSize")
+    if step is not None and not 0 < _number(step) < math.inf:
+        yield fault(f"stepSize {step!r}", where=where, cure="a positive number of seconds is right")
+    if _number(experiment.get("stopTime")) < _number(experiment.get("startTime", "0")):
+        yield fault("stopTime is before startTime", where=where)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+_FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
+
+
+def structure_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
+    """Yield references in ModelStructure and of derivatives that lead to no variable, and unlisted outputs."""
+    if fmi == 2:
+        valid: Collection[str] = {str(i + 1) for i in range(len(list(root.named("ModelVariables", "ScalarVariable"))))}
+        unknowns = [
+            u for group in root.named("ModelStructure") for part in group.children for u in part.named("Unknown")
+        ]
+        key, told = "index", f"there are variables 1 to {len(valid)}"
+    else:
+        valid = {v.reference for v in variables}
+        unknowns = [u for group in root.named("ModelStructure") for u in group.children if u.tag in _FMI3_UNKNOWNS]
+        key, told = "valueReference", "no variable has it"
+    for u in unknowns:
+        for name in (key, "dependencies"):
+            for missing in (r for r in u.get(name).split() if r not in valid):
+                where = f"ModelStructure (line {u.line})"
+                yield fault(f"{name} {missing} leads to no variable", where=where, cure=told)
+    for v in variables:
+        derivative = v.values.get("derivative")
+        if derivative and derivative not in valid:
+            yield fault(f"it is the derivative of {derivative}, which leads to no variable", where=v.where, cure=told)
+    yield from _unlisted_outputs(root, fmi, variables)
+
+
+def _unlisted_outputs(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
+    """Yield the outputs that are not listed; FMPy says that some are not, but not which."""
+    if fmi == 2:
+        listed = {u.get("index") for u in root.named("ModelStructure", "Outputs", "Unknown")}
+        positions = {id(e): str(i + 1) for i, e in enumerate(root.named("ModelVariables", "ScalarVariable"))}
+        missing = [v for v in variables if v.causality == "output" and positions[id(v.element)] not in listed]
+    else:
+        listed = {u.get("valueReference") for u in root.named("ModelStructure", "Output")}
+        missing = [v for v in variables if v.causality == "output" and v.reference not in listed]
+    for v in missing:
+        yield fault("an output that ModelStructure does not list among the outputs", where=v.where)
+
 
 _CLASSES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
 

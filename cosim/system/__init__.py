@@ -1,0 +1,1 @@
+"""Units, parameters and connections, checked before anything starts: loops, schedule, signals."""
