@@ -6,21 +6,19 @@ from fractions import Fraction
 from types import TracebackType
 from typing import TypeVar
 
-from handover.cosim.endings import Endings
-from handover.cosim.ensemble import Ensemble
 from handover.cosim.exceptions import UnitFailure, UnitRefused
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.iterating.iteration_count import IterationCount
-from handover.cosim.master_options import MasterOptions
 from handover.cosim.method import Method
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
-from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.ensemble import Endings, Ensemble
 from handover.cosim.stepping.gauss_seidel import GaussSeidel
+from handover.cosim.stepping.iteration import IterationCount
+from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.stepping.pacing import Pacer
-from handover.cosim.stepping.step_statistics import StepStatistics
-from handover.cosim.stepping.stepper import Stepper
+from handover.cosim.stepping.step_control import StepStatistics
+from handover.cosim.stepping.stepper import Coupling, Stepper
 from handover.cosim.system.signals import Observer, Signals
 from handover.cosim.system.system import System
 from handover.cosim.watchdog import Watchdog

@@ -2,26 +2,19 @@
 
 from collections.abc import Sequence
 
-from handover.cosim.endings import Endings
-from handover.cosim.ensemble import Ensemble
-from handover.cosim.events.event_ensemble import EventEnsemble
-from handover.cosim.events.event_options import has_events, refuse_off_grid
-from handover.cosim.events.event_stepper import EventStepper
 from handover.cosim.fmu.heartbeat import Heartbeat
-from handover.cosim.iterating.fixed_point import FixedPoint
-from handover.cosim.iterating.initial_values import InitialValues
-from handover.cosim.iterating.interface import Interface
-from handover.cosim.iterating.interface_newton import InterfaceNewton
-from handover.cosim.iterating.interface_solver import InterfaceSolver
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.plan.choice import plan_stepper, tell_general_path
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
-from handover.cosim.stepping.coupling import Coupling
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.ensemble import Endings, Ensemble
+from handover.cosim.stepping.event_ensemble import EventEnsemble
+from handover.cosim.stepping.event_stepper import EventStepper, has_events, refuse_off_grid
 from handover.cosim.stepping.gauss_seidel import GaussSeidel
-from handover.cosim.stepping.grid_stepper import GridStepper
+from handover.cosim.stepping.initial_values import InitialValues
+from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.jacobi import Jacobi
-from handover.cosim.stepping.stepper import Stepper
+from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
+from handover.cosim.stepping.solvers import FixedPoint, InterfaceNewton, InterfaceSolver
+from handover.cosim.stepping.stepper import Coupling, GridStepper, Stepper
 from handover.cosim.system.loops import Group, groups_of_data_flow, refuse_circles, refuse_loops
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import System

@@ -7,9 +7,7 @@ from typing import Any
 
 import click
 
-from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.headed_options import HeadedOption
 from handover.scenarios.seconds import Seconds

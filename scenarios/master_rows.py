@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from handover.cosim.master_options import Algorithm
+from handover.cosim.stepping.options import Algorithm
 from handover.cosim.stepping.pacing import PaceReport
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from handover.cosim.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
 from handover.cosim.exceptions import one_line
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.experiment import Watch
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import click
 
-from handover.cosim.master_options import MasterOptions
 from handover.cosim.record.record_formats import RECORD_FORMATS
+from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
 from handover.scenarios.bad_call import BadCall, told_in_one_line
 from handover.scenarios.chosen import fmus_of, replacements, scenario_named

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.iterating.iteration_count import IterationCount
 from handover.cosim.master import Master
+from handover.cosim.stepping.iteration import IterationCount
 from handover.scenarios.experiment import Experiment, Metric
 
 

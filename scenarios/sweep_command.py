@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.bad_call import BadCall, told_in_one_line
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_table import CampaignTable

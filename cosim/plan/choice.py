@@ -2,13 +2,12 @@
 
 import logging
 
-from handover.cosim.ensemble import Ensemble
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.plan.memory import loop
 from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.plan.plan_stepper import PlanStepper
-from handover.cosim.stepping.coupling import Coupling
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
+from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule
 
 _log = logging.getLogger(__name__)

@@ -6,13 +6,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from handover.cosim.ensemble import Ensemble
-from handover.cosim.finite_check import FiniteCheck
 from handover.cosim.fmu.buffers import Copy, OutputBuffer, SignalBuffer, Views
-from handover.cosim.master_options import Algorithm
-from handover.cosim.narrowing import Narrowing
 from handover.cosim.plan import operations
 from handover.cosim.plan.memory import KeptMemory, Segment
+from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.options import Algorithm
+from handover.cosim.stepping.transfers import FiniteCheck, Narrowing
 from handover.cosim.system.schedule import Schedule, Slot
 
 Judge = Callable[[int, float], None]

@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from handover.cosim.ensemble import Ensemble
 from handover.cosim.fmu.heartbeat import Abandoned
 from handover.cosim.plan import memory
 from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.record.record_block import RecordBlock
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.signals import FromThenOn, Observer, Signals
 

@@ -1,23 +1,54 @@
-"""Steps whose length follows their error."""
+"""Steps whose length follows their error.
+
+A step that cannot be made as small as its error asks for.
+"""
 
 import dataclasses
 import math
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
-from handover.cosim.ensemble import Ensemble
 from handover.cosim.exceptions import ScheduleError, UnitFailure, nearest
 from handover.cosim.fmu.failures import NotFinite, UnitDiscarded
-from handover.cosim.iterating.not_converged import NotConverged
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.stepping.coupling import Coupling
-from handover.cosim.stepping.pi_controller import PiController
-from handover.cosim.stepping.step_error import StepError, WorstSignal
-from handover.cosim.stepping.step_statistics import StepStatistics
-from handover.cosim.stepping.step_too_small import StepTooSmall
+from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.iteration import NotConverged
+from handover.cosim.stepping.options import AdaptiveStep
+from handover.cosim.stepping.step_control import PiController, StepError, StepStatistics, WorstSignal
+from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule, Slot
 from handover.cosim.system.system import System
+
+
+class StepTooSmall(UnitFailure):
+    """The smallest step is not small enough for the tolerances.
+
+    Attributes:
+        signal: the scalar output with the largest error, `unit.port`.
+        error: its error in units of what is tolerated; up to 1 is good.
+        step: the step that was tried last, in seconds.
+    """
+
+    kind: ClassVar[str] = "step_too_small"
+    verdict: ClassVar[str] = "the step could not follow its error"
+
+    def __init__(self, unit: str, signal: str, t: float, step: float, error: float) -> None:
+        self.signal, self.error, self.step = signal, error, step
+        super().__init__(unit, "control of the step", t, "no step is short enough")
+
+    @property
+    def what(self) -> str:
+        """What happened, to be read after the call."""
+        return f"found none that is short enough: {self.told}"
+
+    @property
+    def told(self) -> str:
+        """The signal with the largest error, and what may help."""
+        return (
+            f"with a step of {self.step:.3g} s the error of {self.signal} is {self.error:.3g} times what is tolerated; "
+            "if it is noise, leave it uncontrolled"
+        )
+
 
 _TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
 """What a shorter step may cure."""

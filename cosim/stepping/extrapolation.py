@@ -1,14 +1,209 @@
-"""What a unit's inputs are between communication points."""
+"""Inputs that follow the lines through the last two points of their sources.
 
-import enum
+An output at its last two communication points.
+"""
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.fmu.instance import Instance
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import Connection, PortName, System
+
+Moments = tuple[int, NDArray[np.float64], int, NDArray[np.float64]]
+"""Tick and values before, tick and values last; the arrays are not written to again."""
 
 
-class Extrapolation(enum.Enum):
-    """What a unit's inputs are during its step.
+class Trace:
+    """The line through an output's last two points; level while there is one point only.
 
-    HOLD: what their sources gave last. LINEAR: on the line through what their sources gave at their last two
-    communication points; see `LinearInputs`.
+    `values` is where the output's values live.
     """
 
-    HOLD = "hold"
-    LINEAR = "linear"
+    def __init__(self, values: NDArray[Any]) -> None:
+        self._values = values
+        here = np.array(values, dtype=np.float64)
+        self.moments: Moments = (0, here, 0, here)
+
+    @property
+    def last(self) -> NDArray[np.float64]:
+        """The values of the last point."""
+        return self.moments[3]
+
+    def record(self, tick: int) -> None:
+        """Take the values as those of a tick: of the last one once more, or of a later one."""
+        before, was, last, is_ = self.moments
+        here = np.array(self._values, dtype=np.float64)
+        self.moments = (last, is_, tick, here) if tick > last else (before, was, last, here)
+
+    def at(self, half_ticks: int) -> NDArray[np.float64]:
+        """Return the values on the line, at a time in half ticks: exact up to the rounding of the last operations."""
+        before, was, last, is_ = self.moments
+        if last == before:
+            return is_
+        return is_ + (is_ - was) * ((half_ticks - 2 * last) / (2 * (last - before)))
+
+    def rate(self, tick: float) -> NDArray[np.float64]:
+        """Return the line's slope per second; `tick` is in seconds."""
+        before, was, last, is_ = self.moments
+        return (is_ - was) / ((last - before) * tick) if last > before else np.zeros_like(is_)
+
+    def get_state(self) -> list[Any]:
+        """Return the two points as JSON can hold them."""
+        before, was, last, is_ = self.moments
+        return [before, was.tolist(), last, is_.tolist()]
+
+    def set_state(self, state: list[Any]) -> None:
+        """Go back to what `get_state` gave."""
+        before, was, last, is_ = state
+        self.moments = (before, np.array(was, dtype=np.float64), last, np.array(is_, dtype=np.float64))
+
+
+Memory = Mapping[str, Any]
+"""What is remembered of one unit: the tick at which it is, and its outputs' moments by port."""
+
+_NONE: Mapping[str, NDArray[np.float64]] = {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Line:
+    """An input, the trace of its source, and where in the step the input is evaluated, in halves of the step."""
+
+    port: str
+    trace: Trace
+    target: NDArray[Any]
+    change: Linear
+    halves: int
+    rate: NDArray[Any] | None = None
+
+    def follow(self, half_ticks: int, tick: float) -> None:
+        factor, offset = self.change.factor, self.change.offset
+        self.target[...] = self.trace.at(half_ticks) * factor + offset
+        if self.rate is not None:
+            self.rate[...] = self.trace.rate(tick) * factor
+
+    def lead_to(self, end: NDArray[np.float64], dt: float) -> None:
+        begin = self.trace.last * self.change.factor + self.change.offset
+        self.target[...] = begin + (end - begin) * (self.halves / 2)
+        if self.rate is not None:
+            self.rate[...] = (end - begin) / dt
+
+
+class LinearInputs:
+    """Sets inputs on the lines through what their sources gave at their last two communication points.
+
+    The line is drawn on where the source is not yet as far as the unit, and lies between two values of the source where
+    that has stepped already (Gauss-Seidel) or is slower than the unit. A line begins level. The places on it are ratios
+    of whole ticks.
+
+    A unit of FMI 2 that interpolates inputs gets the value at the begin of its step, and the slope. Any other holds an
+    input over its step, so one value must stand for the step:
+    - the one in its middle. The integral of a line over the step is the length times this value, so that states come
+      out to second order in the step.
+    - the one at its end, for an input that is declared to act at once on an output that feeds another unit: the output
+      counts for the end of the step, and so must what it follows. States of such a unit come out to first order.
+
+    Where units iterate, an input that leads back in a circle follows the line from what its source gave last to what
+    it is presumed to be at the end of the step.
+
+    Only real values that change between instants follow lines. What is discrete, or comes from or goes to a unit that
+    acts at instants, is held.
+    """
+
+    def __init__(self, system: System, instances: Mapping[str, Instance], tick: Fraction) -> None:
+        self._instances = instances
+        self._tick = float(tick)
+        self._at = dict.fromkeys(instances, 0)
+        self._traces: dict[str, dict[str, Trace]] = {name: {} for name in instances}
+        self._lines: dict[str, list[_Line]] = {name: [] for name in instances}
+        followed = [c for c in system.connections if _is_followed(system, c)]
+        ports: dict[str, list[str]] = defaultdict(list)
+        for c in followed:
+            ports[c.target.unit].append(c.target.port)
+        for name, fed in ports.items():
+            if instances[name].description.capabilities.interpolates_inputs:
+                instances[name].interpolate(fed)
+        at_once = _acting_at_once(system)
+        for c in followed:
+            self._lines[c.target.unit].append(self._line(system, c, at_once=c.target in at_once))
+
+    def feed(self, unit: str, t: float, dt: float, ends: Mapping[str, NDArray[np.float64]] = _NONE) -> None:
+        """Write the inputs that follow lines, for a step from t to t + dt; `ends` are presumed values, by port."""
+        at, long = 2 * self._ticks(t), self._ticks(dt)
+        for line in self._lines[unit]:
+            if line.port in ends:
+                line.lead_to(ends[line.port], dt)
+            else:
+                line.follow(at + line.halves * long, self._tick)
+
+    def step(self, unit: str) -> None:
+        """Take note that a unit has gone on."""
+        self._at[unit] = self._ticks(self._instances[unit].time)
+
+    def publish(self, unit: str) -> None:
+        """Take note of a unit's outputs where it is."""
+        for trace in self._traces[unit].values():
+            trace.record(self._at[unit])
+
+    def save(self, units: Collection[str]) -> dict[str, Memory]:
+        """Return what is remembered of units, for `restore`."""
+        return {u: {"at": self._at[u], "moments": {p: t.moments for p, t in self._traces[u].items()}} for u in units}
+
+    def restore(self, memories: Mapping[str, Memory]) -> None:
+        """Go back to what `save` gave."""
+        for unit, memory in memories.items():
+            self._at[unit] = memory["at"]
+            moments: Mapping[str, Moments] = memory["moments"]
+            for port, then in moments.items():
+                self._traces[unit][port].moments = then
+
+    def get_state(self) -> dict[str, Any]:
+        """Return all that is remembered as JSON can hold it."""
+        traces = {u: {p: t.get_state() for p, t in ts.items()} for u, ts in self._traces.items()}
+        return {"at": dict(self._at), "traces": traces}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to what `get_state` gave."""
+        self._at = dict(state["at"])
+        for unit, traces in self._traces.items():
+            for port, trace in traces.items():
+                trace.set_state(state["traces"][unit][port])
+
+    def _line(self, system: System, c: Connection, *, at_once: bool) -> _Line:
+        target, traces = self._instances[c.target.unit], self._traces[c.source.unit]
+        values = self._instances[c.source.unit].y[c.source.port][0]
+        rate = target.du.get(c.target.port)
+        return _Line(
+            port=c.target.port,
+            trace=traces.setdefault(c.source.port, Trace(values)),
+            target=target.u[c.target.port][0],
+            change=system.change_by(c) or Linear(),
+            halves=0 if rate else 2 if at_once else 1,
+            rate=rate[0] if rate else None,
+        )
+
+    def _ticks(self, seconds: float) -> int:
+        return round(seconds / self._tick)
+
+
+def _is_followed(system: System, c: Connection) -> bool:
+    source, target = system.units[c.source.unit], system.units[c.target.unit]
+    if source.sampled or target.sampled:
+        return False
+    ends = source.description.outputs[c.source.port], target.description.inputs[c.target.port]
+    return all(port.is_continuous for port in ends)
+
+
+def _acting_at_once(system: System) -> set[PortName]:
+    """Return the inputs that are declared to act at once on an output that feeds a unit."""
+    feeding = {c.source for c in system.connections}
+    inputs: set[PortName] = set()
+    for y in feeding:
+        inputs |= {PortName(y.unit, u) for u in system.units[y.unit].description.feedthrough.get(y.port, ())}
+    return inputs

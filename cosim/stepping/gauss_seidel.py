@@ -1,13 +1,98 @@
-"""Units step one after another, each from the newest values."""
+"""Units step one after another, each from the newest values.
 
-from collections.abc import Mapping, Sequence
+Steps groups of units one after another; the units of a circle until they agree.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from handover.cosim.ensemble import Ensemble
-from handover.cosim.iterating.group_stepping import GroupStepping, MakeSolver
-from handover.cosim.iterating.iteration_count import IterationCount
+from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.interface import Interface
+from handover.cosim.stepping.iteration import IteratedStep, IterationCount
+from handover.cosim.stepping.solvers import InterfaceSolver
 from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
+
+MakeSolver = Callable[[Interface], InterfaceSolver]
+"""Makes a solver for the inputs that lead back in a circle."""
+
+
+class GroupStepping:
+    """Takes groups in the order given. Of a circle whose units have several rates, those iterate that are due.
+
+    Args:
+        ensemble: the units.
+        groups: all units that may be due.
+        make_solver: gives each circle a solver of its own.
+        count: is told of iterated steps.
+    """
+
+    def __init__(
+        self, ensemble: Ensemble, groups: Sequence[Group], make_solver: MakeSolver, count: IterationCount
+    ) -> None:
+        self._ensemble = ensemble
+        self._groups = groups
+        self._make_solver = make_solver
+        self._count = count
+        self._place = {name: (i, j) for i, group in enumerate(groups) for j, name in enumerate(group.units)}
+        self._iterated: dict[tuple[str, ...], IteratedStep | None] = {}
+        for name, (i, _) in self._place.items():
+            if groups[i].circle:
+                ensemble.instances[name].goes_back = True
+
+    def step(self, t: float, due: Sequence[Slot]) -> None:
+        """Step units that are due.
+
+        Raises:
+            UnitFailure: a unit's call failed. NotConverged: a circle did not come to agree.
+        """
+        in_order = sorted(due, key=lambda slot: self._place[slot.unit])
+        for circle, members in itertools.groupby(in_order, key=self._circle_of):
+            slots = list(members)
+            iterated = None if circle is None else self._iterated_step(self._groups[circle], slots)
+            if iterated is None:
+                self._one_after_another(t, slots)
+            else:
+                iterated.step(t, slots)
+
+    def get_state(self) -> list[Any]:
+        """Return, by units that iterate together, what their solver has learnt; JSON can hold it."""
+        return [[list(units), step.solver.get_state()] for units, step in self._iterated.items() if step is not None]
+
+    def set_state(self, state: list[Any]) -> None:
+        """Go back to where `get_state` was called."""
+        self._iterated.clear()
+        for units, learnt in state:
+            step = self._make(self._groups[self._place[units[0]][0]], units)
+            if step is not None:
+                step.solver.set_state(learnt)
+            self._iterated[tuple(units)] = step
+
+    def _circle_of(self, slot: Slot) -> int | None:
+        """Return the place of the group that a unit iterates with; None for those that step by themselves."""
+        i, _ = self._place[slot.unit]
+        return i if self._groups[i].circle else None
+
+    def _iterated_step(self, group: Group, slots: Sequence[Slot]) -> IteratedStep | None:
+        units = tuple(s.unit for s in slots)
+        if units not in self._iterated:
+            self._iterated[units] = self._make(group, units)
+        return self._iterated[units]
+
+    def _make(self, group: Group, units: Sequence[str]) -> IteratedStep | None:
+        interface = Interface(self._ensemble, group.back(units))
+        if not len(interface):
+            return None
+        return IteratedStep(self._ensemble, interface, self._make_solver(interface), self._count, group.told)
+
+    def _one_after_another(self, t: float, due: Sequence[Slot]) -> None:
+        with self._ensemble.stopwatch() as charge:
+            for slot in due:
+                self._ensemble.feed(slot.unit, t, slot.period)
+                self._ensemble.step(slot.unit, t, slot.period)
+                self._ensemble.publish(slot.unit)
+                charge(slot.unit)
 
 
 class GaussSeidel:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from handover.cosim.ensemble import Ensemble
+from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.system.schedule import Slot
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 
 MOST_RUNS = 100_000
 """Runs of a campaign: above it, a slip of the pen is likelier than a wish."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,8 +43,8 @@ def handover(
 ) -> Generator[Ring, None, None]:
     """Give a ring in our master."""
     from handover.cosim.master import Master
-    from handover.cosim.master_options import Algorithm, MasterOptions
     from handover.cosim.record.recorder import Recorder
+    from handover.cosim.stepping.options import Algorithm, MasterOptions
     from handover.cosim.system.system import System
 
     system = System()

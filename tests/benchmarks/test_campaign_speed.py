@@ -18,7 +18,7 @@ import psutil
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
 from handover.scenarios.campaign.crew import Crew
 from handover.scenarios.campaign.dask_crew import embedded_crew

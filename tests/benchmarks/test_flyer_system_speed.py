@@ -12,7 +12,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 

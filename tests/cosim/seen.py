@@ -3,7 +3,7 @@
 from fractions import Fraction
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 

@@ -11,12 +11,9 @@ from oscillator import PLAIN, STATES, STIFF
 from handover.cosim.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
 from handover.cosim.exceptions import BadOptions, ScheduleError
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
-from handover.cosim.stepping.extrapolation import Extrapolation
-from handover.cosim.stepping.step_statistics import StepStatistics
-from handover.cosim.stepping.step_too_small import StepTooSmall
+from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, StepTooSmall
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
+from handover.cosim.stepping.step_control import StepStatistics
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 

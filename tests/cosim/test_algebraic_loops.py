@@ -10,10 +10,10 @@ from native_units import native_fmu
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import ScheduleError, UnitRefused
-from handover.cosim.iterating.chained_derivatives import ChainedDerivatives
-from handover.cosim.iterating.not_converged import NotConverged
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.initial_values import ChainedDerivatives
+from handover.cosim.stepping.iteration import NotConverged
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.conversion import Linear
 from handover.cosim.system.loops import algebraic_loops
 from handover.cosim.system.schedule import Schedule

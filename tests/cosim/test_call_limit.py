@@ -12,9 +12,8 @@ from native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.options import AdaptiveStep, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block

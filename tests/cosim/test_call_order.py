@@ -9,9 +9,7 @@ from called import Called
 from checkpointed import oscillator
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 
 START = {
     2: ["Instantiate", "SetupExperiment", "EnterInitializationMode", "ExitInitializationMode"],

@@ -24,11 +24,9 @@ from handover.cosim.checkpoint import (
     write_checkpoint,
 )
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.record.complete_record import complete_record
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.signals import FromThenOn, Signals
 from handover.cosim.system.system import System
 from handover.scenarios.record import Record

@@ -10,9 +10,9 @@ from two_masses import TwoMasses
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.iterating.not_converged import NotConverged
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.iteration import NotConverged
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Observer
 from handover.cosim.system.system import System
 

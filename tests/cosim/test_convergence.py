@@ -7,8 +7,7 @@ from fractions import Fraction
 import pytest
 from oscillator import PLAIN
 
-from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.system import System
 
 HOLD, LINEAR = Extrapolation.HOLD, Extrapolation.LINEAR

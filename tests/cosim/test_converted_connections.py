@@ -10,8 +10,8 @@ from native_units import native_fmu
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
-from handover.cosim.scaled_copy import ScaledCopy
+from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.stepping.transfers import ScaledCopy
 from handover.cosim.system.conversion import Linear
 from handover.cosim.system.system import PlacedUnit, System
 
@@ -30,7 +30,10 @@ def test_degrees_millimetres_and_celsius_arrive_in_si_units(fmi: int, compiled: 
     s, a, b = pair(fmi, angle_in=30.0, length_in=125.0, temperature_in=20.0)
     for name in QUANTITIES:
         s.connect(getattr(a.y, name), getattr(b.u, f"{name}_in"))
-    with caplog.at_level(logging.INFO, "handover.cosim.wiring"), Master(s, MasterOptions(compiled=compiled)) as master:
+    with (
+        caplog.at_level(logging.INFO, "handover.cosim.stepping.transfers"),
+        Master(s, MasterOptions(compiled=compiled)) as master,
+    ):
         at_start = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]
         master.run(Fraction(1))
         at_end = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]

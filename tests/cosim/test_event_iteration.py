@@ -6,9 +6,9 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from handover.cosim.events.event_iteration import MOST_ITERATIONS
 from handover.cosim.fmu.failures import UnitEnded, UnsettledEvents
 from handover.cosim.master import Master
+from handover.cosim.stepping.event_iteration import MOST_ITERATIONS
 from handover.cosim.system.system import System
 
 

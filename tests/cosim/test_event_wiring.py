@@ -9,10 +9,8 @@ from native_units import native_fmu
 from handover.cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
 from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.options import AdaptiveStep, Extrapolation, MasterOptions
 from handover.cosim.system.system import PortName, System
 
 

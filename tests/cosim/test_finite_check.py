@@ -3,8 +3,8 @@ import pytest
 from numpy.typing import NDArray
 from signals_of import port_of
 
-from handover.cosim.finite_check import FiniteCheck
 from handover.cosim.fmu.failures import NotFinite
+from handover.cosim.stepping.transfers import FiniteCheck
 
 
 def check_of(values: NDArray[np.float64], *names: str) -> FiniteCheck:

@@ -10,7 +10,7 @@ from native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 
 
 class Stuck(Called):

@@ -8,7 +8,7 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
 
 ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]

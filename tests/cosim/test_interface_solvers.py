@@ -5,10 +5,8 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.iterating.fixed_point import FixedPoint
-from handover.cosim.iterating.interface_newton import InterfaceNewton
-from handover.cosim.iterating.interface_solver import InterfaceSolver, Unsolved
-from handover.cosim.iterating.magnitudes import Magnitudes
+from handover.cosim.stepping.interface import Magnitudes
+from handover.cosim.stepping.solvers import FixedPoint, InterfaceNewton, InterfaceSolver, Unsolved
 
 Make = Callable[..., InterfaceSolver]
 

@@ -8,8 +8,7 @@ import pytest
 from two_masses import SIGNALS, Floats, TwoMasses
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.stepping.extrapolation import Extrapolation
+from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.system import System
 
 STIFF, SOFT = TwoMasses(k_c=4000.0, d_c=8.0), TwoMasses(k_c=2.0)

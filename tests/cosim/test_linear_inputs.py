@@ -10,9 +10,8 @@ from native_units import native_fmu
 from oscillator import PLAIN, STATES
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
-from handover.cosim.stepping.extrapolation import Extrapolation
-from handover.cosim.stepping.trace import Trace
+from handover.cosim.stepping.extrapolation import Trace
+from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.conversion import Linear
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

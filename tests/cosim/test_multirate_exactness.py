@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.stepping.grid_stepper import GridStepper
+from handover.cosim.stepping.stepper import GridStepper
 from handover.cosim.system.schedule import Schedule, Slot
 from handover.cosim.system.system import System
 

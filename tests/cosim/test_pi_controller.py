@@ -2,7 +2,7 @@
 
 import pytest
 
-from handover.cosim.stepping.pi_controller import PiController
+from handover.cosim.stepping.step_control import PiController
 
 
 @pytest.mark.parametrize("power", [2, 3])

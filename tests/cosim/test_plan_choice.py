@@ -8,12 +8,11 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.native_libraries import CompilationError
 from handover.cosim.plan import choice, memory
 from handover.cosim.plan.plan_stepper import PlanStepper
-from handover.cosim.stepping.extrapolation import Extrapolation
-from handover.cosim.stepping.grid_stepper import GridStepper
+from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
+from handover.cosim.stepping.stepper import GridStepper
 from handover.cosim.system.system import System
 
 

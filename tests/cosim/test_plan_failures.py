@@ -11,7 +11,7 @@ from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
-from handover.cosim.master_options import Algorithm
+from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.system import System
 
 

@@ -8,8 +8,7 @@ from native_units import native_fmu
 
 from handover.cosim.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
-from handover.cosim.stepping.grid_stepper import GridStepper
-from handover.cosim.stepping.stepper import Stepper
+from handover.cosim.stepping.stepper import GridStepper, Stepper
 from handover.cosim.system.conversion import Linear
 from handover.cosim.system.system import System
 

@@ -8,9 +8,8 @@ from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.adaptive_step import AdaptiveStep
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, MasterOptions
 from handover.cosim.system.system import System
 from handover.scenarios.record import Record
 

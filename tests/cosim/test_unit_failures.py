@@ -22,8 +22,8 @@ from handover.cosim.fmu.failures import (
     UnitHung,
 )
 from handover.cosim.master import Master
-from handover.cosim.master_options import MasterOptions
 from handover.cosim.record.recorder import Recorder
+from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 from handover.scenarios.record import Record
 

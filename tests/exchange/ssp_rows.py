@@ -6,8 +6,8 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.scenarios.command import main
 

@@ -7,7 +7,7 @@ import pytest
 from workshop import Workshop
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 

@@ -8,7 +8,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from handover.cosim.master import Master
-from handover.cosim.master_options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block

@@ -4,7 +4,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import build_block, cached
 from handover.scenarios.campaign.run_order import RunOrder
 from handover.scenarios.catalog import SCENARIOS

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.master_options import Algorithm, MasterOptions
 from handover.cosim.record.file_lock import folder_locked
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.scenarios.campaign.bad_crew import BadCrew
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_place import place_of

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 from own_crew import OwnCrew
 
-from handover.cosim.master_options import MasterOptions
+from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios import supervisor
 from handover.scenarios.campaign import dask_crew
 from handover.scenarios.campaign.campaign_table import CampaignTable

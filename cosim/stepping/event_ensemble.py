@@ -6,13 +6,12 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from handover.cosim.endings import Endings
-from handover.cosim.ensemble import Ensemble
 from handover.cosim.exceptions import CosimError
 from handover.cosim.fmu.calls import State, StepEnd
 from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
+from handover.cosim.stepping.ensemble import Endings, Ensemble
 from handover.cosim.system.schedule import Slot
 from handover.cosim.system.system import PlacedUnit, System
 

@@ -1,13 +1,126 @@
-"""Newton's method on the signals between units."""
+"""Equations x = g(x) between coupled units: what a solver of them is, and when x is good enough.
 
-from collections.abc import Mapping
-from typing import Any
+Fixed-point iteration with Aitken's relaxation.
+
+Newton's method on the signals between units.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.iterating.interface_solver import Jacobian, Map, Solution, Unsolved, residual_of
-from handover.cosim.iterating.magnitudes import Magnitudes
+from handover.cosim.stepping.interface import Magnitudes
+
+Map = Callable[[Floats], Floats]
+"""g: takes the values that go into units and gives back the values that come out; n numbers to n numbers."""
+
+Jacobian = Callable[[], Floats | None]
+"""Gives dg/dx (n by n) at the x that g was last called with, or None where it is not known."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Values x with g(x) = x to the tolerance. g was called with x last."""
+
+    x: Floats
+    iterations: int
+
+
+class Unsolved(Exception):
+    """No x was found; `residual` is how far g(x) is from the last `x`."""
+
+    def __init__(self, why: str, iterations: int, x: Floats, residual: Floats) -> None:
+        super().__init__(why)
+        self.why, self.iterations, self.x, self.residual = why, iterations, x, residual
+
+
+class InterfaceSolver(Protocol):
+    """Solves x = g(x), again and again for one g that changes slowly; what it learns it keeps for the next time."""
+
+    magnitudes: Magnitudes
+
+    def solve(self, g: Map, x: Floats, jacobian: Jacobian | None = None) -> Solution:
+        """Solve from a first guess.
+
+        Raises:
+            Unsolved: no solution was found.
+        """
+        ...
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return what it has learnt; JSON can hold it."""
+        ...
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to where `get_state` was called."""
+        ...
+
+
+def residual_of(g: Map, x: Floats, iterations: int) -> Floats:
+    """Return g(x) - x.
+
+    Raises:
+        Unsolved: it is not finite.
+    """
+    residual = g(x) - x
+    if not np.all(np.isfinite(residual)):
+        raise Unsolved("values leave all bounds", iterations, x, residual)
+    return residual
+
+
+class FixedPoint:
+    """x <- x + w r with r = g(x) - x and w <- -w r'.(r - r') / |r - r'|^2, where r' is the residual before.
+
+    The relaxation w begins at 1, which is plain iteration, and adapts to how r answers; for a single signal this is
+    the secant method, which also converges where plain iteration diverges. Residuals are divided by the signals'
+    magnitudes. [Kuettler2008] Fixed-point fluid-structure interaction solvers with dynamic relaxation, eq. (44);
+    after Irons and Tuck (1969).
+
+    Args:
+        magnitudes: measures what has converged.
+        most_iterations: after so many calls of g, it gives up.
+    """
+
+    def __init__(self, magnitudes: Magnitudes, most_iterations: int) -> None:
+        self.magnitudes = magnitudes
+        self._most = most_iterations
+
+    def solve(self, g: Map, x: Floats, jacobian: Jacobian | None = None) -> Solution:  # noqa: ARG002
+        """Iterate; see `InterfaceSolver`."""
+        scale = self.magnitudes.of(x)
+        weight = 1.0
+        before: Floats | None = None
+        residual = residual_of(g, x, 1)
+        for iteration in range(1, self._most):
+            if not np.any(self.magnitudes.moving(x, residual)):
+                self.magnitudes.learn(x)
+                return Solution(x, iteration)
+            if before is not None:
+                weight = _relaxation(weight, before / scale, residual / scale)
+            x, before = x + weight * residual, residual
+            residual = residual_of(g, x, iteration + 1)
+        if np.any(self.magnitudes.moving(x, residual)):
+            raise Unsolved("values have not settled", self._most, x, residual)
+        self.magnitudes.learn(x)
+        return Solution(x, self._most)
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return the magnitudes; see `InterfaceSolver`."""
+        return {"magnitudes": self.magnitudes.get_state()}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go back to what `get_state` gave."""
+        self.magnitudes.set_state(state["magnitudes"])
+
+
+def _relaxation(weight: float, before: Floats, residual: Floats) -> float:
+    change = residual - before
+    length = float(change @ change)
+    return weight if length == 0.0 else -weight * float(before @ change) / length
+
 
 _SINGULAR = 1e-7
 """Least singular value of I - dg/dx, in magnitudes, at which differences of g still tell a solution from none."""

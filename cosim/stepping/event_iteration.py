@@ -3,10 +3,10 @@
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 
-from handover.cosim.events.event_ensemble import EventEnsemble
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.failures import UnsettledEvents
+from handover.cosim.stepping.event_ensemble import EventEnsemble
 
 MOST_ITERATIONS = 100
 """Most iterations at one instant, and most rounds of values within one."""

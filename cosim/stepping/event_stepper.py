@@ -1,4 +1,7 @@
-"""Steps that end at events too: the schedule's grid, and between its points the instants at which something happens."""
+"""Steps that end at events too: the schedule's grid, and between its points the instants at which something happens.
+
+What does not go together with steps that may end anywhere.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,11 +9,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from handover.cosim.events.event_ensemble import EventEnsemble
-from handover.cosim.events.event_iteration import MOST_ITERATIONS, EventIteration
+from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.failures import UnsettledEvents
-from handover.cosim.stepping.coupling import Coupling
+from handover.cosim.stepping.event_ensemble import EventEnsemble
+from handover.cosim.stepping.event_iteration import MOST_ITERATIONS, EventIteration
+from handover.cosim.stepping.options import Extrapolation, MasterOptions
+from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule, Slot
+from handover.cosim.system.system import System
 
 
 @dataclass
@@ -177,3 +183,25 @@ class EventStepper:
             if instance.next_event is not None:
                 found.append(Fraction(instance.next_event))
         return found
+
+
+def has_events(system: System, options: MasterOptions) -> bool:
+    """Whether steps may end off the grid at events, or where one is discarded; an adaptive step repeats by itself."""
+    return system.has_events or (options.repeat_discarded and options.adaptive is None)
+
+
+def refuse_off_grid(system: System, options: MasterOptions) -> None:
+    """Refuse what is defined for steps on a grid only; `check_control` refuses events where the step follows the error.
+
+    Raises:
+        ScheduleError: inputs are to be extrapolated, though steps may end anywhere.
+    """
+    if not has_events(system, options):
+        return
+    eventful = ", ".join(u.name for u in system.units.values() if u.uses_events)
+    where = f"at events ({eventful})" if eventful else "when one is discarded"
+    if options.extrapolation is Extrapolation.LINEAR:
+        raise ScheduleError(
+            f"inputs can follow lines only where all steps lie on one grid, and steps may end off it {where}: let "
+            "inputs be held"
+        )

@@ -1,6 +1,12 @@
-"""The units of a system in a run: loaded, wired through their buffers, initialised, and freed at the end."""
+"""The units of a system in a run: loaded, wired through their buffers, initialised, and freed at the end.
+
+What has to be done at the end of a run: units terminated, then freed, then their files removed.
+
+Saved states of several units.
+"""
 
 import array
+import collections
 import contextlib
 import functools
 import tempfile
@@ -9,19 +15,51 @@ from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from handover.cosim.endings import Endings
 from handover.cosim.exceptions import CosimError
-from handover.cosim.finite_check import FiniteCheck
 from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.saved_states import SavedStates
-from handover.cosim.stepping.linear_inputs import LinearInputs
+from handover.cosim.stepping.extrapolation import LinearInputs, Memory
+from handover.cosim.stepping.transfers import Feeding, FiniteCheck, feedings, finite_checks
 from handover.cosim.system.schedule import Slot
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
-from handover.cosim.wiring import Feeding, feedings, finite_checks
+
+
+class Endings:
+    """Things to do at the end, the last one first, each once, whatever becomes of the others."""
+
+    def __init__(self) -> None:
+        self._left: collections.deque[Callable[[], object]] = collections.deque()
+        self._first: Exception | None = None
+
+    def add(self, ending: Callable[[], object]) -> None:
+        """Have something done before all that was added until now."""
+        self._left.append(ending)
+
+    def carry_out(self) -> None:
+        """Do what is left. Where one thing did not return, another thread may call this again and goes on after it.
+
+        Raises:
+            Exception: the first that any of it raised, after all was done.
+        """
+        while self._left:
+            try:
+                self._left.pop()()
+            except Exception as e:
+                self._first = self._first or e
+        first, self._first = self._first, None
+        if first is not None:
+            raise first
+
+
+class SavedStates(dict[str, State]):
+    """Saved states by unit, with what the extrapolation of inputs remembers of these units."""
+
+    def __init__(self, states: Mapping[str, State], lines: Mapping[str, Memory]) -> None:
+        super().__init__(states)
+        self.lines = lines
 
 
 class Ensemble:

@@ -1,0 +1,185 @@
+"""How values get from the outputs of loaded units to the inputs that they feed.
+
+Connections whose input has fewer bits than the output that feeds it.
+
+Copies of a connection that changes its values linearly.
+
+Finds NaN and infinity in the outputs of a unit that feed others.
+"""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.fmu.buffers import Copy, Views, joined
+from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.fmu.failures import NotFinite
+from handover.cosim.fmu.instance import Instance
+from handover.cosim.system.conversion import Linear
+from handover.cosim.system.system import PortName, System
+
+
+@dataclass(frozen=True)
+class Narrowing:
+    """An integer output that feeds a narrower input: copied, a number that does not fit would lose its upper bits.
+
+    Attributes:
+        source: the output, `unit.port`.
+        unit, port: the input.
+        values: the output's values, as they are.
+    """
+
+    source: str
+    unit: str
+    port: str
+    width: Width
+    values: NDArray[Any]
+
+    def check(self, t: float) -> None:
+        """Let only numbers through that fit.
+
+        Raises:
+            UnitFailure: one does not.
+        """
+        for number in self.values.tolist():
+            if not self.width.holds(number):
+                fault = f"{self.source} is {number}, which does not fit {self.width.told}"
+                raise UnitFailure(self.unit, f"setting {self.port}", t, "Error", (fault,))
+
+
+def narrows(output: FmuPort, target: FmuPort) -> bool:
+    """Tell whether an integer output has numbers that the input which it feeds cannot take."""
+    a, b = output.width, target.width
+    return (
+        output.kind is Kind.INTEGER
+        and a is not None
+        and b is not None
+        and not (b.holds(a.lowest) and b.holds(a.highest))
+    )
+
+
+class ScaledCopy:
+    """Writes factor * source + offset to a target, entry by entry.
+
+    The product is rounded to a double before the offset, also of 0, is added, and the sum once more if the target is
+    narrower: whoever does the same in C must keep the compiler from fusing the two operations.
+    """
+
+    def __init__(self, target: NDArray[Any], source: NDArray[Any], linear: Linear) -> None:
+        self.target, self.source, self.linear = target, source, linear
+        self._between: NDArray[np.float64] = np.empty(len(source))
+
+    def __call__(self) -> None:
+        """Write the target."""
+        np.multiply(self.source, self.linear.factor, out=self._between, dtype=np.float64)
+        np.add(self._between, self.linear.offset, out=self._between)
+        self.target[...] = self._between
+
+
+class FiniteCheck:
+    """Checks the connected real outputs of one unit.
+
+    Args:
+        unit: the instance.
+        fmi: version of its standard.
+        views: where its outputs lie.
+        read: its connected outputs, with the inputs that each feeds as `unit.port`.
+    """
+
+    def __init__(
+        self, unit: str, fmi: int, views: Mapping[str, Views], read: Mapping[str, tuple[FmuPort, Sequence[str]]]
+    ) -> None:
+        self._unit, self._fmi = unit, fmi
+        real = [(port, readers) for port, readers in read.values() if port.kind is Kind.REAL]
+        self._ports = [(port, views[port.name][0], readers) for port, readers in real]
+        self.blocks: list[NDArray[Any]] = [block for block, _ in joined((v, v) for _, v, _ in self._ports)]
+        """The values, as few contiguous arrays."""
+
+    def __call__(self, t: float, log: Sequence[str] = ()) -> None:
+        """Check the values that were fetched at simulated time t in seconds.
+
+        Raises:
+            NotFinite: one is NaN or infinite.
+        """
+        for block in self.blocks:
+            if not np.isfinite(block).all():
+                failure = self.failure(t, log)
+                if failure is not None:
+                    raise failure
+
+    def failure(self, t: float, log: Sequence[str] = ()) -> UnitFailure | None:
+        """Return the failure that the values are, None if all are finite."""
+        for port, values, readers in self._ports:
+            wrong = np.flatnonzero(~np.isfinite(values))
+            if len(wrong):
+                at = int(wrong[0])
+                index, call = list(indices_of(port.shape))[at], f"fmi{self._fmi}Get{port.fmi_type}"
+                return NotFinite(self._unit, call, t, port.name, index, float(values[at]), readers=readers, log=log)
+        return None
+
+
+_log = logging.getLogger(__name__)
+
+
+class Feeding(NamedTuple):
+    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
+
+    narrowings: Sequence[Narrowing]
+    copies: Sequence[Copy]
+    scaled: Sequence[ScaledCopy]
+
+    def carry_out(self, t: float) -> None:
+        """Fill a unit's buffers at t.
+
+        Raises:
+            UnitFailure: a number does not fit its input.
+        """
+        for narrowing in self.narrowings:
+            narrowing.check(t)
+        for target, source in self.copies:
+            target[...] = source
+        for scaled in self.scaled:
+            scaled()
+
+
+def feedings(system: System, instances: Mapping[str, Instance]) -> dict[str, Feeding]:
+    """Return how each unit is fed; conversions of units of measure are told in the log."""
+    changes = {c.target: change for c in system.connections if (change := system.change_by(c))}
+    return {name: _feeding(system, instances, name, changes) for name in instances}
+
+
+def finite_checks(system: System, instances: Mapping[str, Instance]) -> dict[str, FiniteCheck]:
+    """Return for each unit the check of its connected outputs."""
+    read: dict[str, dict[str, tuple[FmuPort, list[str]]]] = {name: {} for name in instances}
+    for name in instances:
+        for port, source in system.sources_of(name).items():
+            output = instances[source.unit].description.outputs[source.port]
+            read[source.unit].setdefault(source.port, (output, []))[1].append(f"{name}.{port}")
+    return {name: FiniteCheck(name, i.description.fmi, i.y, read[name]) for name, i in instances.items()}
+
+
+def _feeding(
+    system: System, instances: Mapping[str, Instance], name: str, changes: Mapping[PortName, Linear]
+) -> Feeding:
+    instance = instances[name]
+    copies: list[Copy] = []
+    scaled: list[ScaledCopy] = []
+    narrowings: list[Narrowing] = []
+    for port, source in system.sources_of(name).items():
+        other, target = instances[source.unit], instance.description.inputs[port]
+        output, change = other.description.outputs[source.port], changes.get(PortName(name, port))
+        if change is not None:
+            scaled.append(ScaledCopy(instance.u[port][0], other.y[source.port][0], change))
+            _log.info("%s (%s) -> %s.%s (%s): %s", source, output.unit, name, port, target.unit, change)
+        else:
+            copies += zip(instance.u[port], other.y[source.port], strict=True)
+        if target.width and narrows(output, target):
+            narrowings.append(Narrowing(str(source), name, port, target.width, other.y[source.port][0]))
+    return Feeding(narrowings, joined(copies), scaled)
