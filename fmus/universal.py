@@ -12,10 +12,10 @@ def universal(libraries: list[bytes]) -> bytes:
     whole = struct.pack(">2I", MAGIC, len(libraries))
     offset = _aligned(len(whole) + 20 * len(libraries))
     body = b""
-    for library in libraries:
-        processor = struct.unpack_from("<2I", library, 4)  # type and subtype
-        whole += struct.pack(">5I", *processor, offset + len(body), len(library), ALIGNMENT)
-        body += library.ljust(_aligned(len(library)), b"\0")
+    for content in libraries:
+        processor = struct.unpack_from("<2I", content, 4)  # type and subtype
+        whole += struct.pack(">5I", *processor, offset + len(body), len(content), ALIGNMENT)
+        body += content.ljust(_aligned(len(content)), b"\0")
     return whole.ljust(offset, b"\0") + body
 
 

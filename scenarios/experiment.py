@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.variable import Causality, Variable
+from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.camera_picture import CameraPicture
 from handover.scenarios.reporting.published_value import PublishedValue
 from handover.scenarios.reporting.replay import Replay

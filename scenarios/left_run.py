@@ -8,8 +8,8 @@ from typing import Any, cast
 
 from handover.cosim.checkpoint import BadCheckpoint
 from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
-from handover.cosim.record.complete_record import complete_record
 from handover.cosim.record.file_lock import FileLocked
+from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment import Experiment

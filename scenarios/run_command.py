@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from handover.cosim.record.record_formats import RECORD_FORMATS
+from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
 from handover.scenarios.bad_call import BadCall, told_in_one_line

@@ -8,12 +8,12 @@ from handover.cosim.checkpointer import Checkpointer
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Outcome, Watch
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.kept_pictures import write_pictures
 from handover.scenarios.resumption import Resumption, Spent, pack
 from handover.scenarios.run_folder import told_if_not_written

@@ -8,13 +8,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
+from handover.cosim.record.reader import Record
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios import supervisor
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
-from handover.scenarios.record import Record
 from handover.scenarios.run_folder import sha256_of
 
 _MOST_SIGNALS = 6

@@ -10,8 +10,8 @@ from typing import Any
 from handover.cosim.fmu.heartbeat import Abandoned
 from handover.cosim.plan import memory
 from handover.cosim.plan.plan_maker import PlanMaker
-from handover.cosim.record.record_block import RecordBlock
 from handover.cosim.record.recorder import Recorder
+from handover.cosim.record.tail import RecordBlock
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule

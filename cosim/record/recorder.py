@@ -6,10 +6,9 @@ from pathlib import Path
 from types import TracebackType
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.record.complete_record import finish_record, rewind_stream, stream_of, tail_of
-from handover.cosim.record.record_block import RecordBlock
-from handover.cosim.record.record_columns import RecordColumns, record_columns
-from handover.cosim.record.record_stream import RecordStream, stream_batches
+from handover.cosim.record.columns import RecordColumns, record_columns
+from handover.cosim.record.stream import RecordStream, finish_record, rewind_stream, stream_batches, stream_of, tail_of
+from handover.cosim.record.tail import RecordBlock
 from handover.cosim.system.signals import Signals
 
 

@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, nearest
 from handover.cosim.fmu.archive import FmuArchive
-from handover.cosim.ssp.namespaces import STRUCTURE
+from handover.cosim.ssp.xml import STRUCTURE
 
 
 class _Packed(FmuArchive):

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.fmu.xml import XmlElement
-from handover.cosim.ssp.namespaces import local, told
-from handover.cosim.ssp.part import SspPart
+from handover.cosim.ssp.xml import SspPart, local, told
 from handover.cosim.system.conversion import Linear
 
 _LISTS = ("String", "Enumeration", "Binary")

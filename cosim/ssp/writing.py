@@ -1,22 +1,132 @@
-"""Writes a system as an SSP that other tools load."""
+"""Writes a system as an SSP that other tools load.
+
+Writes the start values of a unit as a parameter set (SSV).
+
+Types, units and enumerations of an FMU's ports, as an SSP names them.
+"""
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+from handover.cosim.blocks.start_values import numbers_of
+from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
 from handover.cosim.fmu.archive import write_archive
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.ssp.connected_ports import entry_names
-from handover.cosim.ssp.described_types import DescribedTypes, add_dimensions
-from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE
-from handover.cosim.ssp.parameter_writing import bound_values, parameter_set
-from handover.cosim.ssp.xml_writing import document, root_element
+from handover.cosim.ssp.connected_ports import entry_names, ports_of
+from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, document, root_element
 from handover.cosim.system.conversion import Linear
 from handover.cosim.system.system import Connection, PlacedUnit, System, proposed_step
+
+Items = tuple[tuple[str, int], ...]
+
+
+class DescribedTypes:
+    """Collects the units and enumerations that types refer to by name, and writes types.
+
+    Units that have one name but are not the same cannot be told apart: then the FMUs' own count.
+    """
+
+    def __init__(self, ports: Iterable[FmuPort]) -> None:
+        self._units: dict[str, Unit | None] = {}
+        self._enumerations: dict[Items, str] = {}
+        for port in ports:
+            if port.kind is Kind.REAL and port.unit.defined:
+                known = self._units.setdefault(port.unit.symbol, port.unit)
+                self._units[port.unit.symbol] = port.unit if known == port.unit else None
+            if port.kind is Kind.ENUMERATION and port.items not in self._enumerations:
+                taken = list(self._enumerations.values())
+                same = sum(name.partition("-")[0] == port.name for name in taken)
+                self._enumerations[port.items] = f"{port.name}-{same + 1}" if same else port.name
+
+    def add_type(self, parent: ET.Element, prefix: str, port: FmuPort) -> ET.Element:
+        """Add the element that tells a port's type, such as `<ssc:Real unit="m"/>`."""
+        attributes: dict[str, str] = {}
+        if port.kind is Kind.REAL and self._units.get(port.unit.symbol) == port.unit:
+            attributes["unit"] = port.unit.symbol
+        if port.kind is Kind.ENUMERATION and prefix == "ssc":
+            attributes["name"] = self._enumerations[port.items]
+        if port.kind is Kind.BINARY and port.mime:
+            attributes["mime-type"] = port.mime
+        return ET.SubElement(parent, f"{prefix}:{port.fmi_type}", attributes)
+
+    def add_enumerations(self, root: ET.Element, prefix: str) -> None:
+        """Add the definitions of all enumerations, if there are any."""
+        parent = ET.SubElement(root, f"{prefix}:Enumerations") if self._enumerations else root
+        for items, name in self._enumerations.items():
+            enumeration = ET.SubElement(parent, "ssc:Enumeration", name=name)
+            for item, value in items:
+                ET.SubElement(enumeration, "ssc:Item", name=item, value=str(value))
+
+    def add_units(self, root: ET.Element, prefix: str) -> None:
+        """Add the definitions of all units, if there are any."""
+        units = [unit for unit in self._units.values() if unit is not None]
+        parent = ET.SubElement(root, f"{prefix}:Units") if units else root
+        for unit in units:
+            base = {n: str(x) for n, x in unit.base.nonzero().items()}
+            base |= {"factor": repr(unit.factor)} if unit.factor != 1 else {}
+            base |= {"offset": repr(unit.offset)} if unit.offset != 0 else {}
+            ET.SubElement(ET.SubElement(parent, "ssc:Unit", name=unit.symbol), "ssc:BaseUnit", base)
+
+
+def add_dimensions(parent: ET.Element, shape: Sequence[int]) -> None:
+    """Add the extents of an array that is one variable."""
+    for extent in shape:
+        ET.SubElement(parent, "ssc:Dimension", size=str(extent))
+
+
+def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
+    """Return the start values to bind, by port.
+
+    An enumeration that is what the FMU starts with anyway is left out: libcosim ends its process at enumerations.
+    """
+    ports = ports_of(unit.description)
+    values = {name: (ports[name], value) for name, value in unit.start.items()}
+    return {
+        name: (port, value)
+        for name, (port, value) in values.items()
+        if port.kind is not Kind.ENUMERATION or port.start != str(int(numbers_of(port, value)[0]))
+    }
+
+
+def parameter_set(unit: PlacedUnit, version: str, name: str) -> bytes:
+    """Return the SSV file of a unit's start values.
+
+    All units' sets have one name: Ecos applies the sets of the name that it is told.
+    """
+    values = bound_values(unit)
+    types = DescribedTypes(port for port, _ in values.values() if port.kind is not Kind.ENUMERATION)
+    root = root_element("ssv:ParameterSet", version, name)
+    parameters = ET.SubElement(root, "ssv:Parameters")
+    for port, value in values.values():
+        texts, names = _texts(port, value), entry_names(port)
+        if len(names) == 1:
+            texts = [" ".join(texts) if port.shape else texts[0]]
+        for name, text in zip(names, texts, strict=True):
+            parameter = ET.SubElement(parameters, "ssv:Parameter", name=name)
+            types.add_type(parameter, "ssv", port).set("value", text)
+            add_dimensions(parameter, port.shape if len(names) == 1 else ())
+    types.add_units(root, "ssv")
+    return document(root)
+
+
+def _texts(port: FmuPort, value: Any) -> list[str]:
+    if port.kind is Kind.STRING:
+        return [str(value)]
+    if port.kind is Kind.BINARY:
+        return [bytes(value).hex()]
+    numbers = numbers_of(port, value).tolist()
+    if port.kind is Kind.BOOLEAN:
+        return ["true" if x else "false" for x in numbers]
+    if port.kind is Kind.ENUMERATION:
+        names = {number: name for name, number in port.items}
+        return [names[int(x)] for x in numbers]
+    return [repr(float(x)) if port.kind is Kind.REAL else str(int(x)) for x in numbers]
 
 
 def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = None) -> Path:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.free_flyer.handover_parameters import Parameters
@@ -15,7 +16,6 @@ from handover.scenarios.free_flyer.handover_watch import HandoverWatch
 from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_handover
 from handover.scenarios.paper import paper_values
 from handover.scenarios.parameters import BadParameter
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.replay import Replay
 from handover.scenarios.reporting.time_plot import TimePlot
 

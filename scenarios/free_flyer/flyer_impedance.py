@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
@@ -14,7 +15,6 @@ from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from handover.scenarios.free_flyer.published import published_of_push
 from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
 from handover.scenarios.paper import paper_values
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.published_value import PublishedValue
 from handover.scenarios.reporting.replay import Replay
 from handover.scenarios.reporting.time_plot import TimePlot

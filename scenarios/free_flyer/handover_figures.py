@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.scenarios.experiment import Figure
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch
@@ -16,7 +17,6 @@ from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, 
 from handover.scenarios.free_flyer.thrust_figure import draw_thrust
 from handover.scenarios.paper import paper_values
 from handover.scenarios.plotting import COLOURS, figure, leave_room, shade_phases
-from handover.scenarios.record import Record
 
 _FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("person.{}_WO", "object", {"color": COLOURS[2], "lw": 4.5, "alpha": 0.4}),

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.thrust_plots import plot_thrust
 from handover.scenarios.paper import paper_values
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 _PHASES = "decision.phase"

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.experiment import Figure
 from handover.scenarios.free_flyer.impedance_model import Errors
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
@@ -13,7 +14,6 @@ from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from handover.scenarios.free_flyer.scene import draw_scene, robot_at
 from handover.scenarios.free_flyer.thrust_figure import draw_thrust
 from handover.scenarios.plotting import COLOURS, figure
-from handover.scenarios.record import Record
 
 _PUSH_COLOUR = "#fbe3cf"
 _CALCULATED = "calculated, [Fernandes2020] eq. (4.4)"

@@ -5,9 +5,9 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
 from handover.scenarios.paper import paper_values
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.meshes import Mesh, faceted, hull
 from handover.scenarios.reporting.replay import Body, Line, Replay
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.experiment import Figure
 from handover.scenarios.free_flyer.thrust_plots import BEYOND, QUANTITIES, commanded_wrench
 from handover.scenarios.plotting import COLOURS, figure, leave_room
-from handover.scenarios.record import Record
 
 
 def draw_thrust(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.time_plot import Curve, TimePlot
 
 BEYOND = 2.0

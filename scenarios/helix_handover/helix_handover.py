@@ -7,13 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.published import published_of
 from handover.scenarios.helix_handover.rig import calibration
 from handover.scenarios.helix_handover.watch import HandoverWatch
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.camera_picture import CameraPicture
 from handover.scenarios.reporting.published_value import PublishedValue
 from handover.scenarios.reporting.replay import Replay

@@ -3,8 +3,8 @@
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.scenarios.helix_handover.parameters import Parameters
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 _PHASES = "servo.phase"

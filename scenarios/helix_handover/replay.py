@@ -7,13 +7,13 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.plants.gripper_figure import gripper
 from handover.plants.hand_figure import hand
 from handover.plants.limb import Limb
 from handover.plants.stereo_camera import Params as CameraParams
 from handover.plants.tendon_parameters import Params as ArmParams
 from handover.scenarios.helix_handover.rig import camera_of
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
 from handover.scenarios.reporting.replay import Body, Line, Replay
 

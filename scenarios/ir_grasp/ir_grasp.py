@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.ir_grasp.parameters import Parameters
@@ -14,7 +15,6 @@ from handover.scenarios.ir_grasp.published import published_of
 from handover.scenarios.ir_grasp.situation import Situation
 from handover.scenarios.ir_grasp.watch import GraspWatch
 from handover.scenarios.parameters import BadParameter
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.published_value import PublishedValue
 from handover.scenarios.reporting.replay import Replay
 from handover.scenarios.reporting.time_plot import TimePlot

@@ -4,8 +4,8 @@ import numpy as np
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 FINGER_NAMES = ("thumb", "index", "ring")

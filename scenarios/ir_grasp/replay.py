@@ -4,12 +4,12 @@ import numpy as np
 
 from handover.controllers.reflex_parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
 from handover.plants.grasp_objects import outlines
 from handover.scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import FINGER_NAMES
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.meshes import Mesh, merged, prism
 from handover.scenarios.reporting.replay import Body, Line, Replay
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from handover.controllers.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.scenarios.experiment import Figure
 from handover.scenarios.plotting import COLOURS, figure
 from handover.scenarios.published.helix_1_arm import Helix1Arm
 from handover.scenarios.published.helix_1_telling import published
-from handover.scenarios.record import Record
 
 _TICKS = (10, 20, 50, 100, 200, 500)
 _PUBLISHED = COLOURS[5]

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.page import template
 from handover.scenarios.reporting.plot_html import json_html
 from handover.scenarios.reporting.section import Section

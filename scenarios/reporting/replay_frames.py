@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 
 MOST = 240
 """Frames of a replay; the page moves bodies smoothly between them."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.page import asset
 from handover.scenarios.reporting.plot_html import json_html
 from handover.scenarios.reporting.replay import Body, Line, Replay

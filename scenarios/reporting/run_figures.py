@@ -5,10 +5,9 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from handover.cosim.record.reader import Record, RecordedSignals
 from handover.scenarios.experiment import Figure, Watch
 from handover.scenarios.parameters import BadParameter, parameters_of
-from handover.scenarios.record import Record
-from handover.scenarios.recorded_signals import RecordedSignals
 from handover.scenarios.reporting.kept_pictures import read_pictures
 from handover.scenarios.reporting.run_facts import RunFacts
 from handover.scenarios.reporting.run_record import record_of

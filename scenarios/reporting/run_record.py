@@ -1,7 +1,7 @@
 """The record in a run's folder, as pages and figures need it."""
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.run_folder import BadRunFolder, RunFolder
 
 

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.plot_html import COLOURS, plot_html
 from handover.scenarios.reporting.section import Section
 from handover.scenarios.reporting.thinned import changes_of, rows_of_curve, rows_of_steps

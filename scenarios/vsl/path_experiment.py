@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.parameters import BadParameter
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.replay import Replay
 from handover.scenarios.reporting.time_plot import TimePlot
 from handover.scenarios.vsl.parameters import Parameters

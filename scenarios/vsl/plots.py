@@ -3,7 +3,7 @@
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 from handover.scenarios.vsl.parameters import Parameters
 

@@ -12,12 +12,12 @@ from native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import AdaptiveStep, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
-from handover.scenarios.record import Record
 
 LIMIT = 1.0  # s: a unit in Python may take a while to be loaded beside other tests
 

@@ -24,12 +24,12 @@ from handover.cosim.checkpoint import (
     write_checkpoint,
 )
 from handover.cosim.master import Master
-from handover.cosim.record.complete_record import complete_record
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
+from handover.cosim.record.stream import complete_record
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.signals import FromThenOn, Signals
 from handover.cosim.system.system import System
-from handover.scenarios.record import Record
 
 
 def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path: Path):

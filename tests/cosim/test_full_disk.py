@@ -8,10 +8,10 @@ from native_units import native_fmu
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.master import Master
-from handover.cosim.record.record_stream import RecordStream
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
+from handover.cosim.record.stream import RecordStream
 from handover.cosim.system.system import System
-from handover.scenarios.record import Record
 
 
 def test_a_run_goes_on_where_the_disk_was_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -11,11 +11,11 @@ import pytest
 
 from handover.cosim.exceptions import BadOptions, InvalidFmu, UnitFailure, UnitRefused, WiringError
 from handover.cosim.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
-from handover.scenarios.record import Record
 
 FmuOf = Callable[..., Path]
 

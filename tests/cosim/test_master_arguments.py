@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 from oscillator import PLAIN, STATES
 
+from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
 from handover.scenarios.command import main
-from handover.scenarios.record import Record
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from signals_of import signals_of
 
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
-from handover.scenarios.record import Record
 
 ROWS = 700
 

@@ -22,10 +22,10 @@ from handover.cosim.fmu.failures import (
     UnitHung,
 )
 from handover.cosim.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
-from handover.scenarios.record import Record
 
 COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "compiled"])
 

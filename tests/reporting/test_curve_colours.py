@@ -5,9 +5,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.plot_html import COLOURS
 from handover.scenarios.reporting.time_plots_section import time_figure
 

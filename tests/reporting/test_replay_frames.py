@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.replay_frames import MOST, frame_rows, phase_changes
 
 

@@ -10,9 +10,9 @@ from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.replay_frames import frame_rows
 
 SCENE = "document.querySelector('.replay-scene')"

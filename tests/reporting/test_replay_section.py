@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 from handover.scenarios.reporting.meshes import prism
 from handover.scenarios.reporting.replay import Body, Line, Replay
 from handover.scenarios.reporting.replay_section import replay_section

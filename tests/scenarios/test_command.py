@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from handover.cosim.record.reader import Record
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.command import main
-from handover.scenarios.record import Record
 
 
 def call(*arguments: str | Path) -> Result:

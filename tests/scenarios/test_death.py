@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from failing_systems import failing_ssp, native_fmu, start
 
+from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
-from handover.scenarios.record import Record
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can be forked that tells")
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from flyer_runs import metric, run
 
+from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.free_flyer.collaborative import Collaborative
@@ -17,7 +18,6 @@ from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.human_to_robot import HumanToRobot
 from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
 from handover.scenarios.parameters import BadParameter
-from handover.scenarios.record import Record
 
 HANDOVERS = (RobotToHuman, HumanToRobot, FailedReception, Collaborative)
 FREE, GRIPPER, HAND, BOTH = range(4)

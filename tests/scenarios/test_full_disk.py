@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
 
 from failing_systems import failing_ssp
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.command import main
-from handover.scenarios.record import Record
 
 FILES = ["run.json", "signals.csv", "summary.json", "report.html"]
 

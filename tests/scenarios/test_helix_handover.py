@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.helix_handover.helix_handover import HelixHandover
 from handover.scenarios.helix_handover.parameters import Parameters
-from handover.scenarios.record import Record
 
 
 def command(*arguments: str | Path) -> list[str]:

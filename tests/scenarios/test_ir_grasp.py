@@ -11,6 +11,7 @@ import pytest
 from handover.controllers.ir_reflex import Phase, Stop
 from handover.controllers.reflex_parameters import Strategy
 from handover.cosim.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.plants.grasp_objects import Thing
@@ -19,7 +20,6 @@ from handover.scenarios.interruption import Interruption
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.situation import Situation, asked_for
-from handover.scenarios.record import Record
 from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task

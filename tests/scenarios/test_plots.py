@@ -8,11 +8,11 @@ import pyarrow.parquet as pq
 import pytest
 from flyer_runs import metric, run
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Experiment
 from handover.scenarios.parameters import parse_parameters
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.time_plot import Curve, TimePlot
 
 FAST = {

@@ -3,7 +3,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 
 
 def test_an_enumerations_names_are_read_back(tmp_path: Path):

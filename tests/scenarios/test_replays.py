@@ -10,9 +10,9 @@ sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
 
 from flyer_runs import run
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.parameters import parse_parameters
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.replay import Body, Line
 from handover.scenarios.reporting.replay_section import replay_section
 

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 from killed_run import end_between
 
+from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.command import main
@@ -17,7 +18,6 @@ from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Outcome
 from handover.scenarios.listing import print_summary
 from handover.scenarios.parameters import parse_parameters
-from handover.scenarios.record import Record
 from handover.scenarios.run_folder import RunFolder
 
 fcntl = pytest.importorskip("fcntl")

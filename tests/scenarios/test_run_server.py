@@ -17,11 +17,11 @@ from click.testing import CliRunner
 from crew_orders import bad_order, order
 from living import children, lives, until
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.run_row import row_of
 from handover.scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
 from handover.scenarios.command import main
-from handover.scenarios.record import Record
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.run_folder import RunFolder
 

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
+from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
 from handover.scenarios.command import main
-from handover.scenarios.record import Record
 
 
 def run(file: Path, *arguments: str | Path) -> Result:

@@ -12,7 +12,7 @@ import pytest
 from failing_systems import IN_TERMINAL, failing_ssp, start, wait_until
 from living import lives, until
 
-from handover.scenarios.record import Record
+from handover.cosim.record.reader import Record
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,6 +11,7 @@ import pytest
 
 from handover.cosim.exceptions import UnitRefused
 from handover.cosim.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Observer
 from handover.fmus.build import cached
@@ -18,7 +19,6 @@ from handover.scenarios.ended import Ended
 from handover.scenarios.experiment import Outcome
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.parameters import BadParameter, parse_parameters
-from handover.scenarios.record import Record
 from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task

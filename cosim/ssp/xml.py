@@ -1,8 +1,16 @@
-"""An XML file of an SSP, and what is wrong where in it."""
+"""Names of elements in an SSP's XML files, by the prefixes that the standard uses for their namespaces.
+
+An XML file of an SSP, and what is wrong where in it.
+
+Makes the XML files of an SSP.
+
+Elements have the standard's own prefixes in their names: libcosim knows elements by these, not by their namespaces.
+"""
 
 import functools
 import importlib
 import math
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +19,47 @@ import fmpy
 
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.fmu.xml import UnsafeXml, XmlElement, parse_xml
-from handover.cosim.ssp.namespaces import shortened, tag, told
+
+NAMESPACES = {
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "ssm": "http://ssp-standard.org/SSP1/SystemStructureParameterMapping",
+}
+"""The same in SSP 1.0 and 2.0."""
+
+STRUCTURE = "SystemStructure.ssd"
+"""What an SSP's archive has at its top."""
+
+STEP_ANNOTATION = "handover.communication"
+"""Type of the annotation of a component whose communication step is not the one that its FMU proposes."""
+
+_PREFIXES = {uri: prefix for prefix, uri in NAMESPACES.items()}
+
+
+def tag(name: str) -> str:
+    """Return an element's full name: `{http://...}System` for `ssd:System`."""
+    prefix, _, local = name.partition(":")
+    return f"{{{NAMESPACES[prefix]}}}{local}"
+
+
+def told(full: str) -> str:
+    """Return an element's short name: `ssd:System` for `{http://...}System`."""
+    uri, _, local = full.removeprefix("{").rpartition("}")
+    return f"{_PREFIXES[uri]}:{local}" if uri in _PREFIXES else local
+
+
+def shortened(message: str) -> str:
+    """Return a message in which full names of elements are short ones."""
+    for uri, prefix in _PREFIXES.items():
+        message = message.replace(f"{{{uri}}}", f"{prefix}:")
+    return message
+
+
+def local(full: str) -> str:
+    """Return an element's name without its namespace."""
+    return full.rpartition("}")[2]
+
 
 _etree: Any = importlib.import_module("lxml.etree")  # has no types, nor have its classes
 
@@ -121,3 +169,16 @@ def _schema_faults(content: bytes, wanted: str) -> list[str]:
     schema = _schema(wanted)
     schema.validate(_etree.fromstring(content, _etree.XMLParser(resolve_entities=False, no_network=True)))
     return [f"line {entry.line}: {shortened(str(entry.message))}" for entry in schema.error_log][:_MOST_TOLD]
+
+
+def root_element(name: str, version: str, called: str) -> ET.Element:
+    """Return a file's outermost element."""
+    prefix = name.partition(":")[0]
+    namespaces = {f"xmlns:{p}": NAMESPACES[p] for p in (prefix, "ssc")}
+    return ET.Element(name, {**namespaces, "version": version, "name": called, "generationTool": "handover"})
+
+
+def document(root: ET.Element) -> bytes:
+    """Return a file's content."""
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.record.record_block import RecordBlock
+from handover.cosim.record.tail import RecordBlock
 from handover.cosim.system.signals import Column
 
 _WIDE: dict[Any, Any] = {pa.float64(): np.float64, pa.int64(): np.int64, pa.uint64(): np.uint64, pa.bool_(): np.bool_}

@@ -7,7 +7,6 @@ from fractions import Fraction
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.ssp.archive import SspArchive
-from handover.cosim.ssp.namespaces import STEP_ANNOTATION, STRUCTURE, local, told
 from handover.cosim.ssp.parameter_set import (
     SspValue,
     mapped_values,
@@ -17,7 +16,6 @@ from handover.cosim.ssp.parameter_set import (
     read_units,
     unit_named,
 )
-from handover.cosim.ssp.part import SspPart
 from handover.cosim.ssp.structure import (
     SspComponent,
     SspConnection,
@@ -26,6 +24,7 @@ from handover.cosim.ssp.structure import (
     SspNestedSystem,
     SspStructure,
 )
+from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, SspPart, local, told
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"

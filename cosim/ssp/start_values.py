@@ -1,4 +1,7 @@
-"""Turns values as an SSP writes them into start values of a unit's ports."""
+"""Turns values as an SSP writes them into start values of a unit's ports.
+
+Linear changes of values one after another, and those that units need.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,10 +12,41 @@ import numpy as np
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.ssp.changes import applied, converted
 from handover.cosim.ssp.connected_ports import Entry, entry_names
 from handover.cosim.ssp.parameter_set import SspValue
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import Linear, conversion, pass_as_they_are
+
+
+def applied(change: Linear, number: float) -> float:
+    """Return a number after a change."""
+    return change.factor * number + change.offset
+
+
+def chained(first: Linear, following: Linear) -> Linear:
+    """Return the change that makes two, one after the other."""
+    return Linear(following.factor * first.factor, following.factor * first.offset + following.offset)
+
+
+def converted(source: Unit, target: Unit) -> Linear | None:
+    """Return what makes numbers in one unit numbers in another, None where they are alike or one is not told.
+
+    Raises:
+        ValueError: they differ in dimension, or one of two that differ in name is not defined.
+    """
+    if pass_as_they_are(source, target):
+        return None
+    if not (source.defined and target.defined):
+        undefined = (target if source.defined else source).symbol
+        told = f"{source.symbol!r} cannot be converted to {target.symbol!r}"
+        raise ValueError(f"{told}: the unit {undefined!r} is not defined")
+    if source.base != target.base:
+        raise ValueError(f"{source.symbol!r} cannot be converted to {target.symbol!r}: they differ in dimension")
+    try:
+        change = conversion(source, target)
+    except OverflowError:
+        raise ValueError(f"{source.symbol!r} is too large or too small to be converted to {target.symbol!r}") from None
+    return None if change.is_identity else change
+
 
 _TRUTHS = {"true": True, "1": True, "false": False, "0": False}
 

@@ -1,4 +1,7 @@
-"""Reads the signals of a run back, array by array: `record["arm.p_WG"]` is of shape (rows, 3)."""
+"""Reads the signals of a run back, array by array: `record["arm.p_WG"]` is of shape (rows, 3).
+
+The signals of a run that has ended, one instant at a time, as its watch saw them.
+"""
 
 import re
 from pathlib import Path
@@ -8,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest
+from handover.cosim.system.signals import Signals
 
 _SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
 
@@ -63,3 +67,32 @@ class Record:
 
     def _values(self, name: str) -> NDArray[Any]:
         return self._table.column(name).to_numpy()
+
+
+class RecordedSignals(Signals):
+    """Answers as the signals of the running system did at one row of its record, which holds no pictures and texts.
+
+    Attributes:
+        row: of the record.
+    """
+
+    def __init__(self, record: Record) -> None:
+        super().__init__({}, {}, owner=record)
+        self._record = record
+        self._arrays: dict[str, NDArray[Any]] = {}
+        self.row = 0
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return a copy of a signal's value in its shape.
+
+        Raises:
+            KeyError: it was not recorded.
+        """
+        if name not in self._arrays:
+            self._arrays[name] = self._record[name]
+        return np.array(self._arrays[name][self.row])
+
+    def text(self, name: str) -> str:
+        """Return the item's name of an enumeration."""
+        value = int(self[name])
+        return self._record.items(name).get(value, str(value))
