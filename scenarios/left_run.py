@@ -6,8 +6,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
-from handover.cosim.checkpoint import BadCheckpoint
 from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
+from handover.cosim.master.checkpoint import BadCheckpoint
 from handover.cosim.record.file_lock import FileLocked
 from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from handover.cosim.master.pacing import PaceReport
 from handover.cosim.stepping.options import Algorithm
-from handover.cosim.stepping.pacing import PaceReport
 
 
 def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:

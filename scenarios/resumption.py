@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
 from handover.cosim.exceptions import one_line
+from handover.cosim.master.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.experiment import Watch
 

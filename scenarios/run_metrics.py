@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import IterationCount
 from handover.scenarios.experiment import Experiment, Metric
 

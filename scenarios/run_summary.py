@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.scenarios.conversions import conversions_of
 from handover.scenarios.experiment import Metric, Outcome
 from handover.scenarios.resumption import Spent

@@ -3,11 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from handover.cosim.checkpoint import check_states, remove_checkpoint
-from handover.cosim.checkpointer import Checkpointer
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitHung
-from handover.cosim.master import Master
+from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import FromThenOn, Observer, Signals

@@ -1,18 +1,114 @@
-"""Turns what a coupling does at a communication point into a flat list of operations."""
+"""Turns what a coupling does at a communication point into a flat list of operations.
 
+Operations of a plan as `plan.h` lays them out, 72 bytes each.
+"""
+
+import ctypes
+import enum
+import struct
 from collections.abc import Callable, Sequence
 from ctypes import CDLL
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.fmu.buffers import Copy, OutputBuffer, SignalBuffer, Views
-from handover.cosim.plan import operations
+from handover.cosim.blocks.ports import Width
+from handover.cosim.fmu.buffers import Copy, NativeCall, OutputBuffer, SignalBuffer, Views
+from handover.cosim.fmu.calls import NativeStep
 from handover.cosim.plan.memory import KeptMemory, Segment
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.stepping.transfers import FiniteCheck, Narrowing
+from handover.cosim.system.conversion import Linear
 from handover.cosim.system.schedule import Schedule, Slot
+
+SIZE = 72
+_COPY, _CHECK, _ACCESS, _KEEP, _STEP, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", ""
+_TYPES = {
+    np.dtype(name): number
+    for number, name in enumerate(
+        ("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "float32", "float64")
+    )
+}
+
+
+class _Kind(enum.IntEnum):
+    COPY = 0
+    CONVERT = 1
+    SCALE = 2
+    FITS = 3
+    FINITE = 4
+    ACCESS_2 = 5
+    ACCESS_3 = 6
+    BINARIES_3 = 7
+    KEEP_BYTES = 8
+    KEEP_TEXTS = 9
+    STEP_2 = 10
+    STEP_3 = 11
+    START_CLOCK = 12
+    CHARGE = 13
+
+
+def copy(unit: int, target: NDArray[Any], source: NDArray[Any]) -> bytes:
+    """Copy numbers or addresses, which become numbers of the target's type."""
+    a, b = _TYPES[source.dtype], _TYPES[target.dtype]
+    kind, n = (_Kind.COPY, source.nbytes) if a == b else (_Kind.CONVERT, len(source))
+    return _packed(_COPY, kind, unit, target.ctypes.data, source.ctypes.data, n, b, a, 1.0, 0.0)
+
+
+def scale(unit: int, target: NDArray[Any], source: NDArray[Any], linear: Linear) -> bytes:
+    """Set reals to others times a factor plus an offset, each rounded once."""
+    types = _TYPES[target.dtype], _TYPES[source.dtype]
+    addresses = target.ctypes.data, source.ctypes.data
+    return _packed(_COPY, _Kind.SCALE, unit, *addresses, len(source), *types, linear.factor, linear.offset)
+
+
+def fits(unit: int, values: NDArray[Any], width: Width) -> bytes:
+    """Stop where an integer does not fit a width."""
+    where = values.ctypes.data, len(values), _TYPES[values.dtype]
+    return _packed(_CHECK, _Kind.FITS, unit, *where, int(width.lowest), int(width.highest))
+
+
+def finite(unit: int, values: NDArray[Any]) -> bytes:
+    """Stop where a real is infinite or not a number."""
+    return _packed(_CHECK, _Kind.FINITE, unit, values.ctypes.data, len(values), _TYPES[values.dtype], 0, 0)
+
+
+def access(unit: int, call: NativeCall, arrays: Views, code: int) -> bytes:
+    """Set or get variables from or to these arrays; `code` names the call in the heartbeat."""
+    is_binary = len(arrays) == 2
+    kind = _Kind.ACCESS_2 if call.fmi == 2 else _Kind.BINARIES_3 if is_binary else _Kind.ACCESS_3
+    fixed = call.function, call.component, ctypes.addressof(call.references), len(call.references)
+    sizes = arrays[1].ctypes.data if is_binary else 0
+    return _packed(_ACCESS, kind, unit, *fixed, arrays[0].ctypes.data, len(arrays[0]), sizes, code=code)
+
+
+def keep(unit: int, arrays: Views, kept: int) -> bytes:
+    """Copy binaries, or texts, which have no sizes, to the memory that the `Kept` at address `kept` hold."""
+    kind, sizes = (_Kind.KEEP_BYTES, arrays[1].ctypes.data) if len(arrays) == 2 else (_Kind.KEEP_TEXTS, 0)
+    return _packed(_KEEP, kind, unit, arrays[0].ctypes.data, sizes, len(arrays[0]), kept)
+
+
+def step(unit: int, call: NativeStep, dt: float, code: int) -> bytes:
+    """Let a unit step by dt; `code` names the call in the heartbeat."""
+    kind = _Kind.STEP_2 if call.fmi == 2 else _Kind.STEP_3
+    return _packed(_STEP, kind, unit, call.function, call.component, dt, *(call.flags or (0, 0, 0, 0)), code=code)
+
+
+def start_clock() -> bytes:
+    """Read the CPU clock."""
+    return _packed(_PLAIN, _Kind.START_CLOCK, 0)
+
+
+def charge(unit: int) -> bytes:
+    """Charge the CPU time since the clock was last read to a unit."""
+    return _packed(_PLAIN, _Kind.CHARGE, unit)
+
+
+def _packed(form: str, kind: _Kind, unit: int, *fields: Any, code: int = -1) -> bytes:
+    return struct.pack(f"@iiq{form}", kind, unit, code, *fields).ljust(SIZE, b"\0")
+
 
 Judge = Callable[[int, float], None]
 """Takes what an operation that stopped the plan answered, and when, and raises what the general path would."""
@@ -71,7 +167,7 @@ class PlanMaker:
 
     def _start_clock(self, phase: list[Segment]) -> None:
         if self.has_clock:
-            self._note(operations.start_clock())
+            self._note(start_clock())
             self._close(phase, ALWAYS, len(self._packed) - 1)
 
     def _close(self, phase: list[Segment], group: int, first: int) -> None:
@@ -89,12 +185,12 @@ class PlanMaker:
         unit, instance = self._units[slot.unit], self._ensemble.instances[slot.unit]
         feeding = self._ensemble.feeding(slot.unit)
         for n in feeding.narrowings:
-            self._note(operations.fits(unit, n.values, n.width), _judge_fit(n))
+            self._note(fits(unit, n.values, n.width), _judge_fit(n))
         copies, given = _without_copies(feeding.copies, instance.setters)
         for target, source in copies:
-            self._note(operations.copy(unit, target, source))
+            self._note(copy(unit, target, source))
         for scaled in feeding.scaled:
-            self._note(operations.scale(unit, scaled.target, scaled.source, scaled.linear))
+            self._note(scale(unit, scaled.target, scaled.source, scaled.linear))
         for buffer, arrays in zip(instance.setters, given, strict=True):
             self._access(slot.unit, buffer, arrays)
 
@@ -105,7 +201,7 @@ class PlanMaker:
             instance.judge_step(status)
 
         code = self._ensemble.heartbeat.code(slot.unit, f"fmi{instance.description.fmi}DoStep")
-        self._note(operations.step(self._units[slot.unit], instance.native_step, slot.period, code), judge)
+        self._note(step(self._units[slot.unit], instance.native_step, slot.period, code), judge)
 
     def _publish(self, slot: Slot) -> None:
         for buffer in self._ensemble.instances[slot.unit].getters:
@@ -114,14 +210,14 @@ class PlanMaker:
             if isinstance(buffer, OutputBuffer):
                 kept = KeptMemory(self.library, len(arrays[0]))
                 buffer.kept_elsewhere = kept
-                self._note(operations.keep(self._units[slot.unit], arrays, kept.address), _out_of_memory)
+                self._note(keep(self._units[slot.unit], arrays, kept.address), _out_of_memory)
         check = self._ensemble.finite_check(slot.unit)
         for block in check.blocks:
-            self._note(operations.finite(self._units[slot.unit], block), self._judge_numbers(slot.unit, check))
+            self._note(finite(self._units[slot.unit], block), self._judge_numbers(slot.unit, check))
 
     def _charge(self, slot: Slot) -> None:
         if self.has_clock:
-            self._note(operations.charge(self._units[slot.unit]))
+            self._note(charge(self._units[slot.unit]))
 
     def _access(self, unit: str, buffer: SignalBuffer, arrays: Views) -> None:
         instance = self._ensemble.instances[unit]
@@ -130,7 +226,7 @@ class PlanMaker:
             instance.judge(buffer.name, status)
 
         code = self._ensemble.heartbeat.code(unit, buffer.name)
-        self._note(operations.access(self._units[unit], buffer.native, arrays, code), judge)
+        self._note(access(self._units[unit], buffer.native, arrays, code), judge)
 
     def _judge_numbers(self, unit: str, check: FiniteCheck) -> Judge:
         instance = self._ensemble.instances[unit]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
 from handover.scenarios.chosen import fmus_of, replacements, scenario_named

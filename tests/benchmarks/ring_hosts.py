@@ -42,7 +42,7 @@ def handover(
     n: int, fmu: Path, folder: Path, recorded: bool = False, compiled: bool = True
 ) -> Generator[Ring, None, None]:
     """Give a ring in our master."""
-    from handover.cosim.master import Master
+    from handover.cosim.master.master import Master
     from handover.cosim.record.recorder import Recorder
     from handover.cosim.stepping.options import Algorithm, MasterOptions
     from handover.cosim.system.system import System

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.plants.grasp_objects import Thing

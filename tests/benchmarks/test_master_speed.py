@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import System
 

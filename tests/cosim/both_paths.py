@@ -7,7 +7,7 @@ from pathlib import Path
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import Algorithm, MasterOptions

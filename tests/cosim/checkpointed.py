@@ -6,9 +6,8 @@ from pathlib import Path
 
 from native_units import native_fmu
 
-from handover.cosim.checkpoint import read_checkpoint
-from handover.cosim.checkpointer import Checkpointer
-from handover.cosim.master import Master
+from handover.cosim.master.checkpoint import Checkpointer, read_checkpoint
+from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.cosim.system.system import System

@@ -9,7 +9,7 @@ from native_units import native_fmu
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

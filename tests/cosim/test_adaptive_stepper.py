@@ -8,9 +8,9 @@ import pytest
 from native_units import native_fmu
 from oscillator import PLAIN, STATES, STIFF
 
-from handover.cosim.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
 from handover.cosim.exceptions import BadOptions, ScheduleError
-from handover.cosim.master import Master
+from handover.cosim.master.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, StepTooSmall
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.step_control import StepStatistics

@@ -10,7 +10,7 @@ from native_units import native_fmu
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import ScheduleError, UnitRefused
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.initial_values import ChainedDerivatives
 from handover.cosim.stepping.iteration import NotConverged
 from handover.cosim.stepping.options import Algorithm, MasterOptions

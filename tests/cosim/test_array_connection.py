@@ -8,7 +8,7 @@ from native_units import native_fmu
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.event_instance import EventInstance
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

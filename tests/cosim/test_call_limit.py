@@ -11,7 +11,7 @@ from endless_blocks import GO_ON
 from native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import AdaptiveStep, MasterOptions

@@ -8,7 +8,7 @@ import pytest
 from called import Called
 from checkpointed import oscillator
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 
 START = {

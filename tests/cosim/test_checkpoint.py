@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from native_units import native_fmu
 
-from handover.cosim.checkpoint import (
+from handover.cosim.master.checkpoint import (
     BadCheckpoint,
     Checkpoint,
     StateNotSaved,
@@ -23,7 +23,7 @@ from handover.cosim.checkpoint import (
     take_checkpoint,
     write_checkpoint,
 )
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.record.stream import complete_record

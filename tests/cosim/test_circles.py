@@ -10,7 +10,7 @@ from two_masses import TwoMasses
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import NotConverged
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Observer

@@ -9,7 +9,7 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import WiringError
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.stepping.transfers import ScaledCopy
 from handover.cosim.system.conversion import Linear

@@ -8,7 +8,7 @@ from seen import grid, seen
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import StepDiscarded
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
 

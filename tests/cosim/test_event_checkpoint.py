@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.checkpoint import Checkpoint, take_checkpoint
-from handover.cosim.master import Master
+from handover.cosim.master.checkpoint import Checkpoint, take_checkpoint
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

@@ -7,7 +7,7 @@ from native_units import native_fmu
 from seen import grid, seen
 
 from handover.cosim.fmu.failures import UnitEnded, UnsettledEvents
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.event_iteration import MOST_ITERATIONS
 from handover.cosim.system.system import System
 

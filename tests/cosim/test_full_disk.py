@@ -7,7 +7,7 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.record.stream import RecordStream

@@ -9,7 +9,7 @@ from called import Called, fed_by
 from native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from two_masses import SIGNALS, Floats, TwoMasses
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.system import System
 

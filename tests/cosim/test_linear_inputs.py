@@ -9,7 +9,7 @@ import pytest
 from native_units import native_fmu
 from oscillator import PLAIN, STATES
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.extrapolation import Trace
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.conversion import Linear

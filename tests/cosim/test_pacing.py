@@ -6,9 +6,9 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import BadOptions
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
+from handover.cosim.master.pacing import Pacer, PaceReport
 from handover.cosim.stepping.options import MasterOptions
-from handover.cosim.stepping.pacing import Pacer, PaceReport
 from handover.cosim.system.system import System
 
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.native_libraries import CompilationError
 from handover.cosim.plan import choice, memory
 from handover.cosim.plan.plan_stepper import PlanStepper

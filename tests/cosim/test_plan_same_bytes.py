@@ -9,7 +9,7 @@ from fmu_of import FmuOf
 from native_units import native_fmu
 
 from handover.cosim.fmu.buffers import SignalBuffer
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.conversion import Linear
 from handover.cosim.system.system import System

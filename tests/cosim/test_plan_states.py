@@ -6,7 +6,7 @@ import pytest
 from fmu_of import FmuOf
 from native_units import native_fmu
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.stepper import GridStepper, Stepper
 from handover.cosim.system.conversion import Linear

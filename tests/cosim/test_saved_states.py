@@ -10,7 +10,7 @@ from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, MasterOptions
 from handover.cosim.system.system import System
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ssp_of import component, connection, connectors, described, pack_ssp, system
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block

@@ -14,7 +14,7 @@ from fmu_of import FmuOf
 from ssp_schemas import expect_valid
 
 from handover.cosim.exceptions import NotExportable, WiringError
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.conversion import Linear

@@ -21,7 +21,7 @@ from handover.cosim.fmu.failures import (
     UnitFatal,
     UnitHung,
 )
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import MasterOptions

@@ -7,7 +7,7 @@ import pytest
 
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.watchdog import Watchdog
+from handover.cosim.master.watchdog import Watchdog
 
 
 class Unit:

@@ -8,7 +8,7 @@ from typing import Any
 
 from reference import Record
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals

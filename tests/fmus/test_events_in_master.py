@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 from workshop import Workshop
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

@@ -9,7 +9,7 @@ from sample_units.trouble import Deed
 from workshop import Workshop
 
 from handover.cosim.exceptions import UnitRefused
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
 
 BLOCK = "every_kind:EveryKind"

@@ -14,7 +14,7 @@ from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from fmpy.validation import validate_fmu
 
 from handover.cosim.fmu.description import describe_fmu, indices_of
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block, cached
 from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance

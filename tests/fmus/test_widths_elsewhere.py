@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 from workshop import Workshop
 
 from handover.cosim.exceptions import UnitRefused, WiringError
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.system import System
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System

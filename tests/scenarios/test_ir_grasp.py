@@ -10,7 +10,7 @@ import pytest
 
 from handover.controllers.ir_reflex import Phase, Stop
 from handover.controllers.reflex_parameters import Strategy
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.exceptions import UnitRefused
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Observer

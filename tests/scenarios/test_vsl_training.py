@@ -21,7 +21,7 @@ from handover.controllers.vsl_model_text import parse_model, read_model
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import write_archive
-from handover.cosim.master import Master
+from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block, cached

@@ -9,19 +9,19 @@ from typing import TypeVar
 from handover.cosim.exceptions import UnitFailure, UnitRefused
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.method import Method
+from handover.cosim.master.method import Method
+from handover.cosim.master.pacing import Pacer
+from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
 from handover.cosim.stepping.ensemble import Endings, Ensemble
 from handover.cosim.stepping.gauss_seidel import GaussSeidel
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import MasterOptions
-from handover.cosim.stepping.pacing import Pacer
 from handover.cosim.stepping.step_control import StepStatistics
 from handover.cosim.stepping.stepper import Coupling, Stepper
 from handover.cosim.system.signals import Observer, Signals
 from handover.cosim.system.system import System
-from handover.cosim.watchdog import Watchdog
 
 T = TypeVar("T")
 
