@@ -25,7 +25,7 @@ class UnknownBlock(LookupError):
 
     def __init__(self, path: str, fault: str) -> None:
         super().__init__(
-            f"{path!r} is not the path of a block, such as 'handover.plants.tendon_arm:TendonArm': {fault}"
+            f"{path!r} is not the path of a block, such as 'handover.plants.helix.tendon_arm:TendonArm': {fault}"
         )
         self.path, self.fault = path, fault
 
@@ -53,18 +53,20 @@ class Entry:
 _ENTRIES = (
     Entry(
         "TendonArm",
-        "handover.plants.tendon_arm:TendonArm",
+        "handover.plants.helix.tendon_arm:TendonArm",
         Fraction(1, 50),
         "tendon-driven soft arm with a gripper",
-        ("handover.plants.tendon_chain",),
+        ("handover.plants.helix.tendon_chain",),
     ),
     Entry(
         "HandoverPartner",
-        "handover.plants.handover_partner:HandoverPartner",
+        "handover.plants.helix.handover_partner:HandoverPartner",
         Fraction(1, 50),
         "hand that offers a ball",
     ),
-    Entry("StereoCamera", "handover.plants.stereo_camera:StereoCamera", Fraction(1, 30), "pictures of two cameras"),
+    Entry(
+        "StereoCamera", "handover.plants.helix.stereo_camera:StereoCamera", Fraction(1, 30), "pictures of two cameras"
+    ),
     Entry(
         "HandoverVision",
         "handover.controllers.handover_vision:HandoverVision",
@@ -79,7 +81,7 @@ _ENTRIES = (
     ),
     Entry(
         "VslArm",
-        "handover.plants.vsl_arm:VslArm",
+        "handover.plants.vsl.arm:VslArm",
         Fraction(1, 50),
         "arm with links whose stiffness follows their pressure",
     ),
@@ -95,12 +97,22 @@ _ENTRIES = (
         Fraction(1, 50),
         "rigid-link kinematics, corrected by what was learned",
     ),
-    Entry("FreeFlyer", "handover.plants.free_flyer:FreeFlyer", Fraction(2, 125), "free-flying robot with a fixed arm"),
-    Entry("Thrusters", "handover.plants.thrusters:Thrusters", Fraction(2, 125), "its propulsion, with limits and lag"),
-    Entry("Push", "handover.plants.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"),
+    Entry(
+        "FreeFlyer",
+        "handover.plants.free_flyer.free_flyer:FreeFlyer",
+        Fraction(2, 125),
+        "free-flying robot with a fixed arm",
+    ),
+    Entry(
+        "Thrusters",
+        "handover.plants.free_flyer.thrusters:Thrusters",
+        Fraction(2, 125),
+        "its propulsion, with limits and lag",
+    ),
+    Entry("Push", "handover.plants.free_flyer.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"),
     Entry(
         "HandAndObject",
-        "handover.plants.hand_and_object:HandAndObject",
+        "handover.plants.free_flyer.hand_and_object:HandAndObject",
         Fraction(2, 125),
         "hand that takes and gives an object in microgravity",
     ),
@@ -125,7 +137,10 @@ _ENTRIES = (
         "decides when to fly, yield, signal, hold and let go",
     ),
     Entry(
-        "GraspScene", "handover.plants.grasp_scene:GraspScene", Fraction(3, 200), "soft hand, object, table, IR sensors"
+        "GraspScene",
+        "handover.plants.ir_grasp.scene:GraspScene",
+        Fraction(3, 200),
+        "soft hand, object, table, IR sensors",
     ),
     Entry(
         "IrReflex", "handover.controllers.ir_reflex:IrReflex", Fraction(3, 200), "corrects a grasp by infrared reflexes"
@@ -147,7 +162,7 @@ def find_unit(name: str) -> Entry:
 
 
 def import_block(path: str) -> type[Any]:
-    """Return the class that a path such as `handover.plants.tendon_arm:TendonArm` names.
+    """Return the class that a path such as `handover.plants.helix.tendon_arm:TendonArm` names.
 
     Raises:
         UnknownBlock: the module has no such class.

@@ -36,7 +36,7 @@ class Carried:
     """What goes into an FMU.
 
     Attributes:
-        files: sources by their path in the FMU, such as `handover/plants/tendon_arm.py`.
+        files: sources by their path in the FMU, such as `handover/plants/helix/tendon_arm.py`.
         modules: top-level modules of the environment that they import, sorted.
     """
 
@@ -64,7 +64,7 @@ def closure(block: str) -> Carried:
     """Follow the imports of a block's module.
 
     Args:
-        block: path of the block's class, such as `handover.plants.tendon_arm:TendonArm`.
+        block: path of the block's class, such as `handover.plants.helix.tendon_arm:TendonArm`.
 
     Raises:
         UnknownBlock: its module cannot be found, or is not Python source.

@@ -8,11 +8,9 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.gripper_figure import gripper
-from handover.plants.hand_figure import hand
-from handover.plants.limb import Limb
-from handover.plants.stereo_camera import Params as CameraParams
-from handover.plants.tendon_parameters import Params as ArmParams
+from handover.plants.helix.shapes import Limb, gripper, hand
+from handover.plants.helix.stereo_camera import Params as CameraParams
+from handover.plants.helix.tendon_design import Params as ArmParams
 from handover.scenarios.helix_handover.rig import camera_of
 from handover.scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
 from handover.scenarios.reporting.replay import Body, Line, Replay

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from handover.controllers.reflex_parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.grasp_hand import FINGERS, finger_points, palm_outline, sensor_rays
-from handover.plants.grasp_objects import outlines
+from handover.plants.ir_grasp.hand import FINGERS, finger_points, palm_outline, sensor_rays
+from handover.plants.ir_grasp.objects import outlines
 from handover.scenarios.experiment import Figure
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import FINGER_NAMES, closing_cost, cost, in_sight

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from handover.controllers.reflex_parameters import Strategy
 from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.units import Metre, Radian
-from handover.plants.grasp_objects import Thing
+from handover.plants.ir_grasp.objects import Thing
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,8 @@ import numpy as np
 from handover.controllers.reflex_parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.grasp_hand import FINGERS, PALM, finger_points, sensor_rays
-from handover.plants.grasp_objects import outlines
+from handover.plants.ir_grasp.hand import FINGERS, PALM, finger_points, sensor_rays
+from handover.plants.ir_grasp.objects import outlines
 from handover.scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import FINGER_NAMES

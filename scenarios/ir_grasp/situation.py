@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.grasp_hand import PALM
-from handover.plants.grasp_objects import SOLIDS, Thing, outlines
+from handover.plants.ir_grasp.hand import PALM
+from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
 from handover.scenarios.ir_grasp.parameters import Parameters
 
 _PALM_FRONT = max(x for x, _ in PALM)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from handover.plants.grasp_objects import Thing
+from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.experiment import Figure

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.controllers.reflex_parameters import Strategy
-from handover.plants.grasp_objects import Thing
+from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.paper import paper_values

@@ -9,7 +9,7 @@ from handover.controllers.vsl_kinematics import place
 from handover.controllers.vsl_path import segments_of
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
-from handover.plants.vsl_parameters import HIGHEST_PRESSURE, Link, Motion
+from handover.plants.vsl.parameters import HIGHEST_PRESSURE, Link, Motion
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ import numpy as np
 from handover.controllers.vsl_path import segments_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.vsl_parameters import Params as ArmParams
+from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.reporting.meshes import ball, prism
 from handover.scenarios.reporting.replay import Body, Line, Replay
 from handover.scenarios.vsl.parameters import Parameters

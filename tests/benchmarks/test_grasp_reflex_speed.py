@@ -13,7 +13,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
-from handover.plants.grasp_objects import Thing
+from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.plants.grasp_objects import Thing
-from handover.plants.grasp_parameters import Params
-from handover.plants.grasp_scene import GraspScene, Inputs
+from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.parameters import Params
+from handover.plants.ir_grasp.scene import GraspScene, Inputs
 
 STEP, SECONDS = 0.015, 6.0
 

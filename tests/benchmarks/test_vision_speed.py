@@ -14,8 +14,8 @@ from handover.controllers.handover_vision import HandoverVision, Outputs, Params
 from handover.controllers.handover_vision import Inputs as Pictures
 from handover.cosim.blocks.geometry import quaternion_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.stereo_camera import Inputs, StereoCamera
-from handover.plants.stereo_camera import Params as CameraParams
+from handover.plants.helix.stereo_camera import Inputs, StereoCamera
+from handover.plants.helix.stereo_camera import Params as CameraParams
 
 R_WB = np.diag([1.0, -1.0, -1.0])
 NAMES = ("ball", "wrist", "gripper")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.plants.vsl_arm import Inputs, VslArm
-from handover.plants.vsl_parameters import Motion, Params
+from handover.plants.vsl.arm import Inputs, VslArm
+from handover.plants.vsl.parameters import Motion, Params
 
 
 def inputs(steps: int) -> list[Inputs]:

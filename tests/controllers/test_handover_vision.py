@@ -9,9 +9,9 @@ from handover.controllers.handover_vision import HandoverVision, Inputs, Outputs
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import UnusableCalibration, quaternion_of
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
-from handover.plants.stereo_camera import Inputs as Scene
-from handover.plants.stereo_camera import Params as CameraParams
-from handover.plants.stereo_camera import StereoCamera
+from handover.plants.helix.stereo_camera import Inputs as Scene
+from handover.plants.helix.stereo_camera import Params as CameraParams
+from handover.plants.helix.stereo_camera import StereoCamera
 
 R_WB = np.diag([1.0, -1.0, -1.0])
 PLACES = {"front": 0.0, "front-left": 45.0, "left": 90.0, "back-left": 135.0}  # deg from +x to +y

@@ -14,12 +14,12 @@ from handover.controllers.pose_controller import Inputs, Outputs, Params, PoseCo
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer import FreeFlyer
-from handover.plants.free_flyer import Inputs as FlyerInputs
-from handover.plants.free_flyer import Params as FlyerParams
-from handover.plants.thrusters import Inputs as ThrusterInputs
-from handover.plants.thrusters import Params as ThrusterParams
-from handover.plants.thrusters import Thrusters
+from handover.plants.free_flyer.free_flyer import FreeFlyer
+from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
+from handover.plants.free_flyer.free_flyer import Params as FlyerParams
+from handover.plants.free_flyer.thrusters import Inputs as ThrusterInputs
+from handover.plants.free_flyer.thrusters import Params as ThrusterParams
+from handover.plants.free_flyer.thrusters import Thrusters
 
 T = 0.016
 MASS, INERTIA = 9.584, np.array([0.1534, 0.1427, 0.1623])

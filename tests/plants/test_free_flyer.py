@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
-from handover.plants.rigid_body import TurnsTooFast
+from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
+from handover.plants.free_flyer.rigid_body import TurnsTooFast
 
 KNOWING = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
 SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])

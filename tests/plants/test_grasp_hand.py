@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.grasp_hand import FINGERS, JOINTS, PALM, SENSOR_PLACE, finger_points, palm_outline, sensor_rays
-from handover.plants.grasp_tendon import GEARS, PULLEYS, STIFFNESS, resting_posture, taken_up
+from handover.plants.ir_grasp.hand import (
+    FINGERS,
+    JOINTS,
+    PALM,
+    SENSOR_PLACE,
+    finger_points,
+    palm_outline,
+    sensor_rays,
+)
+from handover.plants.ir_grasp.world import GEARS, PULLEYS, STIFFNESS, resting_posture, taken_up
 
 BENT = np.array([0.3, 0.5, 0.2, 0.4, 0.1, 0.6, 0.2, 0.3])
 ORIGIN = np.zeros(2)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.grasp_objects import SOLIDS, Disc, Slab, Solid, Thing, outlines
+from handover.plants.ir_grasp.objects import SOLIDS, Disc, Slab, Solid, Thing, outlines
 
 
 def met_of_polygons(thing: Thing, start: tuple[float, float], heading: float) -> float | None:

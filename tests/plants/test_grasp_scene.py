@@ -8,12 +8,11 @@ import pytest
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.grasp_hand import FINGERS, JOINTS, finger_points, sensor_rays
-from handover.plants.grasp_objects import SOLIDS, Thing
-from handover.plants.grasp_parameters import SEES_NOTHING, Params, UnusableScene
-from handover.plants.grasp_scene import GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
-from handover.plants.grasp_tendon import PULLEYS, STIFFNESS, resting_posture
-from handover.plants.grasp_world import DT, GraspWorld, beginning
+from handover.plants.ir_grasp.hand import FINGERS, JOINTS, finger_points, sensor_rays
+from handover.plants.ir_grasp.objects import SOLIDS, Thing
+from handover.plants.ir_grasp.parameters import SEES_NOTHING, Params, UnusableScene
+from handover.plants.ir_grasp.scene import GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
+from handover.plants.ir_grasp.world import DT, PULLEYS, STIFFNESS, GraspWorld, beginning, resting_posture
 
 STEP = 0.015
 AROUND = Params(p_WH_0=np.array([-0.13, 0.0]), sigma_0=0.1)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.description import describe
-from handover.plants.grasp_objects import Thing
-from handover.plants.grasp_parameters import Params
-from handover.plants.grasp_scene import GraspScene, Inputs, Outputs
+from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.parameters import Params
+from handover.plants.ir_grasp.scene import GraspScene, Inputs, Outputs
 
 STEP, STEPS = 0.015, 260
 PARAMS = {
@@ -112,7 +112,7 @@ def test_continues_bit_for_bit_in_another_process(thing: Thing, steps: int):
 
 def test_a_world_made_anew_goes_on_nearly_as_before(monkeypatch: pytest.MonkeyPatch):
     def end(checkpoint: int) -> Outputs:
-        monkeypatch.setattr("handover.plants.grasp_scene._CHECKPOINT", checkpoint)
+        monkeypatch.setattr("handover.plants.ir_grasp.scene._CHECKPOINT", checkpoint)
         scene = GraspScene(PARAMS[Thing.CYLINDER])
         return [scene.step(k * STEP, STEP, command(k)) for k in range(130)][-1]
 

@@ -8,11 +8,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer import FreeFlyer
-from handover.plants.free_flyer import Inputs as FlyerInputs
-from handover.plants.free_flyer import Outputs as FlyerOutputs
-from handover.plants.free_flyer import Params as FlyerParams
-from handover.plants.hand_and_object import HandAndObject, Holder, Inputs, Motion, Outputs, Params, StartHolder
+from handover.plants.free_flyer.free_flyer import FreeFlyer
+from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
+from handover.plants.free_flyer.free_flyer import Outputs as FlyerOutputs
+from handover.plants.free_flyer.free_flyer import Params as FlyerParams
+from handover.plants.free_flyer.hand_and_object import (
+    HandAndObject,
+    Holder,
+    Inputs,
+    Motion,
+    Outputs,
+    Params,
+    StartHolder,
+)
 
 FLYER = FlyerParams(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
 STILL = Params(motion=Motion.NONE, tremor_rms=0.0, drift_rms=0.0, p_WO_0=np.zeros(3))

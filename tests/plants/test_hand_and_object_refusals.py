@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.hand_and_object import HandAndObject, Inputs, Motion, Params, StartHolder, UnusableHand
+from handover.plants.free_flyer.hand_and_object import (
+    HandAndObject,
+    Inputs,
+    Motion,
+    Params,
+    StartHolder,
+    UnusableHand,
+)
 
 
 def begun(p_WG: Floats, **changes: Any) -> None:

@@ -7,10 +7,17 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.handover_partner import HandoverPartner, Holder, Inputs, Outputs, Params, UnusablePartner
-from handover.plants.tendon_arm import Inputs as ArmInputs
-from handover.plants.tendon_arm import TendonArm
-from handover.plants.tendon_parameters import Params as ArmParams
+from handover.plants.helix.handover_partner import (
+    HandoverPartner,
+    Holder,
+    Inputs,
+    Outputs,
+    Params,
+    UnusablePartner,
+)
+from handover.plants.helix.tendon_arm import Inputs as ArmInputs
+from handover.plants.helix.tendon_arm import TendonArm
+from handover.plants.helix.tendon_design import Params as ArmParams
 
 STILL = Params(tremor_rms=0.0, drift_rms=0.0)
 AT_BALL = np.array([0.17, 0.01, -0.59])

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.plants.infrared_sensor import InfraredSensor, UnusableSensor
+from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, UnusableSensor
 
 USUAL = {
     "a": 0.062,

@@ -12,7 +12,7 @@ from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
-from handover.plants.push import Axis, Inputs, Params, Push
+from handover.plants.free_flyer.push import Axis, Inputs, Params, Push
 
 PULSE = Params(axis=Axis.Z, force=5.0, torque=-3.0, start=0.105, duration=0.05)
 
@@ -57,8 +57,8 @@ def built(folder: Path, path: str, fmi: int) -> Path:
 def test_a_robot_gets_the_whole_impulse_in_any_order(folder: Path, algorithm: Algorithm, push_first: bool):
     system = System()
     files = {
-        "push": built(folder, "handover.plants.push:Push", 3),
-        "robot": built(folder, "handover.plants.free_flyer:FreeFlyer", 3),
+        "push": built(folder, "handover.plants.free_flyer.push:Push", 3),
+        "robot": built(folder, "handover.plants.free_flyer.free_flyer:FreeFlyer", 3),
     }
     starts: dict[str, dict[str, Any]] = {"push": {"start": 0.0, "duration": 0.05}, "robot": {}}
     names = ["push", "robot"] if push_first else ["robot", "push"]
@@ -78,7 +78,7 @@ def test_a_robot_gets_the_whole_impulse_in_any_order(folder: Path, algorithm: Al
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_unit_without_inputs_is_valid_and_runs_elsewhere(folder: Path, fmi: int):
-    file = built(folder, "handover.plants.push:Push", fmi)
+    file = built(folder, "handover.plants.free_flyer.push:Push", fmi)
     assert validate_fmu(str(file)) == []
     result = fmpy.simulate_fmu(str(file), stop_time=1.6, output_interval=0.016, start_values={"start": 0.805})
     f = result["f_G[1]"] if fmi == 2 else result["f_G"][:, 0]

@@ -9,8 +9,8 @@ import pytest
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import Pinhole, UnusableCalibration
-from handover.plants.sketch import Pixels
-from handover.plants.stereo_camera import BadCover, Inputs, Params, StereoCamera
+from handover.plants.helix.shapes import Pixels
+from handover.plants.helix.stereo_camera import BadCover, Inputs, Params, StereoCamera
 
 HOUSE = Path(__file__).parents[2]
 FAR = np.array([0.3, 1.5, -1.2])  # out of both pictures

@@ -2,9 +2,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.tendon_design import TendonDesign
-from handover.plants.tendon_parameters import Params
-from handover.plants.tendon_tangent import TendonTangent
+from handover.plants.helix.tendon_chain import TendonTangent
+from handover.plants.helix.tendon_design import Params, TendonDesign
 
 
 def energy(design: TendonDesign, p: Floats, R: Floats, L0: Floats) -> float:

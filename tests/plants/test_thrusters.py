@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.thrusters import Inputs, Outputs, Params, Thrusters
+from handover.plants.free_flyer.thrusters import Inputs, Outputs, Params, Thrusters
 
 DT = 0.016
 

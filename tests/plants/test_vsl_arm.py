@@ -8,11 +8,11 @@ import pytest
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.vsl_arm import Inputs as ArmInputs
-from handover.plants.vsl_arm import Outputs as ArmOutputs
-from handover.plants.vsl_arm import UnusableInput, VslArm
-from handover.plants.vsl_parameters import Link, Motion, Params, UnusableVslArm
-from handover.plants.vsl_statics import NoEquilibrium
+from handover.plants.vsl.arm import Inputs as ArmInputs
+from handover.plants.vsl.arm import Outputs as ArmOutputs
+from handover.plants.vsl.arm import UnusableInput, VslArm
+from handover.plants.vsl.parameters import Link, Motion, Params, UnusableVslArm
+from handover.plants.vsl.statics import NoEquilibrium
 
 EXACT = Params(servo_noise=0.0, current_noise=0.0, tracker_noise=0.0, pressure_noise=0.0)
 PRINTED = replace(EXACT, link_2=Link.RIGID, link_3=Link.RIGID)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.vsl_chain import Pose, VslChain
-from handover.plants.vsl_dynamics import NoConvergence, VslDynamics
-from handover.plants.vsl_parameters import Link, Motion, Params
-from handover.plants.vsl_statics import VslStatics
+from handover.plants.vsl.chain import Pose, VslChain
+from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
+from handover.plants.vsl.parameters import Link, Motion, Params
+from handover.plants.vsl.statics import VslStatics
 
 OUTSTRETCHED = (0.47588225, -0.95176450)
 """Stiff arm at (0.4, 0, 0.15) m, elbow up."""

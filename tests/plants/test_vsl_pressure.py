@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.plants.vsl_pressure import PressureLine
+from handover.plants.vsl.actuators import PressureLine
 
 
 def line(p: float, leak_time: float = 600.0) -> PressureLine:

@@ -1,6 +1,6 @@
 import pytest
 
-from handover.plants.vsl_servo import VslServo
+from handover.plants.vsl.actuators import VslServo
 
 
 def servo() -> VslServo:

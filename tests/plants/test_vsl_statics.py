@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.plants.vsl_chain import Pose, VslChain
-from handover.plants.vsl_parameters import Link, Params
-from handover.plants.vsl_statics import NoEquilibrium, VslStatics
+from handover.plants.vsl.chain import Pose, VslChain
+from handover.plants.vsl.parameters import Link, Params
+from handover.plants.vsl.statics import NoEquilibrium, VslStatics
 
 STIFF = 1e11
 ONE_LINK = Params(

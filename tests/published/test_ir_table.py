@@ -9,7 +9,7 @@ import pytest
 import tomli
 from grasp_table import grasp_table
 
-from handover.plants.grasp_objects import Thing
+from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.published.claim import Claim, Verdict

@@ -1,6 +1,6 @@
 """An arm that fails while it runs, to see what a run makes of it."""
 
-from handover.plants.tendon_arm import Inputs, Outputs, TendonArm
+from handover.plants.helix.tendon_arm import Inputs, Outputs, TendonArm
 
 
 class FailingArm(TendonArm):

@@ -13,10 +13,10 @@ from handover.controllers.flyer_handover_parameters import Params as DecisionPar
 from handover.controllers.impedance_controller import Behaviour
 from handover.controllers.impedance_controller import Params as ImpedanceParams
 from handover.controllers.pose_controller import Params as PoseParams
-from handover.plants.flyer_hand_parameters import Params as PersonParams
-from handover.plants.free_flyer import Params as RobotParams
-from handover.plants.push import Params as PushParams
-from handover.plants.thrusters import Params as ThrustersParams
+from handover.plants.free_flyer.free_flyer import Params as RobotParams
+from handover.plants.free_flyer.parameters import Params as PersonParams
+from handover.plants.free_flyer.push import Params as PushParams
+from handover.plants.free_flyer.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
 from handover.scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
 from handover.scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters

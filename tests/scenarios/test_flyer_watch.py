@@ -10,7 +10,7 @@ from handover.controllers.handover_state_machine import HandoverPhase as Phase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
-from handover.plants.hand_and_object import Holder
+from handover.plants.free_flyer.hand_and_object import Holder
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch
 

@@ -10,8 +10,8 @@ from origins import assert_every_default_has_its_origin
 
 import handover.scenarios.ir_grasp
 from handover.controllers.reflex_parameters import Params as ReflexParams
-from handover.plants.grasp_objects import Thing
-from handover.plants.grasp_parameters import Params as SceneParams
+from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.parameters import Params as SceneParams
 from handover.scenarios.ir_grasp.parameters import Parameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]

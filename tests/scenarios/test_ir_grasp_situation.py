@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from handover.controllers.reflex_parameters import Strategy
-from handover.plants.grasp_hand import PALM
-from handover.plants.grasp_objects import Thing, outlines
+from handover.plants.ir_grasp.hand import PALM
+from handover.plants.ir_grasp.objects import Thing, outlines
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.situation import Situation
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from own_crew import OwnCrew
 
-from handover.plants.grasp_objects import Thing
+from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign import carry_out_campaign
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_table import CampaignTable

@@ -9,9 +9,9 @@ import tomli
 
 import handover.scenarios.helix_handover
 from handover.controllers.servo_parameters import Params as ServoParams
-from handover.plants.handover_partner import Params as HandParams
-from handover.plants.stereo_camera import Params as CameraParams
-from handover.plants.tendon_parameters import Params as ArmParams
+from handover.plants.helix.handover_partner import Params as HandParams
+from handover.plants.helix.stereo_camera import Params as CameraParams
+from handover.plants.helix.tendon_design import Params as ArmParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix_handover.parameters import Parameters, Place, Tuning
 from handover.scenarios.helix_handover.rig import calibration

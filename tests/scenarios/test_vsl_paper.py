@@ -17,7 +17,7 @@ from handover.controllers.vsl_path import Path, QuarterArc, segments_of
 from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
-from handover.plants.vsl_parameters import Params as ArmParams
+from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios import vsl_training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl_train_command import vsl_train

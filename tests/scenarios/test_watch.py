@@ -8,7 +8,7 @@ from handover.controllers.visual_servo import Phase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
-from handover.plants.handover_partner import Holder
+from handover.plants.helix.handover_partner import Holder
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.rig import camera_of
 from handover.scenarios.helix_handover.watch import HandoverWatch

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from handover.plants.vsl_arm import Inputs, Outputs, VslArm
+from handover.plants.vsl.arm import Inputs, Outputs, VslArm
 
 
 class BreakingArm(VslArm):

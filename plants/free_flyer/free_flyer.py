@@ -1,0 +1,217 @@
+"""A free-flying robot in microgravity whose arm is fixed: one rigid body, after [Fernandes2020] sec. 4.1."""
+
+import math
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.plain_rotation import Triple, triple, turned
+from handover.cosim.blocks.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.units import (
+    Kilogram,
+    KilogramMetre2,
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonMetre,
+    Number,
+    Radian,
+    RadianPerSecond,
+    Second,
+)
+from handover.plants.free_flyer.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
+from handover.plants.free_flyer.rotations import matrix_of, quaternion
+
+_HALF_A_TURN = math.pi
+
+
+class UnusableFlyer(Refusal):
+    """Parameters that no rigid body has; `faults` lists all of them."""
+
+    block = "FreeFlyer"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """The robot, where it starts, and how well it knows where it is.
+
+    Mass and inertia are the published ones of NASA's Astrobee; the arm's length and the noise are assumed.
+    """
+
+    mass: Kilogram = parameter(9.584, "mass of the robot", minimum=0.1, maximum=1000.0)
+    I_B: Matrix3[KilogramMetre2] = parameter(
+        np.diag([0.1534, 0.1427, 0.1623]), "inertia about the centre of mass", minimum=-100.0, maximum=100.0
+    )
+    p_BG: Vector3[Metre] = parameter(
+        np.array([-0.30, 0.0, 0.0]), "the gripper seen from the centre of mass", minimum=-5.0, maximum=5.0
+    )
+    p_WB_0: Vector3[Metre] = parameter(np.array([0.30, -0.07, 0.0]), "position of the centre of mass at the start")
+    q_WB_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation at the start, a unit quaternion")
+    v_WB_0: Vector3[MetrePerSecond] = parameter(np.zeros(3), "velocity at the start", minimum=-10.0, maximum=10.0)
+    w_WB_0: Vector3[RadianPerSecond] = parameter(
+        np.zeros(3), "angular velocity at the start, in the world", minimum=-100.0, maximum=100.0
+    )
+    substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
+    turn: Radian = parameter(0.004, "largest turn in a step of the integration", minimum=1e-4, maximum=1.0)
+    position_noise: Metre = parameter(0.001, "deviation of the estimated position, an axis", minimum=0.0, maximum=1.0)
+    attitude_noise: Radian = parameter(0.002, "deviation of the estimated attitude, an axis", minimum=0.0, maximum=0.5)
+    velocity_noise: MetrePerSecond = parameter(
+        0.001, "deviation of the estimated velocity, an axis", minimum=0.0, maximum=1.0
+    )
+    rate_noise: RadianPerSecond = parameter(
+        0.002, "deviation of the estimated angular velocity, an axis", minimum=0.0, maximum=1.0
+    )
+    seed: int = parameter(0, "seed of the random numbers", minimum=0)
+
+    def check(self) -> None:
+        """Raise UnusableFlyer, with all faults, if no rigid body has these values."""
+        faults = inertia_faults(self.mass, self.I_B) + unit_faults("q_WB_0", self.q_WB_0)
+        if faults:
+            raise UnusableFlyer(faults)
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """What pushes the robot."""
+
+    f_B: Vector3[Newton] = port(np.zeros(3), "force of the propulsion at the centre of mass, in the robot's frame")
+    tau_B: Vector3[NewtonMetre] = port(np.zeros(3), "torque of the propulsion, in the robot's frame")
+    f_G: Vector3[Newton] = port(np.zeros(3), "force on the gripper, acting at G, in the world")
+    tau_G: Vector3[NewtonMetre] = port(np.zeros(3), "torque on the gripper, in the world")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """Where the robot is and how it moves, in the world: the truth, and what its navigation makes of it."""
+
+    p_WB: Vector3[Metre] = output("position of the centre of mass")
+    q_WB: Vector4[Number] = output("orientation")
+    v_WB: Vector3[MetrePerSecond] = output("velocity of the centre of mass")
+    w_WB: Vector3[RadianPerSecond] = output("angular velocity")
+    p_WG: Vector3[Metre] = output("position of the gripper")
+    q_WG: Vector4[Number] = output("orientation of the gripper, the robot's own")
+    v_WG: Vector3[MetrePerSecond] = output("velocity of the gripper")
+    p_WB_meas: Vector3[Metre] = output("estimated position of the centre of mass")
+    q_WB_meas: Vector4[Number] = output("estimated orientation")
+    v_WB_meas: Vector3[MetrePerSecond] = output("estimated velocity of the centre of mass")
+    w_WB_meas: Vector3[RadianPerSecond] = output("estimated angular velocity")
+
+
+class FreeFlyer:
+    """Moves as one rigid body (`RigidBody`): m v' = R f_B + f_G, L' = R tau_B + (R p_BG) x f_G + tau_G.
+
+    [Fernandes2020] eqs. (3.18)-(3.24) with the arm's joints fixed, eq. (4.1), in place of its Euler angles a unit
+    quaternion whose sign is continuous. During a step the propulsion is held in the robot's frame and the wrench on the
+    gripper in the world; steps are cut into equal parts of at most `substep`, in which the robot turns by at most
+    `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
+
+    The navigation's estimate is the truth plus white Gaussian noise, drawn once a step; the attitude's is a small turn
+    in the robot's frame.
+
+    Raises:
+        UnusableFlyer: by the constructor, for an inertia that no rigid body has or a quaternion that is not unit.
+        TurnsTooFast: by `step`, where the robot turns by more than half a turn in it.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: Params) -> None:
+        params.check()
+        self._substep, self._turn = params.substep, params.turn
+        q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
+        places = [triple(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
+        p_BG, p_WB, v_WB, w_WB = places
+        self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
+        deviations = (params.position_noise, 0.5 * params.attitude_noise, params.velocity_noise, params.rate_noise)
+        self._deviations = np.repeat(np.array(deviations, dtype=np.float64), 3)
+        self._rng = np.random.default_rng(params.seed)
+        self._noise: list[float] = []
+        self._draw()
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return where the robot is; no time passes."""
+        return self._told()
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Advance from t by dt with u held."""
+        wrench = triple(u.f_B), triple(u.tau_B), triple(u.f_G), triple(u.tau_G)
+        h = dt / (count := self._substeps(dt))
+        advance = self._body.advance
+        for _ in range(count):
+            advance(h, *wrench)
+        self._draw()
+        return self._told()
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        b = self._body
+        return pickle.dumps((b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this robot or of one with equal parameters."""
+        b = self._body
+        b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state = pickle.loads(state)
+
+    def _substeps(self, dt: float) -> int:
+        rate = math.hypot(*self._body.w)
+        if not rate * dt < _HALF_A_TURN:
+            raise TurnsTooFast(rate, dt)
+        return max(1, math.ceil(dt / self._substep - 1e-6), math.ceil(rate * dt / self._turn))
+
+    def _draw(self) -> None:
+        self._noise = (self._deviations * self._rng.standard_normal(12)).tolist()
+
+    def _told(self) -> Outputs:
+        """Return the outputs as pieces of one array, which costs less than an array each."""
+        b = self._body
+        w = b.w
+        a = np.array([*b.p, *b.q, *b.v, *w, *self._gripper(w), *self._estimate(w)])
+        return Outputs(
+            p_WB=a[0:3],
+            q_WB=a[3:7],
+            v_WB=a[7:10],
+            w_WB=a[10:13],
+            p_WG=a[13:16],
+            q_WG=a[3:7],
+            v_WG=a[16:19],
+            p_WB_meas=a[19:22],
+            q_WB_meas=a[22:26],
+            v_WB_meas=a[26:29],
+            w_WB_meas=a[29:32],
+        )
+
+    def _gripper(self, w: Triple) -> tuple[float, float, float, float, float, float]:
+        """Return p_WG and v_WG = v_WB + w_WB x p_BG."""
+        b = self._body
+        x, y, z = turned(matrix_of(b.q), b.p_BG)
+        (px, py, pz), (vx, vy, vz), (wx, wy, wz) = b.p, b.v, w
+        return px + x, py + y, pz + z, vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
+
+    def _estimate(self, w: Triple) -> list[float]:
+        """Return estimated position, orientation, velocity and angular velocity."""
+        b = self._body
+        px, py, pz, hx, hy, hz, vx, vy, vz, wx, wy, wz = self._noise
+        (bpx, bpy, bpz), (bvx, bvy, bvz), (bwx, bwy, bwz) = b.p, b.v, w
+        a, i, j, k = b.q
+        n = 1.0 / math.sqrt(1.0 + hx * hx + hy * hy + hz * hz)  # q (1, half the turn), brought to norm 1
+        return [
+            bpx + px,
+            bpy + py,
+            bpz + pz,
+            n * (a - i * hx - j * hy - k * hz),
+            n * (i + a * hx + j * hz - k * hy),
+            n * (j + a * hy + k * hx - i * hz),
+            n * (k + a * hz + i * hy - j * hx),
+            bvx + vx,
+            bvy + vy,
+            bvz + vz,
+            bwx + wx,
+            bwy + wy,
+            bwz + wz,
+        ]

@@ -1,0 +1,236 @@
+"""A person's hand at the end of a compliant arm: on its course, on the object that it holds, or against a palm.
+
+The gripper of a free-flyer: two fingers that close along z of G around an object, and a palm behind them.
+"""
+
+import pickle
+
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Quaternion,
+    Rows,
+    Triple,
+    cross,
+    inverse,
+    norm,
+    product,
+    triple,
+    turned,
+    turned_back,
+)
+from handover.plants.free_flyer.attachment import Attachment, Frame, Palm, Stiffness
+from handover.plants.free_flyer.parameters import Params
+from handover.plants.free_flyer.rigid_body import RigidBody
+from handover.plants.free_flyer.rotations import IDENTITY, along, between, matrix_of, minus, plus
+from handover.plants.hand_tremor import HandTremor
+
+_SPARE = 0.1
+"""Metres beyond its reach at which an arm loses what the hand holds."""
+
+
+class FlyerHand:
+    """The hand H. Its course, where the arm wants it, is the person's plus tremor.
+
+    What the hand holds, it holds fast: the compliance is the arm's, between course and object (`Attachment`), and gives
+    in at arm_force_max; what it gave in, it takes back with the time constant recovery_time. A fist on the palm of a
+    gripper is kept off it, by the depth that its course has in the palm, and presses with the arm's stiffness and
+    damping times depth and speed, at most arm_force_max.
+    """
+
+    def __init__(self, params: Params, p: Triple, q: Quaternion) -> None:
+        self._p = params
+        self._arm = Stiffness(
+            params.arm_stiffness,
+            params.arm_damping,
+            params.arm_force_max,
+            params.wrist_stiffness,
+            params.wrist_damping,
+            params.wrist_torque_max,
+        )
+        self._tremor = HandTremor(
+            params.tremor_rms,
+            params.tremor_frequency,
+            params.tremor_bandwidth,
+            params.drift_rms,
+            params.drift_time,
+            params.seed,
+        )
+        self._shake, self._rest, self._led = ZERO, p, p
+        self.p, self.q = p, q
+        self.p_OH, self.q_OH = triple(params.p_OH), IDENTITY
+        self.course = Frame(p, q)
+        self.hold: Attachment | None = None
+
+    @property
+    def calm(self) -> Triple:
+        """Where the hand is, without its tremor."""
+        return minus(self.p, self._shake)
+
+    def move(self, dt: float, p: Triple, q: Quaternion) -> Frame:
+        """Return the course at the end of a step that leads to a pose, without tremor, where nothing is in the way."""
+        self._recover(dt)
+        self._tremor.advance(dt)
+        self._shake = triple(self._tremor.displacement)
+        led, self._led = self._led, plus(p, self._shake)
+        return _led(dt, led, self._led, q)
+
+    def press(self, dt: float, course: Frame, G: Frame) -> tuple[Frame, Triple, Triple]:
+        """Return the course of a fist as the palm lets it, its force on the gripper, and where it acts, seen from G."""
+        p = self._p
+        arm = minus(course.p, G.p)
+        x, y, z = turned_back(G.R, arm)
+        depth, aside = x + p.fist_radius - p.palm_depth, max(abs(y), abs(z))
+        if not 0.0 < depth < 2.0 * p.fist_radius + _SPARE or aside > p.palm_width + p.fist_radius:
+            return course, ZERO, ZERO
+        n = (G.R[0], G.R[3], G.R[6])
+        v = minus(course.v, plus(G.v, cross(G.w, arm)))
+        push = p.arm_stiffness * depth + p.arm_damping * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2])
+        push = min(max(push, 0.0), p.arm_force_max)
+        kept_off = _led(dt, self.course.p, along(course.p, -depth, n), course.q)
+        return kept_off, along(ZERO, push, n), along(arm, p.fist_radius - depth, n)
+
+    def take_or_leave(self, wants: bool, body: RigidBody) -> None:
+        """Take hold of an object where the hand is, or let it go; an arm that is stretched too far loses it."""
+        if wants and self.hold is None:
+            R = matrix_of(body.q)
+            self.p_OH = turned_back(R, minus(self.p, body.p))
+            self.q_OH = product(inverse(body.q), self.q)
+            F = self.course
+            place, turn = turned_back(F.R, minus(self.p, F.p)), product(inverse(F.q), body.q)
+            self.hold = Attachment(self._arm, self.p_OH, place, turn)
+        elif self.hold is not None:
+            stretched = norm(minus(self.p, self._rest)) > self._p.arm_reach + _SPARE
+            if not wants or stretched:
+                self.hold = None
+
+    def _recover(self, dt: float) -> None:
+        """Draw what the hand holds back to its course, from where the arm gave in."""
+        hold = self.hold
+        if hold is not None:
+            left = max(0.0, 1.0 - dt / self._p.recovery_time)
+            hold.place = along(ZERO, left, hold.place)
+            hold.turn = between(inverse(self.q_OH), hold.turn, left)
+
+    def arrive(self, course: Frame, body: RigidBody) -> None:
+        """Be where the object is that the hand holds, or on the course."""
+        self.course = course
+        if self.hold is None:
+            self.p, self.q = course.p, course.q
+        else:
+            self.p = plus(body.p, turned(matrix_of(body.q), self.p_OH))
+            self.q = product(body.q, self.q_OH)
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        h, c = self.hold, self.course
+        hold = None if h is None else (h.r, h.place, h.turn)
+        places = (self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH)
+        return pickle.dumps((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this hand or of one with equal parameters."""
+        tremor, hold, course, places = pickle.loads(state)
+        self._tremor.set_state(tremor)
+        self.hold = None if hold is None else Attachment(self._arm, *hold)
+        self.course = Frame(*course)
+        self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH = places
+
+
+def _led(dt: float, before: Triple, p: Triple, q: Quaternion) -> Frame:
+    return Frame(p, q, ((p[0] - before[0]) / dt, (p[1] - before[1]) / dt, (p[2] - before[2]) / dt))
+
+
+_NEAR = 0.02
+"""Metres in front of the palm within which an object may come to touch it in a step."""
+
+
+class FlyerGripper:
+    """Follows the closure at a limited rate, and holds an object that is between its fingers when they get to it.
+
+    The gripper opens towards -x of G. The object's centre line, its long axis y, is within reach of the fingers where
+    its point nearest to G is at most capture_axial and capture_lateral away along x and z of G, and G at most
+    capture_end beyond its end. An object that is held keeps the pose that it had when the fingers closed, drawn to the
+    fingers' middle in x and z with the time constant centring_time, until the fingers have opened by release_angle or
+    it slides out of their reach.
+    """
+
+    def __init__(self, params: Params) -> None:
+        self._p = p = params
+        self._half = 0.5 * float(p.object_size[1])
+        self._thick = 0.5 * float(p.object_size[0])
+        self.stiffness = Stiffness(
+            p.grip_stiffness,
+            p.grip_damping,
+            p.grip_force_max,
+            p.grip_turn_stiffness,
+            p.grip_turn_damping,
+            p.grip_torque_max,
+        )
+        self._angle_object = p.angle_object
+        self.angle = p.angle_0
+        self.grip: Attachment | None = None
+
+    def act(self, dt: float, closure: float, G: Frame, body: RigidBody) -> None:
+        """Move the fingers for dt towards a closure from 0, open, to 1; take hold or let go."""
+        p = self._p
+        target = p.angle_open + min(max(closure, 0.0), 1.0) * (p.angle_empty - p.angle_open)
+        before, most = self.angle, p.gripper_rate * dt
+        after = before + min(max(target - before, -most), most)
+        if self.grip is None:
+            if after <= self._angle_object < before:
+                self.grip = self._grasp(G, body)
+        elif after > self._angle_object + p.release_angle or not self._reaches(G, body):
+            self.grip = None
+        if self.grip is not None:
+            after = max(after, self._angle_object)
+            x, y, z = self.grip.place
+            left = max(0.0, 1.0 - dt / p.centring_time)
+            self.grip.place = (left * x, y, left * z)
+        self.angle = after
+
+    def palm(self, G: Frame, body: RigidBody) -> Palm | None:
+        """Return the palm for an object that is near it, none for one that is elsewhere or in the grip."""
+        p = self._p
+        if self.grip is not None or max(abs(a - b) for a, b in zip(body.p, G.p, strict=True)) > 2.0 * self._half:
+            return None
+        R = matrix_of(body.q)
+        s, (x, y, z) = self._nearest(G, body, R)
+        depth = x + self._thick - p.palm_depth
+        if not -_NEAR < depth < 2.0 * self._thick or abs(y) > p.palm_width or abs(z) > p.palm_width:
+            return None
+        n_W = (-G.R[0], -G.R[3], -G.R[6])
+        n = turned_back(R, n_W)
+        t = self._thick
+        r = (-t * n[0], s - t * n[1], -t * n[2])
+        p_GP = (x + t, y, z)
+        v = plus(G.v, cross(G.w, turned(G.R, p_GP)))
+        speed = v[0] * n_W[0] + v[1] * n_W[1] + v[2] * n_W[2]
+        return Palm(r, n, speed, depth, p.palm_stiffness, p.palm_damping)
+
+    def touches(self, G: Frame, body: RigidBody) -> bool:
+        """Return whether an object is in the palm."""
+        palm = self.palm(G, body)
+        return palm is not None and palm.depth > 0.0
+
+    def crushes(self, G: Frame, body: RigidBody) -> bool:
+        """Return whether an object is between fingers that are closed further than it is thick."""
+        return self.angle < self._angle_object and self._reaches(G, body)
+
+    def _reaches(self, G: Frame, body: RigidBody) -> bool:
+        p, (_, (x, y, z)) = self._p, self._nearest(G, body, matrix_of(body.q))
+        return abs(x) <= p.capture_axial and abs(y) <= p.capture_end and abs(z) <= p.capture_lateral
+
+    def _grasp(self, G: Frame, body: RigidBody) -> Attachment | None:
+        """Return a grip of the object as it is, none if it is out of the fingers' reach."""
+        if not self._reaches(G, body):
+            return None
+        s, place = self._nearest(G, body, matrix_of(body.q))
+        return Attachment(self.stiffness, (0.0, s, 0.0), place, product(inverse(G.q), body.q))
+
+    def _nearest(self, G: Frame, body: RigidBody, R: Rows) -> tuple[float, Triple]:
+        """Return where on the centre line the point nearest to G lies, seen from the centre, and the point in G."""
+        axis = (R[1], R[4], R[7])
+        d = minus(G.p, body.p)
+        s = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
+        s = min(max(s, -self._half), self._half)
+        return s, turned_back(G.R, (s * axis[0] - d[0], s * axis[1] - d[1], s * axis[2] - d[2]))

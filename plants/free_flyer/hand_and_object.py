@@ -1,0 +1,259 @@
+"""Hand, object and grip between a person and a free-flyer in microgravity, after [Fernandes2020] secs. 3.1-3.2, 4.3."""
+
+import enum
+import math
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.plain_rotation import ZERO, Triple, cross, norm, triple, turned
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector14, output, port
+from handover.cosim.blocks.units import (
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonMetre,
+    Number,
+    Radian,
+    RadianPerSecond,
+)
+from handover.plants.free_flyer.attachment import Attachment, Frame
+from handover.plants.free_flyer.floating_object import FloatingObject
+from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
+from handover.plants.free_flyer.parameters import Motion, Params, StartHolder, UnusableHand
+from handover.plants.free_flyer.person import Activity, FlyerPerson, Seen, minimum_jerk
+from handover.plants.free_flyer.rotations import along, between, matrix_of, minus, plus, quaternion, unit
+
+__all__ = [
+    "Activity",
+    "HandAndObject",
+    "Holder",
+    "Inputs",
+    "Motion",
+    "Outputs",
+    "Params",
+    "StartHolder",
+    "UnusableHand",
+]
+
+_THUMB = [1.0, 0.8]
+_FINGER = [1.2, 1.4, 1.0]
+_CLOSED: Floats = np.array(_THUMB + 4 * _FINGER)
+"""Angles of the closed fingers' joints, in rad, assumed: thumb, index, middle, ring, little, each from its base."""
+
+
+class Holder(enum.IntEnum):
+    """Who holds the object."""
+
+    FREE = 0
+    GRIPPER = 1
+    HAND = 2
+    BOTH = 3
+
+
+_HOLDERS = {
+    (False, False): Holder.FREE,
+    (True, False): Holder.GRIPPER,
+    (False, True): Holder.HAND,
+    (True, True): Holder.BOTH,
+}
+"""By whether the gripper and whether the hand holds it."""
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """What the robot does; its gripper's place in the default wiring's start."""
+
+    p_WG: Vector3[Metre] = port(np.array([0.0, -0.07, 0.0]), "position of the gripper in the world")
+    q_WG: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper in the world")
+    v_WG: Vector3[MetrePerSecond] = port(np.zeros(3), "velocity of the gripper in the world")
+    w_WB: Vector3[RadianPerSecond] = port(np.zeros(3), "angular velocity of the robot in the world")
+    closure: Number = port(0.0, "closure commanded to the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)
+    light: bool = port(False, "the robot's signal light is on")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """What the gripper feels, where object and hand are, in the world, and who holds the object."""
+
+    f_G: Vector3[Newton] = output("force on the gripper at G, mean over the step")
+    tau_G: Vector3[NewtonMetre] = output("torque on the gripper about G, mean over the step")
+    p_WO: Vector3[Metre] = output("position of the object's centre")
+    q_WO: Vector4[Number] = output("orientation of the object")
+    v_WO: Vector3[MetrePerSecond] = output("velocity of the object's centre")
+    p_WH: Vector3[Metre] = output("position of the middle of the palm of the hand")
+    q_WH: Vector4[Number] = output("orientation of the hand, along the object's axes when it holds it as offered")
+    finger: Vector14[Radian] = output("angles of the joints: thumb 2, then 3 of each finger, each from its base")
+    gripper_angle: Radian = output("angle between the gripper's fingers")
+    holder: Holder = output("who holds the object")
+    activity: Activity = output("what the person does")
+    f_H: Vector3[Newton] = output("force on the hand, mean over the step")
+
+
+class HandAndObject:
+    """A person's hand and the object that a free-flyer gives or takes, joined by springs in one unit.
+
+    - `FloatingObject`: a rigid box of 0.1 kg in microgravity. `FlyerGripper` holds it by a stiff spring in all six
+      directions that slides at its limits, or has it pressed against its palm. A hand that holds it is joined to its
+      course by the arm's and wrist's springs, which give in at the force that a person cares to exert (`FlyerHand`).
+    - `FlyerPerson` moves the hand's course and decides when the fingers close; `HandTremor` is added to the course. A
+      fist pushes the palm by the arm's spring.
+
+    One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
+    gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
+    system this unit comes after the robot; the gripper is led from the last step's pose to this one's, and its wrench
+    acts on the robot in the next step.
+
+    Raises:
+        UnusableHand: by the constructor, for parameters that contradict each other; by the first step, if the gripper
+            starts in the hand or has the free object in its palm or its closed fingers.
+        TurnsTooFast: see `RigidBody`.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: Params) -> None:
+        params.check()
+        self._p = params
+        self._person = FlyerPerson(params)
+        self._hand = FlyerHand(params, self._person.p, self._person.q)
+        self._gripper = FlyerGripper(params)
+        self._object = FloatingObject(params.object_mass, triple(params.object_size))
+        self._robot: Frame | None = None
+        self._f_G, self._tau_G, self._f_H = ZERO, ZERO, ZERO
+        body = self._object.body
+        if params.object_with is StartHolder.HAND:
+            body.q = self._hand.q
+            body.p = minus(self._hand.p, turned(matrix_of(body.q), self._hand.p_OH))
+            self._hand.take_or_leave(True, body)
+        else:
+            body.p = triple(params.p_WO_0)
+            body.q = unit(quaternion(params.q_WO_0))
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return where everything is; no time passes."""
+        return self._told()
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Advance from t by dt with u held."""
+        G = Frame(triple(u.p_WG), quaternion(u.q_WG), triple(u.v_WG), triple(u.w_WB))
+        if self._robot is None:
+            self._refuse_overlap(G)
+        before, body, person, hand = self._robot or G, self._object.body, self._person, self._hand
+        person.act(dt, self._seen(u.light, before))
+        self._gripper.act(dt, u.closure, before, body)
+        hand.take_or_leave(person.holding, body)
+        course, f_fist, p_GF = hand.move(dt, person.p, person.q), ZERO, ZERO
+        if person.pushes_with_fist:
+            course, f_fist, p_GF = hand.press(dt, course, G)
+        self._meet(dt, before, G, course)
+        self._f_G, self._tau_G = plus(self._f_G, f_fist), plus(self._tau_G, cross(p_GF, f_fist))
+        self._f_H = minus(self._f_H, f_fist)
+        hand.arrive(course, body)
+        self._robot = G
+        return self._told()
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        b, grip, G = self._object.body, self._gripper.grip, self._robot
+        parts = (self._person.get_state(), self._hand.get_state(), self._gripper.angle)
+        held = None if grip is None else (grip.r, grip.place, grip.turn)
+        robot = None if G is None else (G.p, G.q, G.v, G.w)
+        return pickle.dumps(((b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H)))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this unit or of one with equal parameters."""
+        b = self._object.body
+        (b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H) = pickle.loads(state)
+        person, hand, self._gripper.angle = parts
+        self._person.set_state(person)
+        self._hand.set_state(hand)
+        self._gripper.grip = None if held is None else Attachment(self._gripper.stiffness, *held)
+        self._robot = None if robot is None else Frame(*robot)
+
+    def _refuse_overlap(self, G: Frame) -> None:
+        p, faults = self._p, list[str]()
+        apart = norm(minus(self._hand.p, G.p))
+        if apart < p.fist_radius + p.palm_width:
+            faults.append(f"the hand starts in the gripper, {apart:.3g} m from G; p_WH_0 must be farther away")
+        if self._gripper.touches(G, self._object.body):
+            faults.append("the object starts in the gripper's palm; move p_WO_0 or the robot's start")
+        if self._gripper.crushes(G, self._object.body):
+            faults.append(
+                f"the object starts between fingers that are closed further than it is thick: angle_0 {p.angle_0:g} "
+                f"rad; open them to {p.angle_object:.3g} rad at least, or move p_WO_0 or the robot's start"
+            )
+        if faults:
+            raise UnusableHand(faults)
+
+    def _seen(self, light: bool, G: Frame) -> Seen:
+        b, hand = self._object.body, self._hand
+        return Seen(
+            light=light,
+            angle=self._gripper.angle,
+            G=G,
+            O=Frame(b.p, b.q),
+            gripped=self._gripper.grip is not None,
+            held=hand.hold is not None,
+            p_WH=hand.calm,
+            q_WH=hand.q,
+            p_OH=hand.p_OH,
+            q_OH=hand.q_OH,
+        )
+
+    def _meet(self, dt: float, before: Frame, after: Frame, course: Frame) -> None:
+        """Let object, gripper and hand act on each other for dt; find their mean wrenches."""
+        count = max(1, math.ceil(dt / self._p.substep - 1e-6))
+        f_G, tau_G, f_H, body = ZERO, ZERO, ZERO, self._object.body
+        grip, hold = self._gripper.grip, self._hand.hold
+        for i in range(1, count + 1):
+            last, s = i == count, i / count
+            gripper = after if last else _between(before, after, s)
+            arm = course if last else _between(self._hand.course, course, s)
+            held = [(a, F) for a, F in ((grip, gripper), (hold, arm)) if a is not None]
+            palm = self._gripper.palm(gripper, body)
+            R, p_GO = matrix_of(body.q), minus(body.p, gripper.p)
+            wrenches, push = self._object.advance(dt / count, held, palm)
+            if palm is not None:
+                f_G, tau_G = _added(f_G, tau_G, push, ZERO, plus(p_GO, turned(R, palm.r)))
+            for (a, _), (f, tau) in zip(held, wrenches, strict=True):
+                if a is grip:
+                    f_G, tau_G = _added(f_G, tau_G, f, tau, plus(p_GO, turned(R, a.r)))
+                else:
+                    f_H = minus(f_H, f)
+        s = 1.0 / count
+        self._f_G, self._tau_G, self._f_H = along(ZERO, s, f_G), along(ZERO, s, tau_G), along(ZERO, s, f_H)
+
+    def _told(self) -> Outputs:
+        """Return the outputs as pieces of one array, which costs less than an array each."""
+        b, hand = self._object.body, self._hand
+        a = np.array([*self._f_G, *self._tau_G, *b.p, *b.q, *b.v, *hand.p, *hand.q, *self._f_H])
+        return Outputs(
+            f_G=a[0:3],
+            tau_G=a[3:6],
+            p_WO=a[6:9],
+            q_WO=a[9:13],
+            v_WO=a[13:16],
+            p_WH=a[16:19],
+            q_WH=a[19:23],
+            finger=minimum_jerk(self._person.fingers) * _CLOSED,
+            gripper_angle=self._gripper.angle,
+            holder=_HOLDERS[self._gripper.grip is not None, hand.hold is not None],
+            activity=self._person.activity,
+            f_H=a[23:26],
+        )
+
+
+def _added(f: Triple, tau: Triple, f_O: Triple, tau_O: Triple, arm: Triple) -> tuple[Triple, Triple]:
+    """Return a wrench on the gripper with the reaction to one on the object added, which acts at `arm` from G."""
+    return minus(f, f_O), minus(minus(tau, tau_O), cross(arm, f_O))
+
+
+def _between(a: Frame, b: Frame, s: float) -> Frame:
+    p, v, w = (along(x, s, minus(y, x)) for x, y in ((a.p, b.p), (a.v, b.v), (a.w, b.w)))
+    return Frame(p, between(a.q, b.q, s), v, w)

@@ -1,0 +1,215 @@
+"""Parameters of the person, the object and the gripper that meet in microgravity."""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.blocks.units import (
+    Hertz,
+    Kilogram,
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonMetre,
+    NewtonMetrePerRadian,
+    NewtonMetreSecondPerRadian,
+    NewtonPerMetre,
+    NewtonSecondPerMetre,
+    Number,
+    Radian,
+    RadianPerSecond,
+    Second,
+)
+from handover.plants.free_flyer.rigid_body import unit_faults
+
+LEAST_ROOM = 0.05
+"""Metres that must lie between the gripper's and the hand's place on an object for both to hold it."""
+
+
+class UnusableHand(Refusal):
+    """Parameters, or a start, that contradict each other; `faults` lists all of them."""
+
+    block = "HandAndObject"
+
+
+class Motion(enum.IntEnum):
+    """What the person does at the robot's signal."""
+
+    NONE = 0
+    TAKE = 1
+    GIVE = 2
+    PUSH = 3
+
+
+class StartHolder(enum.IntEnum):
+    """Who has the object at the start."""
+
+    FREE = 0
+    HAND = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Object: [Fernandes2020] sec. 4.1.2, its sides in metres. All other values are assumed.
+
+    The object lies across the gripper, its long side along y: that makes the handover place (0, -0.07, 0) of
+    [Fernandes2020] the place of an end of an object whose centre is in the world's origin.
+    """
+
+    motion: Motion = parameter(Motion.TAKE, "what the person does at the robot's first signal")
+    motion_again: Motion = parameter(Motion.GIVE, "what the person does at each later signal")
+    object_with: StartHolder = parameter(StartHolder.FREE, "who has the object at the start")
+    p_WO_0: Vector3[Metre] = parameter(np.array([-0.10, -0.57, 0.0]), "where a free object is at the start")
+    q_WO_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of a free object at the start")
+    p_WH_0: Vector3[Metre] = parameter(np.array([-0.40, 0.10, -0.05]), "where the hand rests")
+    q_WH_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the hand where it rests")
+    arm_reach: Metre = parameter(0.90, "how far from its rest the hand goes", minimum=0.05, maximum=5.0)
+
+    object_mass: Kilogram = parameter(0.1, "mass of the object", minimum=0.001, maximum=100.0)
+    object_size: Vector3[Metre] = parameter(
+        np.array([0.021, 0.195, 0.017]), "sides of the object, a box", minimum=0.001, maximum=1.0
+    )
+    p_OG: Vector3[Metre] = parameter(np.array([0.0, -0.07, 0.0]), "where the person offers the object to the gripper")
+    p_OH: Vector3[Metre] = parameter(np.array([0.0, 0.07, 0.0]), "where the hand takes hold of the object")
+
+    reaction_time: Second = parameter(0.35, "mean time from seeing to acting", minimum=0.0, maximum=10.0)
+    reaction_spread: Number = parameter(0.15, "its deviation, relative", minimum=0.0, maximum=0.3)
+    reach_speed: MetrePerSecond = parameter(0.40, "highest speed of a reach", minimum=0.01, maximum=3.0)
+    grasp_time: Second = parameter(0.40, "how long the fingers close or open", minimum=0.01, maximum=10.0)
+    pull_direction: Vector3[Number] = parameter(np.array([-0.25, 0.0, 1.0]), "direction of a pull, in the world")
+    pull_speed: MetrePerSecond = parameter(0.15, "speed of a pull", minimum=0.001, maximum=3.0)
+    pull_ramp: Second = parameter(0.60, "how long it takes to get to that speed", minimum=0.01, maximum=10.0)
+    pull_distance: Metre = parameter(0.30, "longest pull", minimum=0.0, maximum=2.0)
+    push_speed: MetrePerSecond = parameter(0.08, "speed of a push against the palm", minimum=0.001, maximum=3.0)
+    push_ramp: Second = parameter(0.30, "how long it takes to get to that speed", minimum=0.01, maximum=10.0)
+    push_distance: Metre = parameter(0.30, "longest push, with the way to the palm", minimum=0.0, maximum=2.0)
+    offer_gap: Metre = parameter(0.04, "how far before the palm a push begins", minimum=0.0, maximum=0.5)
+    patience: Second = parameter(10.0, "how long the person pulls or pushes in vain", minimum=0.1, maximum=1e4)
+
+    arm_stiffness: NewtonPerMetre = parameter(120.0, "stiffness of the arm", minimum=1.0, maximum=5000.0)
+    arm_damping: NewtonSecondPerMetre = parameter(12.0, "damping of the arm", minimum=0.0, maximum=200.0)
+    arm_force_max: Newton = parameter(2.0, "force at which the arm gives in", minimum=0.1, maximum=200.0)
+    wrist_stiffness: NewtonMetrePerRadian = parameter(2.5, "stiffness of the wrist", minimum=0.01, maximum=200.0)
+    wrist_damping: NewtonMetreSecondPerRadian = parameter(0.20, "damping of the wrist", minimum=0.0, maximum=10.0)
+    wrist_torque_max: NewtonMetre = parameter(0.6, "torque at which the wrist gives in", minimum=0.01, maximum=50.0)
+    recovery_time: Second = parameter(1.0, "how long an arm takes back what it gave in", minimum=0.05, maximum=1e6)
+    fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2)
+    fist_offset: Metre = parameter(-0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3)
+
+    grip_stiffness: NewtonPerMetre = parameter(800.0, "stiffness of the grip", minimum=1.0, maximum=1e5)
+    grip_damping: NewtonSecondPerMetre = parameter(8.0, "damping of the grip", minimum=0.0, maximum=1000.0)
+    grip_force_max: Newton = parameter(5.0, "force at which the object slides", minimum=0.01, maximum=1000.0)
+    grip_turn_stiffness: NewtonMetrePerRadian = parameter(4.0, "its turning stiffness", minimum=0.01, maximum=1e4)
+    grip_turn_damping: NewtonMetreSecondPerRadian = parameter(0.04, "its turning damping", minimum=0.0, maximum=100.0)
+    grip_torque_max: NewtonMetre = parameter(0.4, "torque at which it turns in the grip", minimum=0.001, maximum=100.0)
+    centring_time: Second = parameter(0.5, "how long the grip takes to centre", minimum=0.01, maximum=100.0)
+    palm_stiffness: NewtonPerMetre = parameter(600.0, "stiffness of the palm", minimum=1.0, maximum=1e5)
+    palm_damping: NewtonSecondPerMetre = parameter(6.0, "damping of the palm", minimum=0.0, maximum=1000.0)
+    palm_depth: Metre = parameter(0.03, "how far the palm lies behind G", minimum=0.001, maximum=0.5)
+    palm_width: Metre = parameter(0.04, "half the width of the palm", minimum=0.001, maximum=0.5)
+    capture_axial: Metre = parameter(0.03, "how far along x of G the fingers reach", minimum=0.001, maximum=0.2)
+    capture_lateral: Metre = parameter(0.02, "how far along z of G they reach", minimum=0.001, maximum=0.2)
+    capture_end: Metre = parameter(0.01, "how far beyond an object's end G may be", minimum=0.0, maximum=0.1)
+    angle_open: Radian = parameter(1.20, "angle of the open gripper", minimum=0.0, maximum=3.0)
+    angle_empty: Radian = parameter(0.60, "angle of the gripper closed on nothing", minimum=0.0, maximum=3.0)
+    angle_0: Radian = parameter(1.20, "angle of the gripper at the start", minimum=0.0, maximum=3.0)
+    aperture: Metre = parameter(0.055, "thickness that the open gripper just takes", minimum=0.001, maximum=0.5)
+    release_angle: Radian = parameter(
+        0.20, "how far the fingers open before the object comes free", minimum=0.0, maximum=3.0
+    )
+    gripper_rate: RadianPerSecond = parameter(0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0)
+
+    tremor_rms: Metre = parameter(0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05)
+    tremor_frequency: Hertz = parameter(8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0)
+    tremor_bandwidth: Hertz = parameter(2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0)
+    drift_rms: Metre = parameter(0.002, "root mean square length of the drift", minimum=0.0, maximum=0.1)
+    drift_time: Second = parameter(5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0)
+    substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
+    seed: int = parameter(0, "seed of the random numbers", minimum=0)
+
+    @property
+    def angle_object(self) -> float:
+        """Angle of the gripper closed on the object, in rad; its fingers close along z."""
+        return self.angle_empty + (self.angle_open - self.angle_empty) * float(self.object_size[2]) / self.aperture
+
+    def check(self) -> None:
+        """Raise UnusableHand, with all faults, if values contradict each other."""
+        faults = self._object_faults() + self._gripper_faults() + self._person_faults()
+        if faults:
+            raise UnusableHand(faults)
+
+    def _object_faults(self) -> list[str]:
+        faults: list[str] = []
+        size = np.asarray(self.object_size)
+        if not size[1] >= max(size[0], size[2]):
+            faults.append(f"object_size {size.tolist()} m: the second side must be the longest, it is held at its ends")
+        for name, place in (("p_OG", self.p_OG), ("p_OH", self.p_OH)):
+            if np.any(np.abs(place) > size / 2.0):
+                told, half = np.asarray(place).tolist(), (size / 2.0).tolist()
+                faults.append(f"{name} {told} m must lie inside the object, within {half} m of its centre")
+        room = float(np.linalg.norm(np.asarray(self.p_OG) - self.p_OH))
+        if room < LEAST_ROOM:
+            faults.append(f"p_OG and p_OH are {room:g} m apart; gripper and hand need {LEAST_ROOM:g} m")
+        return faults
+
+    def _gripper_faults(self) -> list[str]:
+        faults: list[str] = []
+        if not self.angle_empty < self.angle_open:
+            faults.append(f"angle_empty {self.angle_empty:g} rad must be less than angle_open {self.angle_open:g} rad")
+        if not self.angle_empty <= self.angle_0 <= self.angle_open:
+            faults.append(
+                f"angle_0 {self.angle_0:g} rad must lie between angle_empty {self.angle_empty:g} rad and angle_open "
+                f"{self.angle_open:g} rad"
+            )
+        if self.angle_object + self.release_angle > self.angle_open:
+            faults.append(
+                f"the object never comes free: the fingers hold it at {self.angle_object:g} rad and must open by "
+                f"release_angle {self.release_angle:g} rad, which is beyond angle_open {self.angle_open:g} rad"
+            )
+        if not self.object_size[2] < self.aperture:
+            faults.append(
+                f"aperture {self.aperture:g} m must exceed the object's thickness, object_size[3] "
+                f"{self.object_size[2]:g} m, or it does not fit into the gripper"
+            )
+        if not self.object_size[0] / 2.0 < self.palm_depth + self.capture_axial:
+            faults.append(
+                f"an object {self.object_size[0]:g} m wide against a palm at {self.palm_depth:g} m is out of the "
+                f"fingers' reach, capture_axial {self.capture_axial:g} m"
+            )
+        return faults
+
+    def _person_faults(self) -> list[str]:
+        faults = unit_faults("q_WO_0", self.q_WO_0) + unit_faults("q_WH_0", self.q_WH_0)
+        if not np.linalg.norm(self.pull_direction) > 0.0:
+            faults.append("pull_direction must not be zero")
+        if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
+            faults.append(
+                f"tremor_bandwidth {self.tremor_bandwidth:g} Hz must be less than twice tremor_frequency "
+                f"{self.tremor_frequency:g} Hz"
+            )
+        if self.motion is Motion.GIVE and self.object_with is StartHolder.FREE:
+            faults.append("motion GIVE at the first signal needs the object in the hand: object_with HAND")
+        if self.motion is Motion.TAKE and self.object_with is StartHolder.HAND:
+            faults.append("motion TAKE at the first signal needs the object elsewhere: object_with FREE")
+        if self.object_with is StartHolder.FREE:
+            gap = self._start_gap()
+            if gap < 0.0:
+                faults.append(f"p_WH_0 and p_WO_0: the hand starts {-gap:.3g} m inside the object; move one away")
+        return faults
+
+    def _start_gap(self) -> float:
+        """Return the room between fist and object at the start, the object taken as a rod along its long side."""
+        y = _long_axis(np.asarray(self.q_WO_0))
+        apart = np.asarray(self.p_WH_0) - self.p_WO_0
+        half = float(self.object_size[1]) / 2.0
+        nearest = apart - y * min(max(float(apart @ y), -half), half)
+        thick = max(float(self.object_size[0]), float(self.object_size[2])) / 2.0
+        return float(np.linalg.norm(nearest)) - self.fist_radius - thick
+
+
+def _long_axis(q: Floats) -> Floats:
+    w, x, y, z = (q / np.linalg.norm(q)).tolist()
+    return np.array([2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)])

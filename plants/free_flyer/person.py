@@ -1,0 +1,261 @@
+"""A person who takes an object from a free-flying robot, gives it one, or only pushes it."""
+
+import enum
+import pickle
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.cosim.blocks.plain_rotation import Quaternion, Triple, norm, product, triple, turned
+from handover.plants.free_flyer.attachment import Frame
+from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
+from handover.plants.free_flyer.rotations import along, between, minus, plus, quaternion
+
+_PEAK = 1.875
+"""Highest speed of a minimum-jerk course over its mean speed."""
+_SHORTEST = 0.3
+"""Seconds that a reach takes at least."""
+_CLOSING = 0.1
+"""Radians by which the gripper's angle must change for a person to see it."""
+
+
+class Activity(enum.IntEnum):
+    """What the person does."""
+
+    WAIT = 0
+    REACH = 1
+    GRASP = 2
+    PULL = 3
+    OFFER = 4
+    PUSH = 5
+    LET_GO = 6
+    WITHDRAW = 7
+    REST = 8
+
+
+@dataclass(slots=True)
+class Seen:
+    """What the person sees and feels: the gripper and its light, the object, and the hand with its hold of it."""
+
+    light: bool
+    angle: float
+    G: Frame
+    O: Frame
+    gripped: bool
+    held: bool
+    p_WH: Triple
+    q_WH: Quaternion
+    p_OH: Triple
+    q_OH: Quaternion
+
+
+class FlyerPerson:
+    """Moves a hand in minimum-jerk reaches, ramped pulls and pushes, one after the other as the robot's doing allows.
+
+    TAKE: REACH for the object's end p_OH, GRASP, PULL until the gripper has let go, WITHDRAW with the object, REST.
+    GIVE: OFFER, to p_OG in front of the palm, PUSH against it until the gripper moves, LET_GO when it holds, WITHDRAW.
+    PUSH: OFFER and PUSH with the fist beside the fingers, until the gripper moves; WITHDRAW with what the hand holds.
+
+    A signal is the rising edge of the light. What the person sees is acted on after a reaction time, drawn at each
+    signal; a signal that comes in the middle of something waits until that is done, and so does one whose motion is not
+    possible: TAKE with the object in the hand or out of reach, GIVE with it elsewhere.
+    """
+
+    def __init__(self, params: Params) -> None:
+        self._p = params
+        self._rng = np.random.default_rng([params.seed, 1])
+        pull = np.asarray(params.pull_direction) / np.linalg.norm(params.pull_direction)
+        self._pull = triple(pull)
+        self.rest = triple(params.p_WH_0)
+        q = np.asarray(params.q_WH_0) / np.linalg.norm(params.q_WH_0)
+        self._rest_q = quaternion(q)
+        self._end = triple(params.p_OH)
+        self._offered = triple(params.p_OG)
+        self.activity = Activity.WAIT
+        self.p, self.q = self.rest, self._rest_q  # where the arm wants the hand, without tremor
+        self.holding = params.object_with is StartHolder.HAND
+        self.fingers = 1.0 if self.holding else 0.0  # 0 straight, 1 closed
+        self._motion = Motion.NONE
+        self._from, self._from_q, self._duration = self.p, self.q, 1.0
+        self._clock = 0.0  # seconds in this activity
+        self._since = 0.0  # seconds for which what ends it has been there
+        self._way, self._speed, self._axis = 0.0, 0.0, self._pull
+        self._lit, self._called, self._answered = False, False, False
+        self._reaction = params.reaction_time
+        self._acts = {
+            Activity.WAIT: self._waits,
+            Activity.REACH: self._reaches,
+            Activity.GRASP: self._grasps,
+            Activity.PULL: self._pulls,
+            Activity.OFFER: self._offers,
+            Activity.PUSH: self._pushes,
+            Activity.LET_GO: self._lets_go,
+            Activity.WITHDRAW: self._withdraws,
+            Activity.REST: self._waits,
+        }
+
+    @property
+    def pushes_with_fist(self) -> bool:
+        """Whether the hand is to be a fist that may touch the gripper."""
+        return self._motion is Motion.PUSH and self.activity in (Activity.OFFER, Activity.PUSH, Activity.WITHDRAW)
+
+    def act(self, dt: float, seen: Seen) -> None:
+        """Go on for dt with what is seen at its beginning."""
+        if seen.light and not self._lit:
+            self._called = True
+            spread = self._p.reaction_spread * float(self._rng.standard_normal())
+            self._reaction = self._p.reaction_time * max(0.1, 1.0 + spread)
+            if self.activity in (Activity.WAIT, Activity.REST):
+                self._since = 0.0
+        self._lit = seen.light
+        self._clock += dt
+        if self.holding and not seen.held:
+            self.holding = False
+            if self.activity not in (Activity.GRASP, Activity.PULL):
+                self._begin(Activity.WITHDRAW, seen)
+        self._acts[self.activity](dt, seen)
+        step = dt / self._p.grasp_time
+        closed = self.holding or self.activity is Activity.GRASP or self.pushes_with_fist
+        self.fingers = min(1.0, self.fingers + step) if closed else max(0.0, self.fingers - step)
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        where = (self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis)
+        signal = (self._lit, self._called, self._answered, self._reaction)
+        course = (self.holding, self.fingers, self._duration, self._clock, self._since, self._way, self._speed)
+        return pickle.dumps((where, signal, course, self._rng.bit_generator.state))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this person or of one with equal parameters."""
+        where, signal, course, self._rng.bit_generator.state = pickle.loads(state)
+        self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis = where
+        self._lit, self._called, self._answered, self._reaction = signal
+        self.holding, self.fingers, self._duration, self._clock, self._since, self._way, self._speed = course
+
+    def _begin(self, activity: Activity, seen: Seen) -> None:
+        """Start an activity: courses go from where the hand is, or the arm wants it if it holds something."""
+        if activity is Activity.LET_GO or not self.holding:
+            self.p, self.q = seen.p_WH, seen.q_WH
+        self.activity = activity
+        self._clock, self._since, self._way, self._speed = 0.0, 0.0, 0.0, 0.0
+        self._from, self._from_q = self.p, self.q
+        goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
+        if activity in goals:
+            p, _ = goals[activity](seen)
+            self._duration = max(_SHORTEST, _PEAK * norm(minus(p, self.p)) / self._p.reach_speed)
+
+    def _waits(self, dt: float, seen: Seen) -> None:
+        if not self._called:
+            return
+        self._since += dt
+        self._motion = self._p.motion_again if self._answered else self._p.motion
+        if self._since < self._reaction or not self._can(seen):
+            return
+        self._called, self._answered = False, True
+        starts = {Motion.TAKE: Activity.REACH, Motion.GIVE: Activity.OFFER, Motion.PUSH: Activity.OFFER}
+        if self._motion in starts:
+            self._begin(starts[self._motion], seen)
+
+    def _can(self, seen: Seen) -> bool:
+        if self._motion is Motion.NONE:
+            return True
+        takes = self._motion is Motion.TAKE
+        if self._motion is not Motion.PUSH and takes is self.holding:
+            return False
+        goal, _ = self._at_object(seen) if takes else self._at_palm(seen)
+        return norm(minus(goal, self.rest)) <= self._p.arm_reach
+
+    def _reaches(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+        self._follow(*self._at_object(seen))
+        if self._clock >= self._duration:
+            self._begin(Activity.GRASP, seen)
+
+    def _grasps(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+        self.p, self.q = self._at_object(seen)
+        if self._clock >= self._p.grasp_time:
+            self._begin(Activity.PULL, seen)
+            self.holding = True
+
+    def _pulls(self, dt: float, seen: Seen) -> None:
+        p = self._p
+        self._go(dt, self._pull, p.pull_speed, p.pull_ramp, p.pull_distance)
+        if not self.holding or self._clock > p.patience:
+            self._let_go(seen)
+        elif self._has_seen(not seen.gripped, dt):
+            self._begin(Activity.WITHDRAW, seen)
+
+    def _offers(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+        self._follow(*self._at_palm(seen))
+        if self._clock >= self._duration:
+            self._begin(Activity.PUSH, seen)
+            self._axis = (seen.G.R[0], seen.G.R[3], seen.G.R[6])
+
+    def _pushes(self, dt: float, seen: Seen) -> None:
+        p = self._p
+        moved = seen.angle < p.angle_open - _CLOSING
+        if not moved:
+            self._go(dt, self._axis, p.push_speed, p.push_ramp, p.push_distance)
+        gives = self._motion is Motion.GIVE
+        if gives and seen.gripped:
+            if self._has_seen(True, dt):
+                self._let_go(seen)
+            return
+        empty = seen.angle < p.angle_object - 0.5 * _CLOSING
+        if self._has_seen(empty if gives else moved, dt) or self._clock > p.patience:
+            self._begin(Activity.WITHDRAW, seen)
+
+    def _lets_go(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+        if self._clock >= self._p.grasp_time:
+            self._begin(Activity.WITHDRAW, seen)
+
+    def _withdraws(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+        self._follow(*self._at_rest(seen))
+        if self._clock >= self._duration:
+            self._begin(Activity.REST, seen)
+
+    def _let_go(self, seen: Seen) -> None:
+        self._begin(Activity.LET_GO, seen)
+        self.holding = False
+
+    def _has_seen(self, there: bool, dt: float) -> bool:
+        """Return whether something has been there for the time of a reaction."""
+        self._since = self._since + dt if there else 0.0
+        return there and self._since >= self._reaction
+
+    def _follow(self, p: Triple, q: Quaternion) -> None:
+        """Go on along a minimum-jerk course to a goal that may move."""
+        s = minimum_jerk(self._clock / self._duration)
+        self.p = along(self._from, s, minus(p, self._from))
+        self.q = between(self._from_q, q, s)
+
+    def _go(self, dt: float, axis: Triple, speed: float, ramp: float, distance: float) -> None:
+        """Go on along an axis with a speed that rises smoothly in the time `ramp`, until the distance is done."""
+        self._speed = min(1.0, self._speed + dt / ramp)
+        x = self._speed
+        self._way = min(distance, self._way + dt * speed * x * x * (3.0 - 2.0 * x))
+        self.p = along(self._from, self._way, axis)
+
+    def _at_object(self, seen: Seen) -> tuple[Triple, Quaternion]:
+        """Return the hand's pose at the object's end: the object's axes."""
+        return plus(seen.O.p, turned(seen.O.R, self._end)), seen.O.q
+
+    def _at_palm(self, seen: Seen) -> tuple[Triple, Quaternion]:
+        """Return the hand's pose where a push begins: with the object, p_OG in front of the palm; a fist, beside it."""
+        p, G = self._p, seen.G
+        front = p.palm_depth - p.offer_gap
+        q = product(G.q, seen.q_OH)
+        if self._motion is Motion.PUSH:
+            return plus(G.p, turned(G.R, (front - p.fist_radius, p.fist_offset, 0.0))), q
+        x, y, z = minus(seen.p_OH, self._offered)
+        place = (front - 0.5 * float(p.object_size[0]) + x, y, z)
+        return plus(G.p, turned(G.R, place)), q
+
+    def _at_rest(self, seen: Seen) -> tuple[Triple, Quaternion]:  # noqa: ARG002
+        return self.rest, self._rest_q
+
+
+def minimum_jerk(s: float) -> float:
+    """Return how much of a minimum-jerk course is done after a share s of its time."""
+    if s >= 1.0:
+        return 1.0
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0))

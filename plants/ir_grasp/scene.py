@@ -1,0 +1,202 @@
+"""A soft hand with infrared sensors on its fingertips and an object on a table, seen from above, after [Luberto]."""
+
+import math
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
+from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
+from handover.plants.ir_grasp.hand import FINGERS
+from handover.plants.ir_grasp.parameters import SEES_NOTHING, Params, UnusableScene
+from handover.plants.ir_grasp.world import DT, Command, GraspWorld, beginning
+
+_SLOT = 5  # internal steps for which a sensor is active
+_CHECKPOINT = 500  # internal steps after which the world is made anew of its own snapshot
+_SENSORS = len(FINGERS)
+_MIDDLE = ((1.0, 0.0),)
+
+
+class StepSizeError(ValueError):
+    """A step is no multiple of the internal time step; nothing has changed."""
+
+    is_refusal = True
+
+    def __init__(self, dt: float) -> None:
+        fewer = max(int(dt / DT), 1)
+        super().__init__(
+            f"GraspScene: a step of {dt:.6g} s is no multiple of the internal step {DT:g} s; "
+            f"{fewer * DT:.6g} s or {(fewer + 1) * DT:.6g} s would fit"
+        )
+        self.dt = dt
+
+
+class UnusableCommand(Refusal):
+    """A command that is no number; `faults` names the inputs."""
+
+    block = "GraspScene"
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """What arm and hand are told."""
+
+    p_WH_cmd: Vector2[Metre] = port(np.array([-0.25, 0.0]), "commanded position of the wrist, in the world")
+    yaw_cmd: Radian = port(0.0, "commanded orientation of the hand")
+    sigma_cmd: Number = port(0.0, "commanded closure: 0 open, 1 closed", minimum=0.0, maximum=1.0)
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """What encoders and sensors tell, and where things are; three entries are of thumb, index and ring finger."""
+
+    p_WH: Vector2[Metre] = output("position of the wrist, in the world")
+    yaw: Radian = output("orientation of the hand")
+    sigma: Number = output("closure that the motor has reached", minimum=0.0, maximum=1.0)
+    ticks: Vector3[Tick] = output("last readings of the sensors")
+    q: Vector8[Radian] = output("joint angles: thumb 2, index 3, ring 3")
+    tension: Newton = output("tension of the tendon")
+    p_WO: Vector2[Metre] = output("position of the object, in the world")
+    yaw_O: Radian = output("orientation of the object, that of its reference pose included")
+    touching: int = output("number of the hand's bodies, of palm and 8 phalanges, that touch the object")
+    range: Vector3[Metre] = output("distance of the object along the middle of each sensor's beam; 0.2 if none is met")
+
+
+class GraspScene:
+    """Soft hand, object and table in the plane x-y of W, with three infrared sensors, after [Luberto] sec. III, V.
+
+    - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`grasp_wrist.follow`), a thumb
+      of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left (`grasp_hand`). One elastic tendon,
+      T = k max(0, sigma L - sum r q), turns all joints, so a blocked finger lets the others close further.
+    - Object: rigid, with dry friction on the table and in the hand (`grasp_objects`).
+    - Sensors: on the distal phalanges, one active at a time (sec. V-B), for 5 ms (assumed), in the order of the
+      fingers; it is read at the end of its time. A reading is the mean over three rays of the beam of
+      `InfraredSensor.ticks`, plus noise, rounded. At the start all three have been read. Only the object returns
+      light, and no finger hides it.
+
+    Contacts are solved by pymunk, in steps of 1 ms; a step of the block is a multiple of that. pymunk's solver starts
+    from impulses that it does not give away. So that a state is complete, the world is made anew of its positions and
+    velocities every 500 internal steps; a state is that snapshot and the commands since, which `set_state` replays.
+
+    Raises:
+        UnusableScene: by the constructor, for parameters of which no scene can be built, or a hand that would start
+            in the object.
+        StepSizeError: by `step`, for steps that are no multiple of 1 ms.
+        UnusableCommand: by `step`, for commands that are not finite; all are named.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+    variable_step: ClassVar[bool] = False
+
+    def __init__(self, params: Params) -> None:
+        params.check()
+        self._params = params
+        self._sensor = params.sensor()
+        self._reflectivity = params.reflectivity or params.solid.reflectivity
+        angles = (0.0, -params.beam, params.beam)
+        self._rays = [(math.cos(a), math.sin(a)) for a in angles]
+        self._checkpoint = beginning(params)
+        self._since: list[tuple[int, Command]] = []  # internal steps and their command
+        self._replayed = 0  # internal steps since the checkpoint
+        self._world = GraspWorld(params, self._checkpoint)
+        _refuse_overlap(self._world)
+        self._rng = np.random.default_rng(params.seed)
+        self._clock = 0  # internal steps into the scan of the sensors
+        self._ticks = [self._read(i) for i in range(_SENSORS)]
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return where everything is and what was read last; no time passes."""
+        w = self._world
+        x, y, yaw = w.wrist
+        x_O, y_O, yaw_O = w.thing
+        return Outputs(
+            p_WH=np.array([x, y]),
+            yaw=yaw,
+            sigma=w.sigma,
+            ticks=np.array(self._ticks),
+            q=np.array(w.joints),
+            tension=w.tension,
+            p_WO=np.array([x_O, y_O]),
+            yaw_O=yaw_O,
+            touching=w.touching,
+            range=np.array([self._range(i) for i in range(_SENSORS)]),
+        )
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        """Advance from t by dt with u held."""
+        steps = round(dt / DT)
+        if steps < 1 or abs(steps * DT - dt) > 1e-6 * DT:
+            raise StepSizeError(dt)
+        command = _command(u)
+        while steps > 0:
+            if self._replayed == _CHECKPOINT:
+                self._renew()
+            n = min(steps, _SLOT - self._clock % _SLOT, _CHECKPOINT - self._replayed)
+            self._advance(n, command)
+            self._clock = (self._clock + n) % (_SLOT * _SENSORS)
+            if self._clock % _SLOT == 0:
+                active = (self._clock // _SLOT - 1) % _SENSORS
+                self._ticks[active] = self._read(active)
+            steps -= n
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        """Return the last checkpoint, the commands since, and the sensors."""
+        sensors = (self._clock, self._ticks, self._rng.bit_generator.state)
+        return pickle.dumps((self._checkpoint, self._since, sensors))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this scene or of one with equal parameters."""
+        self._checkpoint, since, (self._clock, self._ticks, self._rng.bit_generator.state) = pickle.loads(state)
+        self._world, self._since, self._replayed = GraspWorld(self._params, self._checkpoint), [], 0
+        for steps, command in since:
+            self._advance(steps, command)
+
+    def _advance(self, steps: int, command: Command) -> None:
+        for _ in range(steps):
+            self._world.advance(command)
+        if self._since and self._since[-1][1] == command:
+            steps_before, _ = self._since.pop()
+            self._since.append((steps_before + steps, command))
+        else:
+            self._since.append((steps, command))
+        self._replayed += steps
+
+    def _renew(self) -> None:
+        self._checkpoint, self._since, self._replayed = self._world.snapshot, [], 0
+        self._world = GraspWorld(self._params, self._checkpoint)
+
+    def _read(self, finger: int) -> float:
+        p = self._params
+        met = self._world.look(finger, self._rays, p.farthest)
+        x = sum(self._sensor.ticks(d, cosine, self._reflectivity) for d, cosine in met) / len(self._rays)
+        return self._sensor.reading(x + p.noise * float(self._rng.standard_normal()))
+
+    def _range(self, finger: int) -> float:
+        met = self._world.look(finger, _MIDDLE, SEES_NOTHING)
+        return max(met[0][0], 0.0) if met else SEES_NOTHING  # contacts overlap a little
+
+
+def _command(u: Inputs) -> Command:
+    """Return what is commanded, without negative zeros: equal commands are kept once."""
+    x, y, yaw, sigma = *u.p_WH_cmd.tolist(), float(u.yaw_cmd), float(u.sigma_cmd)
+    if not all(map(math.isfinite, (x, y, yaw, sigma))):
+        told = {"p_WH_cmd": (x, y), "yaw_cmd": (yaw,), "sigma_cmd": (sigma,)}
+        wrong = {name: values for name, values in told.items() if not all(map(math.isfinite, values))}
+        raise UnusableCommand([f"{name} must be finite, not {list(values)}" for name, values in wrong.items()])
+    return x + 0.0, y + 0.0, yaw + 0.0, min(max(sigma, 0.0), 1.0) + 0.0
+
+
+def _refuse_overlap(world: GraspWorld) -> None:
+    overlaps = world.overlaps()
+    if overlaps:
+        told = ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)
+        raise UnusableScene(
+            [f"the hand would start in the object: {told}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"]
+        )

@@ -1,0 +1,1 @@
+"""The arm with links of variable stiffness: its chain, motors, air and sensors."""

@@ -1,0 +1,230 @@
+"""Arm of three joints with two links of variable stiffness, its motors, air and sensors, after [Gandarias2020]."""
+
+import math
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
+from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
+from handover.plants.vsl.actuators import PressureLine, VslServo
+from handover.plants.vsl.chain import Complexes, VslChain
+from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
+from handover.plants.vsl.parameters import HIGHEST_PRESSURE, TURN, Link, Motion, Params, UnusableVslArm
+from handover.plants.vsl.statics import NoEquilibrium, VslStatics
+
+__all__ = ["Inputs", "Link", "Motion", "Outputs", "Params", "UnusableInput", "UnusableVslArm", "VslArm"]
+
+HEAVIEST = 0.5
+"""Largest load, kg; the published experiments go to 0.1 kg."""
+
+
+class UnusableInput(Refusal):
+    """Inputs that are not numbers, or a load or pressure that there is not; `faults` lists all of them."""
+
+    block = "VslArm"
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """What motors and regulators are told, and what hangs on the gripper."""
+
+    q_cmd: Vector3[Radian] = port(
+        np.array([0.0, 0.8411, -1.6821]), "commanded joint angles", minimum=-TURN, maximum=TURN
+    )
+    qd_cmd: Vector3[RadianPerSecond] = port(
+        np.zeros(3), "speeds at which the joints go there, whatever their sign; 0: as fast as they can"
+    )
+    p_cmd: Vector2[Pascal] = port(
+        np.array([1.0e5, 1.0e5]), "commanded pressures of links 2 and 3", minimum=0.0, maximum=HIGHEST_PRESSURE
+    )
+    load: Kilogram = port(0.0, "mass that hangs on the gripper", minimum=0.0, maximum=HEAVIEST)
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """What the robot's computer and the tracker measure, and where the arm is."""
+
+    q_meas: Vector3[Radian] = output("joint angles by the encoders, which do not see what is behind the gears")
+    i_meas: Vector3[Ampere] = output("currents of the motors, positive for a torque that turns the joint forwards")
+    p_meas: Vector2[Pascal] = output("pressures of links 2 and 3 by the transducers")
+    p_WG: Vector3[Metre] = output("position of the gripper")
+    p_WG_meas: Vector3[Metre] = output("position of the gripper by the tracker")
+    shape: Polyline25[Metre] = output("centre line: the base, 12 points on link 2, 12 on link 3 to the gripper")
+
+
+class VslArm:
+    """Arm that bends under its weight, by a pseudo-rigid chain in the plane that J1 turns, after [Gandarias2020].
+
+    - W has its origin at the foot of the axis of J1, z up. With stiff links and joints p_WG is the last column of
+      eq. (1), for angles q = (theta_1, theta_2, theta_3), theta_2 from the horizontal, theta_3 from link 2.
+    - Bodies, springs: `VslChain`. QUASI_STATIC: at rest at every instant, `VslStatics`. DYNAMIC: `VslDynamics`.
+    - Servos go to q_cmd at qd_cmd, `VslServo`. Under the torque tau of J2 or J3 the encoder shows
+      q = q_aim - tau / servo_stiffness (after a while, if DYNAMIC); the joint gives by tau / joint_stiffness more,
+      behind the encoder. Friction shows in the current only. J1 carries no weight and does not give: its current is
+      friction and the arm's inertia about it.
+    - Air: `PressureLine`. A rigid link has a line that is closed behind the transducer.
+    - Readings have white Gaussian noise, drawn once a step.
+
+    The arm starts at rest in q_0 with the load of its first instant; a load that is put on later has the gripper's
+    velocity. A step ends with the rest or motion under the inputs held during it.
+
+    Raises:
+        UnusableVslArm: by the constructor, for parameters of which no arm can be built.
+        UnusableInput: by `outputs` and `step`, which then change nothing.
+        NoEquilibrium: by `outputs` and `step`, if the arm buckles.
+        NoConvergence: by `step`, if there is no solution of the equations of motion.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: Params) -> None:
+        params.check()
+        self._params = params
+        dynamic = params.motion is Motion.DYNAMIC
+        self._chain = VslChain(params, params.hinges_dynamic if dynamic else params.hinges)
+        self._mechanics: VslStatics | VslDynamics = (
+            VslDynamics(self._chain, params)
+            if dynamic
+            else VslStatics(self._chain, params.gravity, 1.0 / params.servo_stiffness)
+        )
+        self._servos = [
+            VslServo(angle, params.servo_speed, params.kt, params.gear_friction, params.sliding)
+            for angle in params.q_0.tolist()
+        ]
+        self._lines = [
+            PressureLine(p, params.pressure_time, params.leak_time, params.valve_tolerance, params.valve_band)
+            for p in params.p_0.tolist()
+        ]
+        self._rng = np.random.default_rng(params.seed)
+        self._noise = self._rng.standard_normal(11)
+        self._sigma = np.repeat(
+            [params.servo_noise, params.current_noise, params.tracker_noise, params.pressure_noise], [3, 3, 3, 2]
+        )
+        self._spin = 0.0
+        self._q = [0.0, 0.0, 0.0]  # what the encoders show, and the currents, without noise
+        self._i = [0.0, 0.0, 0.0]
+        self._started = False
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return where the arm is, at the start at rest with its load; no time passes."""
+        if not self._started:
+            _refuse(u)
+            self._rest(u.load)
+        return self._seen()
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Advance from t by dt with u held."""
+        _refuse(u)
+        before = self.get_state()
+        try:
+            if not self._started:
+                self._rest(u.load)
+                self._started = True
+            self._advance(dt, u)
+        except (NoEquilibrium, NoConvergence):
+            self.set_state(before)
+            raise
+        self._noise = self._rng.standard_normal(11)
+        return self._seen()
+
+    def get_state(self) -> bytes:
+        """Return the complete state, random generator included."""
+        parts = [part.get_state() for part in (self._mechanics, *self._servos, *self._lines)]
+        random = (self._rng.bit_generator.state, self._noise)
+        return pickle.dumps((parts, random, self._spin, self._q, self._i, self._started))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this arm or of one with equal parameters."""
+        parts, random, self._spin, self._q, self._i, self._started = pickle.loads(state)
+        for part, own in zip((self._mechanics, *self._servos, *self._lines), parts, strict=True):
+            part.set_state(own)
+        self._rng.bit_generator.state, self._noise = random
+
+    def _rest(self, load: float) -> None:
+        _, theta_2, theta_3 = self._aims()
+        self._mechanics.settle((theta_2, theta_3), self._pressures(), load)
+        self._q = self._shown()
+        for servo, q in zip(self._servos, self._q, strict=True):
+            servo.rest(q)
+        self._i = self._currents(0.0)
+
+    def _advance(self, dt: float, u: Inputs) -> None:
+        first = self._aims()
+        for servo, command, speed in zip(self._servos, u.q_cmd.tolist(), u.qd_cmd.tolist(), strict=True):
+            servo.turn(command, speed, dt)
+        for line, p_cmd in zip(self._lines, u.p_cmd.tolist(), strict=True):
+            line.advance(dt, p_cmd)
+        last = self._aims()
+        spin = (last[0] - first[0]) / dt
+        self._mechanics.advance(dt, (first[1:], last[1:]), self._pressures(), u.load, spin)
+        self._q = self._shown()
+        for servo, q in zip(self._servos, self._q, strict=True):
+            servo.slide(q)
+        faster, self._spin = (spin - self._spin) / dt, spin
+        inertia = self._chain.inertia_about_J1(self._mechanics.pose, u.load) if faster else 0.0
+        self._i = self._currents(faster * inertia)
+
+    def _aims(self) -> tuple[float, float, float]:
+        J1, J2, J3 = self._servos
+        return J1.angle, J2.angle, J3.angle
+
+    def _pressures(self) -> tuple[float, float]:
+        link_2, link_3 = self._lines
+        return link_2.p, link_3.p
+
+    def _shown(self) -> list[float]:
+        """Return what the encoders show, without noise."""
+        theta_1, theta_2, theta_3 = self._aims()
+        droop_2, droop_3 = self._mechanics.pose.droop
+        return [theta_1, theta_2 - droop_2, theta_3 - droop_3]
+
+    def _currents(self, tau_1: float) -> list[float]:
+        """Return the currents, without noise, for a torque of J1 and those that hold the links."""
+        return [
+            servo.current(torque)
+            for servo, torque in zip(self._servos, (tau_1, *self._mechanics.pose.torque), strict=True)
+        ]
+
+    def _seen(self) -> Outputs:
+        noise = self._sigma * self._noise
+        ends = self._chain.ends(self._mechanics.pose)
+        p_WG = self._in_world(ends[-1:])[0]
+        shape = np.zeros((25, 3))
+        shape[1:] = self._in_world(self._chain.centre_line(ends))
+        return Outputs(
+            q_meas=np.array(self._q) + noise[:3],
+            i_meas=np.array(self._i) + noise[3:6],
+            p_meas=np.array(self._pressures()) + noise[9:],
+            p_WG=p_WG,
+            p_WG_meas=p_WG + noise[6:9],
+            shape=shape,
+        )
+
+    def _in_world(self, points: Complexes) -> Floats:
+        """Return points of the arm's plane, seen from the shoulder, in W, (k, 3)."""
+        theta_1 = self._servos[0].angle
+        p = np.empty((len(points), 3))
+        p[:, 0] = math.cos(theta_1) * points.real
+        p[:, 1] = math.sin(theta_1) * points.real
+        p[:, 2] = self._params.L_1 + points.imag
+        return p
+
+
+def _refuse(u: Inputs) -> None:
+    """Raise UnusableInput for what is no number, or no load or pressure."""
+    faults: list[str] = []
+    if not np.isfinite((*u.q_cmd, *u.qd_cmd, *u.p_cmd)).all():
+        faults.append(f"q_cmd {u.q_cmd}, qd_cmd {u.qd_cmd} and p_cmd {u.p_cmd} must be finite")
+    elif not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= HIGHEST_PRESSURE:
+        faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {HIGHEST_PRESSURE:g} Pa")
+    if not 0.0 <= u.load <= HEAVIEST:
+        faults.append(f"load {u.load:g} kg must be from 0 to {HEAVIEST:g} kg")
+    if faults:
+        raise UnusableInput(faults)

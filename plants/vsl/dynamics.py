@@ -1,0 +1,246 @@
+"""How the chain of the arm swings."""
+
+import math
+import pickle
+from typing import NamedTuple
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.plants.vsl.chain import Complexes, Pose, VslChain
+from handover.plants.vsl.parameters import Params
+from handover.plants.vsl.statics import VslStatics
+
+_TOLERANCE = 1e-10
+_ITERATIONS = 8
+_SHORTEST = 1e-5  # s: a step that fails is halved until it is shorter
+
+
+class NoConvergence(RuntimeError):
+    """The equations of motion could not be solved for a time step."""
+
+    def __init__(self, h: float) -> None:
+        super().__init__(
+            f"VslArm: no solution of the equations of motion, down to internal steps of {h:.2g} s; a slower "
+            "servo_speed or a smaller load would have one"
+        )
+        self.h = h
+
+
+class _Held(NamedTuple):
+    """What is held during a step: stiffness of the springs, masses C by bodies and by coordinates, weights, w^2."""
+
+    k: Floats
+    C: Floats
+    C_y: Floats
+    weight: Floats
+    spin2: float
+
+
+class VslDynamics:
+    """Motion of the chain, with the coordinates y: angles phi_k of all bodies and shears s_k of those that shear.
+
+        M y'' + D^T C b + B^T k (e + damping_time e') = D^T (C w^2 Re u - i A),   e = B y - offsets
+
+    written with Re(conj(.) .) for products of the complex u_k (see `VslChain`): D = du/dy is i u_k for an angle and
+    i exp(i phi_k) for a shear, M = Re(conj(D) C D) + inertia, b = -2 exp(i phi) phi' s' - u phi'^2, A the weights, e
+    the deformations of the springs of stiffness k. Turning about J1 at the rate w pulls all masses outwards.
+
+    A gear of high ratio does not yield to swings: the droop of the servos follows their torques with droop_time,
+    droop' = (torque / servo_stiffness - droop) / droop_time, and the offsets are what they aim at less the droop.
+
+    Integrated by generalized-alpha (Arnold and Bruels 2007) in equal steps no longer than `substep`, with Newton's
+    method in each. The droop is implicit too: it is linear in the deformations, and makes the springs of the joints
+    softer within a step.
+
+    Raises:
+        NoEquilibrium: by `settle`.
+        NoConvergence: by `advance`.
+    """
+
+    def __init__(self, chain: VslChain, params: Params) -> None:
+        self._chain = chain
+        self._params = params
+        self._statics = VslStatics(chain, params.gravity, 1.0 / params.servo_stiffness)
+        sheared = np.flatnonzero(np.array(chain.shearing) > 0.0)
+        n, m = len(chain), len(chain) + len(sheared)
+        self._sheared = sheared
+        self._body = np.concatenate((np.arange(n), sheared))  # of each coordinate
+        self._joints = np.array([0, chain.elbow])  # hinges of J2 and J3
+        self._B = np.eye(m)
+        self._B[np.arange(1, n), np.arange(n - 1)] = -1.0
+        self._inertia = np.diag(np.concatenate((chain.inertia, np.zeros(len(sheared)))))
+        self._lengths = np.array(chain.lengths)
+        self._y: Floats = np.zeros(m)
+        self._v: Floats = np.zeros(m)
+        self._a: Floats = np.zeros(m)
+        self._a_mean = np.zeros(m)
+        self._offset: Floats = np.zeros(2)
+        self.pose = self._statics.pose
+
+    def settle(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
+        """Rest at the angles of J2 and J3 that the servos aim at, rad, wherever the arm was before."""
+        self._statics.settle(theta, p, load)
+        self.pose = self._statics.pose
+        self._y = np.concatenate((self.pose.angles, self.pose.shears[self._sheared]))
+        self._v, self._a, self._a_mean = (np.zeros(len(self._y)) for _ in range(3))
+        self._offset = np.array(theta) - self.pose.droop
+
+    def advance(
+        self,
+        dt: float,
+        theta: tuple[tuple[float, float], tuple[float, float]],
+        p: tuple[float, float],
+        load: float,
+        spin: float,
+    ) -> None:
+        """Advance by dt.
+
+        Args:
+            dt: in s.
+            theta: angles of J2 and J3, rad, that the servos aim at first and last; they go evenly between.
+            p: pressures of links 2 and 3, Pa.
+            load: at the tip, kg.
+            spin: rate of J1, rad/s.
+        """
+        steps = max(1, math.ceil(dt / self._params.substep - 1e-9))
+        held = self._held(p, load, spin)
+        aims = np.linspace(theta[0], theta[1], steps + 1)
+        for i in range(steps):
+            self._substep(dt / steps, aims[i], aims[i + 1], held)
+
+    def frequencies(self, p: tuple[float, float], load: float) -> Floats:
+        """Return the natural frequencies about the pose at hand, without damping, in Hz, the lowest first."""
+        held = self._held(p, load, 0.0)
+        u, e, D = self._directions(self._y)
+        K = np.transpose(self._B * held.k[:, None]) @ self._B + self._turning(
+            u, e, np.asarray(1j * held.weight, dtype=np.complex128)
+        )
+        whiten = np.linalg.inv(np.linalg.cholesky(self._mass(D, held.C_y)))
+        return np.sqrt(np.linalg.eigvalsh(whiten @ K @ np.transpose(whiten))) / (2.0 * math.pi)
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        return pickle.dumps((self._y, self._v, self._a, self._a_mean, self._offset, self.pose))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this chain or of one with equal parameters."""
+        self._y, self._v, self._a, self._a_mean, self._offset, self.pose = pickle.loads(state)
+
+    def _held(self, p: tuple[float, float], load: float, spin: float) -> _Held:
+        hinge, shear = self._chain.springs(p)
+        k = 1.0 / np.concatenate((hinge, np.array(shear)[self._sheared]))
+        weight: Floats = self._params.gravity * (self._chain.carried + load)
+        C = self._chain.coupling + load
+        return _Held(k, C, C[np.ix_(self._body, self._body)], weight, spin * spin)
+
+    def _substep(self, h: float, first: Floats, last: Floats, held: _Held) -> None:
+        """Advance by h, or by halves of it if need be, while the servos' aims go from the first to the last, (2,)."""
+        kept = math.exp(-h / self._params.droop_time)
+        yielding = (1.0 - kept) / self._params.servo_stiffness
+        lag = self._params.damping_time / h
+        k = np.array(held.k)
+        k[self._joints] /= 1.0 + yielding * (1.0 + lag) * k[self._joints]
+        droop = kept * np.array(self.pose.droop)
+        rest = np.zeros(len(k))
+        rest[self._joints] = last - droop + lag * (last - droop - self._offset)
+        if self._move(h, rest, k, held):
+            deformation = self._B @ (self._y + self._params.damping_time * self._v)
+            torque = (k * (rest - deformation))[self._joints]
+            droop += yielding * torque
+            self._offset = last - droop
+            self._take_pose(torque, droop)
+        elif h > _SHORTEST:
+            middle = (first + last) / 2.0
+            self._substep(h / 2.0, first, middle, held)
+            self._substep(h / 2.0, middle, last, held)
+        else:
+            raise NoConvergence(h)
+
+    def _move(self, h: float, rest: Floats, k: Floats, held: _Held) -> bool:
+        """Advance coordinates and rates by h, with springs k from rest, e + damping_time e' without force.
+
+        Return whether Newton's method came to an end; if not, nothing has moved.
+        """
+        alpha_m, alpha_f, beta, gamma = _weights(self._params.high_frequency_damping)
+        a_mean = (alpha_f * self._a - alpha_m * self._a_mean) / (1.0 - alpha_m)
+        y = self._y + h * self._v + h * h * ((0.5 - beta) * self._a_mean + beta * a_mean)
+        v = self._v + h * ((1.0 - gamma) * self._a_mean + gamma * a_mean)
+        a = np.zeros(len(y))
+        by_a = (1.0 - alpha_m) / (h * h * beta * (1.0 - alpha_f))
+        by_v = gamma / (h * beta)
+        springs = np.transpose(self._B * k[:, None])
+        K = (1.0 + self._params.damping_time * by_v) * (springs @ self._B)
+        for _ in range(_ITERATIONS):
+            u, e, D = self._directions(y)
+            pull, S = self._inertial(u, e, D, (v, a), (by_v, by_a), held)
+            stretch = self._B @ (y + self._params.damping_time * v) - rest
+            residual = np.real(np.conj(D) * pull[self._body]) + self._inertia @ a + springs @ stretch
+            dy = np.linalg.solve(S + K, -residual)
+            y, v, a = y + dy, v + by_v * dy, a + by_a * dy
+            if np.abs(dy).max() < _TOLERANCE:
+                self._y, self._v, self._a = y, v, a
+                self._a_mean = a_mean + (1.0 - alpha_f) / (1.0 - alpha_m) * a
+                return True
+        return False
+
+    def _directions(self, y: Floats) -> tuple[Complexes, Complexes, Complexes]:
+        """Return u_k and exp(i phi_k) of all bodies, (n,), and D_j of all coordinates, (m,)."""
+        n = len(self._chain)
+        e = np.exp(1j * y[:n])
+        u = self._lengths * e
+        u[self._sheared] += 1j * y[n:] * e[self._sheared]
+        return u, e, 1j * np.concatenate((u, e[self._sheared]))
+
+    def _mass(self, D: Complexes, C_y: Floats) -> Floats:
+        return C_y * np.real(np.conj(D)[:, None] * D) + self._inertia
+
+    def _inertial(
+        self,
+        u: Complexes,
+        e: Complexes,
+        D: Complexes,
+        rates: tuple[Floats, Floats],
+        by: tuple[float, float],
+        held: _Held,
+    ) -> tuple[Complexes, Floats]:
+        """Return what acceleration, turn and weight pull at u_k with, (n,), and the derivative in y of that, (m, m).
+
+        Rates v and a are those of y, and change with it by the factors given. With e = exp(i phi) in all terms of
+        u'' = i u phi'' + i e s'' - 2 e phi' s' - u phi'^2, its derivative by phi is i u''.
+        """
+        n, at = len(self._chain), self._sheared
+        v, a = rates
+        by_v, by_a = by
+        accelerated = 1j * u * a[:n] - u * v[:n] ** 2
+        accelerated[at] += e[at] * (1j * a[n:] - 2.0 * v[at] * v[n:])
+        pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * held.weight
+        G = by_a * D - held.spin2 * D.real
+        G[:n] += 1j * accelerated - 2.0 * by_v * u * v[:n]
+        G[at] -= 2.0 * by_v * e[at] * v[n:]
+        G[n:] += 1j * e[at] * (1j * a[at] - v[at] ** 2) - 2.0 * by_v * e[at] * v[at]
+        S = held.C_y * np.real(np.conj(D)[:, None] * G) + by_a * self._inertia + self._turning(u, e, pull)
+        return pull, S
+
+    def _turning(self, u: Complexes, e: Complexes, pull: Complexes) -> Floats:
+        """Return the derivative in y of the generalised forces of what pulls at u_k, as D turns, (m, m)."""
+        n, at = len(self._chain), self._sheared
+        sheared = np.arange(n, len(self._body))
+        turning = np.zeros((len(self._body), len(self._body)))
+        turning[np.arange(n), np.arange(n)] = -np.real(np.conj(u) * pull)
+        turning[at, sheared] = turning[sheared, at] = -np.real(np.conj(e) * pull)[at]
+        return turning
+
+    def _take_pose(self, torque: Floats, droop: Floats) -> None:
+        n = len(self._chain)
+        shears = np.zeros(n)
+        shears[self._sheared] = self._y[n:]
+        joints = (float(torque[0]), float(torque[1])), (float(droop[0]), float(droop[1]))
+        self.pose = Pose(np.array(self._y[:n]), shears, *joints)
+
+
+def _weights(radius: float) -> tuple[float, float, float, float]:
+    """Return alpha_m, alpha_f, beta, gamma for a spectral radius at high frequency."""
+    alpha_m, alpha_f = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
+    gamma = 0.5 + alpha_f - alpha_m
+    return alpha_m, alpha_f, (gamma + 0.5) ** 2 / 4.0, gamma

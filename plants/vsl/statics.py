@@ -1,0 +1,158 @@
+"""Where the chain of the arm rests: its weight against bending, shear and joints."""
+
+import math
+import pickle
+from typing import NamedTuple
+
+import numpy as np
+
+from handover.plants.vsl.chain import Pose, VslChain
+
+_TOLERANCE = 1e-12
+_ITERATIONS = 12
+_FARTHEST = 0.5  # rad: a Newton step that is longer is cut
+_LARGEST_SHARE, _SMALLEST_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # of gravity, by which it is turned up
+
+
+class NoEquilibrium(RuntimeError):
+    """The arm buckles: there is no stable rest that its unloaded shape leads to."""
+
+    is_refusal = True
+
+    def __init__(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
+        super().__init__(
+            f"VslArm: no stable rest at joint angles ({theta[0]:.4g}, {theta[1]:.4g}) rad with a load of {load:.4g} kg "
+            f"and {p[0]:.4g} and {p[1]:.4g} Pa in links 2 and 3: the arm buckles; more pressure or less load holds it"
+        )
+        self.theta, self.p, self.load = theta, p, load
+
+
+class _Body(NamedTuple):
+    """Length, shear compliance, weight lifted, compliance of the hinge at the root and the angle of its rest."""
+
+    l: float
+    c: float
+    A: float
+    b: float
+    offset: float
+
+
+class VslStatics:
+    """Rest of the chain: the least potential energy, found from the tip inwards by Newton's method for one unknown.
+
+    All weights are dead loads, so with the weight A_i that body i lifts (half its own, all of what follows)
+
+        shear:   s_i = -c_i A_i cos phi_i
+        hinge:   tau_i = tau_i+1 - A_i (l_i cos phi_i - s_i sin phi_i),   tau_n = 0
+        inwards: phi_i-1 = phi_i - b_i tau_i - offset_i
+
+    with offsets theta_2 at the shoulder, theta_3 at the elbow. The angle of the tip's body therefore gives all others,
+    down to the ground's, which must be 0. Its derivative goes along: it is positive at every hinge if the rest is
+    stable. The search begins at the last rest; if that leads nowhere, gravity is turned up from 0.
+
+    Args:
+        chain: whose rest it is.
+        gravity: in m/s2.
+        droop: of the servos, which adds to the compliance of the joints, rad/(N m).
+
+    Raises:
+        NoEquilibrium: by `settle` and `advance`.
+    """
+
+    def __init__(self, chain: VslChain, gravity: float, droop: float) -> None:
+        self._chain = chain
+        self._gravity = gravity
+        self._droop = droop
+        self._weight = [gravity * m for m in chain.carried.tolist()]
+        self._tip = 0.0
+        self.pose = Pose(np.zeros(len(chain)), np.zeros(len(chain)), (0.0, 0.0), (0.0, 0.0))
+
+    def settle(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
+        """Rest at the angles of J2 and J3 that the servos aim at, rad, wherever the arm was before."""
+        tip, reached, share = theta[0] + theta[1], 0.0, _LARGEST_SHARE
+        while reached < 1.0:
+            bodies = self._bodies(theta, p, load, min(reached + share, 1.0))
+            found = _newton(bodies, tip)
+            if found is not None and self._rest(bodies, found):
+                tip, reached, share = found, reached + share, min(2.0 * share, _LARGEST_SHARE)
+            elif share > _SMALLEST_SHARE:
+                share /= 2.0
+            else:
+                raise NoEquilibrium(theta, p, load)
+
+    def advance(
+        self,
+        dt: float,  # noqa: ARG002
+        theta: tuple[tuple[float, float], tuple[float, float]],
+        p: tuple[float, float],
+        load: float,
+        spin: float,  # noqa: ARG002
+    ) -> None:
+        """Rest at the second of the two pairs of angles; time, the first pair and the turn of J1 do not matter."""
+        bodies = self._bodies(theta[1], p, load, 1.0)
+        tip = _newton(bodies, self._tip)
+        if tip is None or not self._rest(bodies, tip):
+            self.settle(theta[1], p, load)
+
+    def get_state(self) -> bytes:
+        """Return the complete state."""
+        return pickle.dumps((self._tip, self.pose))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this chain or of one with equal parameters."""
+        self._tip, self.pose = pickle.loads(state)
+
+    def _bodies(self, theta: tuple[float, float], p: tuple[float, float], load: float, share: float) -> list[_Body]:
+        """Return all bodies from the tip inwards, at a share of gravity."""
+        chain = self._chain
+        hinge, shear = chain.springs(p)
+        offset = [0.0] * len(hinge)
+        offset[0], offset[chain.elbow] = theta
+        hinge[0] += self._droop
+        hinge[chain.elbow] += self._droop
+        weight = [share * (w + self._gravity * load) for w in self._weight]
+        return [_Body(*body) for body in zip(chain.lengths, shear, weight, hinge, offset, strict=True)][::-1]
+
+    def _rest(self, bodies: list[_Body], tip: float) -> bool:
+        """Take the pose that belongs to a tip angle if it is stable; return whether."""
+        angles: list[float] = []
+        shears: list[float] = []
+        taus: list[float] = []
+        tau, dtau, phi, dphi = 0.0, 0.0, tip, 1.0
+        for l, c, A, b, offset in bodies:
+            co, si = math.cos(phi), math.sin(phi)
+            cA = c * A
+            angles.append(phi)
+            shears.append(-cA * co)
+            tau -= A * co * (l + cA * si)
+            dtau -= A * (cA * (co * co - si * si) - l * si) * dphi
+            taus.append(tau)
+            phi -= b * tau + offset
+            dphi -= b * dtau
+            if dphi <= 0.0:
+                return False
+        self._tip = tip
+        tau_2, tau_3 = -taus[-1], -taus[-1 - self._chain.elbow]
+        droop = (self._droop * tau_2, self._droop * tau_3)
+        self.pose = Pose(np.array(angles[::-1]), np.array(shears[::-1]), (tau_2, tau_3), droop)
+        return True
+
+
+def _newton(bodies: list[_Body], tip: float) -> float | None:
+    """Return the tip's angle for which the ground's is 0, or None if there is none near."""
+    for _ in range(_ITERATIONS):
+        tau, dtau, phi, dphi = 0.0, 0.0, tip, 1.0
+        for l, c, A, b, offset in bodies:
+            co, si = math.cos(phi), math.sin(phi)
+            cA = c * A
+            tau -= A * co * (l + cA * si)
+            dtau -= A * (cA * (co * co - si * si) - l * si) * dphi
+            phi -= b * tau + offset
+            dphi -= b * dtau
+        if dphi <= 0.0:
+            return None
+        change = phi / dphi
+        tip -= max(-_FARTHEST, min(change, _FARTHEST))
+        if abs(change) < _TOLERANCE:
+            return tip
+    return None
