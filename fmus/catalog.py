@@ -69,13 +69,13 @@ _ENTRIES = (
     ),
     Entry(
         "HandoverVision",
-        "handover.controllers.handover_vision:HandoverVision",
+        "handover.controllers.helix.handover_vision:HandoverVision",
         Fraction(1, 30),
         "finds ball and markers",
     ),
     Entry(
         "VisualServo",
-        "handover.controllers.visual_servo:VisualServo",
+        "handover.controllers.helix.visual_servo:VisualServo",
         Fraction(1, 2),
         "moves the arm by what vision sees",
     ),
@@ -87,13 +87,13 @@ _ENTRIES = (
     ),
     Entry(
         "TrajectoryPlanner",
-        "handover.controllers.trajectory_planner:TrajectoryPlanner",
+        "handover.controllers.vsl.trajectory_planner:TrajectoryPlanner",
         Fraction(1, 50),
         "lines, arcs and squares for a three-joint arm",
     ),
     Entry(
         "HybridKinematics",
-        "handover.controllers.hybrid_kinematics:HybridKinematics",
+        "handover.controllers.vsl.hybrid_kinematics:HybridKinematics",
         Fraction(1, 50),
         "rigid-link kinematics, corrected by what was learned",
     ),
@@ -118,21 +118,21 @@ _ENTRIES = (
     ),
     Entry(
         "ImpedanceController",
-        "handover.controllers.impedance_controller:ImpedanceController",
+        "handover.controllers.free_flyer.impedance_controller:ImpedanceController",
         Fraction(2, 125),
         "makes the gripper yield like a spring and damper",
         ("control",),
     ),
     Entry(
         "PoseController",
-        "handover.controllers.pose_controller:PoseController",
+        "handover.controllers.free_flyer.pose_controller:PoseController",
         Fraction(2, 125),
         "flies to a pose",
         ("control",),
     ),
     Entry(
         "HandoverStateMachine",
-        "handover.controllers.handover_state_machine:HandoverStateMachine",
+        "handover.controllers.free_flyer.handover_state_machine:HandoverStateMachine",
         Fraction(2, 125),
         "decides when to fly, yield, signal, hold and let go",
     ),
@@ -143,7 +143,10 @@ _ENTRIES = (
         "soft hand, object, table, IR sensors",
     ),
     Entry(
-        "IrReflex", "handover.controllers.ir_reflex:IrReflex", Fraction(3, 200), "corrects a grasp by infrared reflexes"
+        "IrReflex",
+        "handover.controllers.ir_grasp.ir_reflex:IrReflex",
+        Fraction(3, 200),
+        "corrects a grasp by infrared reflexes",
     ),
 )
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import click
 
-from handover.controllers.hybrid_kinematics import Params
-from handover.controllers.vsl_kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.hybrid_kinematics import Params
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.cosim.exceptions import CosimError, UnitFailure
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
@@ -44,7 +44,7 @@ def vsl_train(points: int, seed: int, elbow: str, plant: Path | None, out: Path)
 
     Measures points at random pressures, joint angles and loads, fits what rigid kinematics leave, and prints the errors
     of points that were set aside. The model is a parameter of HybridKinematics: `-p model=FILE` of vsl_hybrid. An --out
-    that ends in .py gets the form of controllers/vsl_default_model.py.
+    that ends in .py gets the form of controllers/vsl/default_model.py.
 
     Ctrl-C aborts; the file is written at the end, whole or not at all.
     """

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.vsl_fit import Fit, fit_cubic
-from handover.controllers.vsl_kinematics import Elbow, VslKinematics
-from handover.controllers.vsl_model import FORWARD_INPUTS, VslModel, inputs_of, turned
-from handover.controllers.vsl_model_text import model_text
+from handover.controllers.vsl.fit import Fit, fit_cubic
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.learned_model import FORWARD_INPUTS, VslModel, inputs_of, turned
+from handover.controllers.vsl.model_text import model_text
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
@@ -33,7 +33,7 @@ _MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
 
 Generated; when the sources of the arm (plants/vsl_*.py) have changed, run again
 
-    handover vsl-train --points {points} --seed {seed}{elbow} --out controllers/vsl_default_model.py
+    handover vsl-train --points {points} --seed {seed}{elbow} --out controllers/vsl/default_model.py
 """
 
 DEFAULT_MODEL = """\\

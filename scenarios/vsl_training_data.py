@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.vsl_kinematics import VslKinematics
+from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused

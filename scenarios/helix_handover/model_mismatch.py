@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from handover.controllers.constant_curvature import forward_kinematics
+from handover.controllers.helix.constant_curvature import forward_kinematics
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.paper import paper_values
 

@@ -62,7 +62,9 @@ def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
 
 def _mark(side: Cover, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
     """Yield the mark of a point, unless it is behind the camera."""
-    from handover.controllers.handover_vision import Params as Vision  # long to load for who only lists parameters
+    from handover.controllers.helix.handover_vision import (
+        Params as Vision,  # long to load for who only lists parameters
+    )
 
     camera = _camera(side)
     u, v = camera.project(p_WP).tolist()

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from handover.controllers.reflex_parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Strategy
 from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.units import Metre, Radian
 from handover.plants.ir_grasp.objects import Thing

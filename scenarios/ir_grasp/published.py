@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from handover.controllers.reflex_parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Strategy
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.reporting.published_value import PublishedValue
 

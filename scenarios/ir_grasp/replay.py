@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import FINGERS, PALM, finger_points, sensor_rays

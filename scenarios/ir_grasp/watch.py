@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.plants.ir_grasp.objects import SOLIDS

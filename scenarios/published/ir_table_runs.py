@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.reflex_parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Strategy
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp

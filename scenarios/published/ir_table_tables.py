@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from handover.controllers.ir_reflex import Stop
+from handover.controllers.ir_grasp.ir_reflex import Stop
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.statistics import LEVEL, paired_test, success_interval, two_proportions
 from handover.scenarios.ir_grasp.plots import FINGER_NAMES

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.trajectory_planner import Elbow, Path
-from handover.controllers.vsl_kinematics import place
-from handover.controllers.vsl_path import segments_of
+from handover.controllers.vsl.kinematics import place
+from handover.controllers.vsl.paths import segments_of
+from handover.controllers.vsl.trajectory_planner import Elbow, Path
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from handover.plants.vsl.parameters import HIGHEST_PRESSURE, Link, Motion

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handover.controllers.vsl_path import segments_of
+from handover.controllers.vsl.paths import segments_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.vsl.parameters import Params as ArmParams

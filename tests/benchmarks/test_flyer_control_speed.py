@@ -12,10 +12,10 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.spatial.transform import Rotation
 
-from handover.controllers import handover_state_machine, impedance_controller, pose_controller
-from handover.controllers.handover_state_machine import HandoverStateMachine, HandoverTask
-from handover.controllers.impedance_controller import ImpedanceController
-from handover.controllers.pose_controller import PoseController
+from handover.controllers.free_flyer import handover_state_machine, impedance_controller, pose_controller
+from handover.controllers.free_flyer.handover_state_machine import HandoverStateMachine, HandoverTask
+from handover.controllers.free_flyer.impedance_controller import ImpedanceController
+from handover.controllers.free_flyer.pose_controller import PoseController
 
 T, STEPS = 0.016, 2000
 

@@ -10,8 +10,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.handover_vision import HandoverVision, Outputs, Params
-from handover.controllers.handover_vision import Inputs as Pictures
+from handover.controllers.helix.handover_vision import HandoverVision, Outputs, Params
+from handover.controllers.helix.handover_vision import Inputs as Pictures
 from handover.cosim.blocks.geometry import quaternion_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.stereo_camera import Inputs, StereoCamera

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from handover.controllers.ball_fit import BallFit
-from handover.controllers.ball_outline import BallOutline
-from handover.controllers.stereo_rig import StereoRig
+from handover.controllers.helix.ball import BallFit, BallOutline
+from handover.controllers.helix.stereo import StereoRig
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import Floats
 

@@ -4,7 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.constant_curvature import forward_kinematics, linearise, segment_transform, tendon_lengths
+from handover.controllers.helix.constant_curvature import (
+    forward_kinematics,
+    linearise,
+    segment_transform,
+    tendon_lengths,
+)
 from handover.cosim.blocks.ports import Floats
 
 D_GRIPPER, D_TENDON = 0.10, 0.035

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.flyer_behaviour import Behaviour
-from handover.controllers.flyer_velocity_monitor import VelocityMonitor
-from handover.controllers.handover_state_machine import (
+from handover.controllers.free_flyer.handover_state_machine import (
     HandoverPhase,
     HandoverStateMachine,
     HandoverTask,
@@ -19,6 +17,8 @@ from handover.controllers.handover_state_machine import (
     Params,
     UnusableHandover,
 )
+from handover.controllers.free_flyer.ports import Behaviour
+from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 

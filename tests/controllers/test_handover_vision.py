@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.handover_vision import HandoverVision, Inputs, Outputs, Params
+from handover.controllers.helix.handover_vision import HandoverVision, Inputs, Outputs, Params
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import UnusableCalibration, quaternion_of
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.controllers.hybrid_kinematics import (
+from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
     HybridKinematics,
     Inputs,
@@ -14,9 +15,8 @@ from handover.controllers.hybrid_kinematics import (
     Params,
     UnusableModel,
 )
-from handover.controllers.vsl_default_model import DEFAULT_MODEL
-from handover.controllers.vsl_kinematics import VslKinematics
-from handover.controllers.vsl_model_text import parse_model
+from handover.controllers.vsl.kinematics import VslKinematics
+from handover.controllers.vsl.model_text import parse_model
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 MODEL = parse_model(DEFAULT_MODEL, "that ships")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.flyer_behaviour import Behaviour
-from handover.controllers.flyer_rotation import UnusableOrientation
-from handover.controllers.flyer_stability import UnusableController
-from handover.controllers.impedance_controller import ImpedanceController, Inputs, Outputs, Params
+from handover.controllers.free_flyer.body import UnusableController
+from handover.controllers.free_flyer.impedance_controller import ImpedanceController, Inputs, Outputs, Params
+from handover.controllers.free_flyer.ports import Behaviour
+from handover.controllers.free_flyer.rotations import UnusableOrientation
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
 from handover.cosim.blocks.ports import Floats

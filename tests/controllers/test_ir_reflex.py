@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.ir_reflex import (
+from handover.controllers.ir_grasp.ir_reflex import (
     Inputs,
     IrReflex,
     Outputs,
@@ -20,7 +20,7 @@ from handover.controllers.ir_reflex import (
     UnusableReflex,
     Visibility,
 )
-from handover.controllers.reflex_visibility import RECOVERY, Action
+from handover.controllers.ir_grasp.visibility import RECOVERY, Action
 
 DT = 0.015
 CURVE = Params().calibration

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.flyer_profile import Bounds, profile_between
-from handover.controllers.flyer_stability import UnusableController
-from handover.controllers.pose_controller import Inputs, Outputs, Params, PoseController
+from handover.controllers.free_flyer.body import UnusableController
+from handover.controllers.free_flyer.pose_controller import Inputs, Outputs, Params, PoseController
+from handover.controllers.free_flyer.profile import Bounds, profile_between
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats

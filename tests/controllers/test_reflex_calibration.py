@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.reflex_calibration import Calibration
+from handover.controllers.ir_grasp.parameters import Calibration
 
 CURVE = Calibration(0.062, -0.0030, 0.022, -0.00043)
 

@@ -2,8 +2,8 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.reflex_descent import Descent, Verdict
-from handover.controllers.reflex_parameters import Params
+from handover.controllers.ir_grasp.descent import Descent, Verdict
+from handover.controllers.ir_grasp.parameters import Params
 
 X = (-0.2, 0.0, 0.0, 0.0)
 J = np.array([[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handover.controllers.reflex_gauss_newton import (
+from handover.controllers.ir_grasp.descent import (
     bounded_step,
     broyden_update,
     cost,

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handover.controllers.reflex_move import Move
-from handover.controllers.reflex_probing import Probing
+from handover.controllers.ir_grasp.moves import Move, Probing
 
 SIZES = (0.004, 0.004, 0.04, 0.03)
 

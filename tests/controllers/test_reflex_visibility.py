@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from handover.controllers.reflex_visibility import RECOVERY, Action, Motion, Recovery, Visibility, displaced
+from handover.controllers.ir_grasp.visibility import RECOVERY, Action, Motion, Recovery, Visibility, displaced
 
 STEP, CLOSING, LEAST = 0.010, 0.05, 0.002
 

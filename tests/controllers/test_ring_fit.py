@@ -1,10 +1,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.marker_reader import Markers
-from handover.controllers.marker_ring import MarkerRing
-from handover.controllers.normal_equations import covariance
-from handover.controllers.ring_fit import RingFit
+from handover.controllers.helix.markers import MarkerRing, Markers
+from handover.controllers.helix.ring_fit import RingFit
+from handover.controllers.helix.stereo import covariance
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import Floats
 

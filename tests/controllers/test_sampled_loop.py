@@ -5,7 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from handover.controllers.sampled_loop import LinearController, LinearPlant, SampledLoop, largest_stable, without_memory
+from handover.controllers.free_flyer.sampled_loop import (
+    LinearController,
+    LinearPlant,
+    SampledLoop,
+    largest_stable,
+    without_memory,
+)
 from handover.cosim.blocks.ports import Floats
 
 T = 0.016

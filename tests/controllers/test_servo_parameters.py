@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.servo_parameters import Params, UnusableParameters
-from handover.controllers.visual_servo import VisualServo
+from handover.controllers.helix.servo_parameters import Params, UnusableParameters
+from handover.controllers.helix.visual_servo import VisualServo
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.trajectory_planner import (
+from handover.controllers.vsl.kinematics import VslKinematics
+from handover.controllers.vsl.paths import Line, QuarterArc
+from handover.controllers.vsl.trajectory_planner import (
     Elbow,
     Inputs,
     Outputs,
@@ -14,8 +16,6 @@ from handover.controllers.trajectory_planner import (
     TrajectoryPlanner,
     UnusablePath,
 )
-from handover.controllers.vsl_kinematics import VslKinematics
-from handover.controllers.vsl_path import Line, QuarterArc
 from handover.cosim.blocks.ports import Floats
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.constant_curvature import forward_kinematics, tendon_lengths
-from handover.controllers.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
+from handover.controllers.helix.constant_curvature import forward_kinematics, tendon_lengths
+from handover.controllers.helix.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.vsl_kinematics import Elbow, Unreachable, VslKinematics
+from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 UNEQUAL = VslKinematics(0.1, 0.3, 0.2, Elbow.DOWN)

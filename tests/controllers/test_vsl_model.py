@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.vsl_cubic import Cubic, all_powers, hull_directions
-from handover.controllers.vsl_default_model import DEFAULT_MODEL
-from handover.controllers.vsl_fit import fit_cubic, rounded
-from handover.controllers.vsl_kinematics import Elbow, VslKinematics
-from handover.controllers.vsl_model import VslModel, inputs_of, turned
-from handover.controllers.vsl_model_text import UnusableModel, model_text, parse_model, read_model
+from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl.fit import fit_cubic, rounded
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.learned_model import Cubic, VslModel, all_powers, hull_directions, inputs_of, turned
+from handover.controllers.vsl.model_text import UnusableModel, model_text, parse_model, read_model
 from handover.cosim.blocks.ports import Floats
 
 RNG = np.random.default_rng(5)

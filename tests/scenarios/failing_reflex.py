@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from handover.controllers.ir_reflex import Inputs, IrReflex, Outputs, Params
+from handover.controllers.ir_grasp.ir_reflex import Inputs, IrReflex, Outputs, Params
 
 T_BAD = 0.1
 """From when on they misbehave, s."""

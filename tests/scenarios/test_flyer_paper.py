@@ -9,10 +9,10 @@ import tomli
 from origins import assert_every_default_has_its_origin
 
 import handover.scenarios.free_flyer
-from handover.controllers.flyer_handover_parameters import Params as DecisionParams
-from handover.controllers.impedance_controller import Behaviour
-from handover.controllers.impedance_controller import Params as ImpedanceParams
-from handover.controllers.pose_controller import Params as PoseParams
+from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
+from handover.controllers.free_flyer.impedance_controller import Behaviour
+from handover.controllers.free_flyer.impedance_controller import Params as ImpedanceParams
+from handover.controllers.free_flyer.pose_controller import Params as PoseParams
 from handover.plants.free_flyer.free_flyer import Params as RobotParams
 from handover.plants.free_flyer.parameters import Params as PersonParams
 from handover.plants.free_flyer.push import Params as PushParams

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handover.controllers.handover_state_machine import HandoverPhase as Phase
+from handover.controllers.free_flyer.handover_state_machine import HandoverPhase as Phase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.ir_reflex import Phase, Stop
-from handover.controllers.reflex_parameters import Strategy
+from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
+from handover.controllers.ir_grasp.parameters import Strategy
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule

@@ -9,7 +9,7 @@ import tomli
 from origins import assert_every_default_has_its_origin
 
 import handover.scenarios.ir_grasp
-from handover.controllers.reflex_parameters import Params as ReflexParams
+from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.plants.ir_grasp.objects import Thing
 from handover.plants.ir_grasp.parameters import Params as SceneParams
 from handover.scenarios.ir_grasp.parameters import Parameters

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.reflex_parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Strategy
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import Thing, outlines
 from handover.scenarios.ir_grasp.parameters import Parameters

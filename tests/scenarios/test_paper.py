@@ -8,7 +8,7 @@ import pytest
 import tomli
 
 import handover.scenarios.helix_handover
-from handover.controllers.servo_parameters import Params as ServoParams
+from handover.controllers.helix.servo_parameters import Params as ServoParams
 from handover.plants.helix.handover_partner import Params as HandParams
 from handover.plants.helix.stereo_camera import Params as CameraParams
 from handover.plants.helix.tendon_design import Params as ArmParams

@@ -10,10 +10,10 @@ import pytest
 import tomli
 
 import handover.scenarios.vsl
-from handover.controllers.hybrid_kinematics import Params as KinematicsParams
-from handover.controllers.trajectory_planner import Elbow
-from handover.controllers.trajectory_planner import Params as PlannerParams
-from handover.controllers.vsl_path import Path, QuarterArc, segments_of
+from handover.controllers.vsl.hybrid_kinematics import Params as KinematicsParams
+from handover.controllers.vsl.paths import Path, QuarterArc, segments_of
+from handover.controllers.vsl.trajectory_planner import Elbow
+from handover.controllers.vsl.trajectory_planner import Params as PlannerParams
 from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality

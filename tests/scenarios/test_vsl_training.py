@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from handover.controllers.vsl_default_model import DEFAULT_MODEL
-from handover.controllers.vsl_kinematics import Elbow, VslKinematics
-from handover.controllers.vsl_model import VslModel
-from handover.controllers.vsl_model_text import parse_model, read_model
+from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.learned_model import VslModel
+from handover.controllers.vsl.model_text import parse_model, read_model
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import write_archive
@@ -205,7 +205,7 @@ def shipped() -> VslModel:
 
 def test_the_model_that_ships_was_trained_on_the_present_arm():
     key = shipped().provenance["arm"]["key"]
-    assert key == content_key(cached("VslArm", 3)), "run `handover vsl-train --out controllers/vsl_default_model.py`"
+    assert key == content_key(cached("VslArm", 3)), "run `handover vsl-train --out controllers/vsl/default_model.py`"
 
 
 @pytest.mark.slow

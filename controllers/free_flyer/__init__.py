@@ -1,0 +1,1 @@
+"""What runs on the free-flyer's computer: handover sequence, impedance and pose control."""

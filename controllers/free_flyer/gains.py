@@ -1,0 +1,96 @@
+"""Stiffness and damping of a free-flyer's gripper. [Fernandes2020] table 4.1.
+
+PID laws of a free-flyer's base, for its translation and its attitude.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.controllers.free_flyer.body import FlyerBody, positive_definite
+from handover.controllers.free_flyer.ports import Behaviour
+from handover.controllers.free_flyer.sampled_loop import LinearController, without_memory
+from handover.cosim.blocks.ports import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpedanceGains:
+    """k_D and k_B of eq. (3.25), each (3, 3), for translation (N/m, N s/m) and rotation (N m/rad, N m s/rad)."""
+
+    stiffness_translation: Floats
+    damping_translation: Floats
+    stiffness_rotation: Floats
+    damping_rotation: Floats
+
+    def faults(self) -> list[str]:
+        """Return which of the four matrices is not symmetric and positive definite, as eq. (3.25) wants them."""
+        return [
+            f"{name} = {np.asarray(M).tolist()} must be symmetric and positive definite"
+            for name, M in vars(self).items()
+            if not positive_definite(M)
+        ]
+
+    def scaled(self, factor: float) -> "ImpedanceGains":
+        """Return all gains times a factor."""
+        return ImpedanceGains(**{name: factor * M for name, M in vars(self).items()})
+
+    def law(self, body: FlyerBody) -> LinearController:
+        """Return eq. (3.25) near the goal: commanded wrench on B from displacement and twist of G."""
+        K: Floats = np.zeros((6, 6))
+        D: Floats = np.zeros((6, 6))
+        K[:3, :3], K[3:, 3:] = self.stiffness_translation, self.stiffness_rotation
+        D[:3, :3], D[3:, 3:] = self.damping_translation, self.damping_rotation
+        return without_memory(np.transpose(body.jacobian()) @ np.hstack([K, D]))
+
+
+def published_gains(behaviour: Behaviour, body: FlyerBody) -> ImpedanceGains:
+    """Return the rigid or the compliant column of table 4.1: 7 m, 15, 70 H, 5 or 0.7 m, 5, 7 H, 1."""
+    k, d, k_R, d_R = {Behaviour.RIGID: (7.0, 15.0, 70.0, 5.0), Behaviour.COMPLIANT: (0.7, 5.0, 7.0, 1.0)}[behaviour]
+    I = np.eye(3)
+    return ImpedanceGains(
+        stiffness_translation=np.diag([k * body.mass] * 3),
+        damping_translation=d * I,
+        stiffness_rotation=k_R * body.I_B,
+        damping_rotation=d_R * I,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PidGains:
+    """Accelerations for error, its integral and its rate: 1/s2, 1/s3, 1/s."""
+
+    k_P: float
+    k_I: float
+    k_D: float
+
+    def faults(self, name: str) -> list[str]:
+        """Return what keeps the continuous loop of a free body from being stable: Routh's k_P k_D > k_I >= 0."""
+        if not (self.k_P > 0.0 and self.k_D > 0.0):
+            return [f"{name}: k_P = {self.k_P:g} and k_D = {self.k_D:g} must be positive"]
+        if not 0.0 <= self.k_I < self.k_P * self.k_D:
+            return [f"{name}: k_I = {self.k_I:g} must be from 0 to less than k_P k_D = {self.k_P * self.k_D:g} 1/s3"]
+        return []
+
+    def scaled(self, factor: float) -> "PidGains":
+        """Return all gains times a factor."""
+        return PidGains(k_P=factor * self.k_P, k_I=factor * self.k_I, k_D=factor * self.k_D)
+
+
+def pid_law(body: FlyerBody, position: PidGains, attitude: PidGains, period: float) -> LinearController:
+    """Return both laws near the goal: commanded wrench on B from displacement and twist of G (6 and 6).
+
+    The integral of a sample counts from the next one on. A channel without integral has no state for it: that would
+    be a pole at one which nothing sees.
+    """
+    M, O = body.mass_matrix(), np.zeros((6, 6))
+    base: Floats = np.linalg.inv(body.jacobian()).astype(np.float64)
+    P, integral, D = (
+        np.diag(np.repeat([getattr(position, k), getattr(attitude, k)], 3)) for k in ("k_P", "k_I", "k_D")
+    )
+    kept = np.eye(6)[np.diag(integral) > 0.0]
+    return LinearController(
+        A=np.eye(len(kept)),
+        B=period * kept @ np.hstack([base, O]),
+        C=M @ integral @ np.transpose(kept),
+        D=M @ np.hstack([P @ base, D @ base]),
+    )

@@ -1,0 +1,165 @@
+"""Parameters of a free-flyer's handover, and what is wrong with them. [Fernandes2020] sec. 4.1.2 and 4.3."""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.controllers.free_flyer.ports import ARM, Behaviour
+from handover.controllers.free_flyer.rotations import rows_of, unit_quaternion
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.plain_rotation import triple, turned
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, Second
+
+NAME = "HandoverStateMachine"
+
+_VELOCITIES = {Behaviour.RIGID: (0.059, 0.021), Behaviour.COMPLIANT: (0.08, 0.037)}  # release, receive: sec. 4.1.2
+
+
+class UnusableHandover(Refusal):
+    """A handover that cannot be done as its parameters have it; `faults` lists all of them."""
+
+    block = NAME
+
+
+class HandoverTask(enum.IntEnum):
+    """What is handed over to whom; sec. 5.5 has the last three."""
+
+    HOLD = 0
+    ROBOT_TO_HUMAN = 1
+    HUMAN_TO_ROBOT = 2
+    COLLABORATIVE = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Places, thresholds and times; velocities, angle and handover place as stated, all else assumed."""
+
+    task: HandoverTask = parameter(
+        HandoverTask.HOLD, "HOLD stays at the handover place and yields; COLLABORATIVE gives, waits there, and receives"
+    )
+    behaviour: Behaviour = parameter(Behaviour.RIGID, "behaviour that the velocities below are for")
+    release_velocity: MetrePerSecond = parameter(
+        0.0, "speed of the gripper that tells of a pull; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
+    )
+    receive_velocity: MetrePerSecond = parameter(
+        0.0, "speed that tells of an object put into it; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
+    )
+    angle_threshold: Radian = parameter(
+        0.71, "gripper angle above which a closed gripper holds something", minimum=0.0, maximum=6.3
+    )
+    p_WG_handover: Vector3[Metre] = parameter(np.array([0.0, -0.07, 0.0]), "where the gripper hands over")
+    q_WG_handover: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "its orientation there")
+    p_WO_0: Vector3[Metre] = parameter(np.array([-0.10, -0.57, 0.0]), "where the object is fetched: its centre")
+    p_OG: Vector3[Metre] = parameter(
+        np.array([0.0, -0.07, 0.0]),
+        "where it is gripped, seen from its centre, in the world",
+        minimum=-1.0,
+        maximum=1.0,
+    )
+    q_WG_object: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper at the object")
+    approach: Metre = parameter(
+        0.15,
+        "length of the way on which it comes to the object straight ahead, along -x of G",
+        minimum=0.0,
+        maximum=5.0,
+    )
+    p_WG_retreat: Vector3[Metre] = parameter(np.array([0.40, -0.07, 0.0]), "where the gripper retreats to")
+    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass", minimum=-5.0, maximum=5.0)
+    workspace_low: Vector3[Metre] = parameter(
+        np.array([-0.30, -1.5, -1.5]), "least coordinates of gripper and robot: the person is beyond, at -x"
+    )
+    workspace_high: Vector3[Metre] = parameter(np.array([2.0, 1.5, 1.5]), "greatest coordinates of gripper and robot")
+    gate_error: Metre = parameter(
+        0.05, "distance from the handover place below which impedance control may begin", minimum=1e-4, maximum=10.0
+    )
+    gate_speed: MetrePerSecond = parameter(0.01, "speed below which the gripper is at rest", minimum=1e-4, maximum=10.0)
+    tolerance: Metre = parameter(
+        0.01, "distance from the goal at which it has arrived, and at which it signals", minimum=1e-4, maximum=10.0
+    )
+    tolerance_angle: Radian = parameter(0.05, "angle at which it has arrived anywhere", minimum=1e-3, maximum=3.2)
+    settle_time: Second = parameter(0.5, "time at rest and in place that makes it arrived", minimum=0.0, maximum=60.0)
+    gripper_time: Second = parameter(1.0, "time that opening or closing takes", minimum=0.0, maximum=60.0)
+    signal_time: Second = parameter(1.0, "time that the light is on", minimum=0.0, maximum=60.0)
+    pause: Second = parameter(
+        4.0, "COLLABORATIVE: time from the release to the next signal, at least", minimum=0.0, maximum=600.0
+    )
+    filter_time: Second = parameter(0.08, "time constant of the velocity's low-pass", minimum=0.0, maximum=10.0)
+    attempts: int = parameter(5, "failed receptions before it gives up", minimum=1, maximum=1000)
+    patience: Second = parameter(60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5)
+
+    def velocities(self) -> tuple[float, float]:
+        """Return the thresholds for release and reception; 0 for one that is neither given nor stated."""
+        release, receive = _VELOCITIES.get(self.behaviour, (0.0, 0.0))
+        return self.release_velocity or release, self.receive_velocity or receive
+
+    def object_goal(self) -> Floats:
+        """Return p_WG where the object is grasped."""
+        return self.p_WO_0 + self.p_OG
+
+    def standoff(self) -> Floats:
+        """Return p_WG where the straight way to the object begins."""
+        back = turned(rows_of(unit_quaternion(self.q_WG_object, NAME, "q_WG_object")), (self.approach, 0.0, 0.0))
+        return self.object_goal() + np.array(back)
+
+    @property
+    def fetches(self) -> bool:
+        """Whether the task begins with an object to be fetched."""
+        return self.task in (HandoverTask.ROBOT_TO_HUMAN, HandoverTask.COLLABORATIVE)
+
+    def check(self) -> None:
+        """Raise UnusableHandover, with all faults, if this is no handover that can be done."""
+        faults = self._place_faults() + self._velocity_faults() + self._time_faults()
+        if faults:
+            raise UnusableHandover(faults)
+
+    def _place_faults(self) -> list[str]:
+        faults = [
+            f"{name} = {q.tolist()} must be finite and not zero"
+            for name, q in (("q_WG_handover", self.q_WG_handover), ("q_WG_object", self.q_WG_object))
+            if not 1e-6 < np.linalg.norm(q) < np.inf
+        ]
+        low, high = self.workspace_low, self.workspace_high
+        if not np.all(low < high):
+            faults.append(f"workspace_low = {low.tolist()} must be less than workspace_high = {high.tolist()}")
+        return faults or [fault for name, p_WG, q_WG in self._places() for fault in self._outside(name, p_WG, q_WG)]
+
+    def _places(self) -> list[tuple[str, Floats, Floats]]:
+        """Gripper goals of the task: name, position, orientation."""
+        places = [("p_WG_handover", self.p_WG_handover, self.q_WG_handover)]
+        if self.fetches:
+            places.append(("p_WO_0 + p_OG", self.object_goal(), self.q_WG_object))
+            places.append(("the way to the object", self.standoff(), self.q_WG_object))
+        if self.task is not HandoverTask.HOLD:
+            places.append(("p_WG_retreat", self.p_WG_retreat, self.q_WG_handover))
+        return places
+
+    def _outside(self, name: str, p_WG: Floats, q_WG: Floats) -> list[str]:
+        back = turned(rows_of(unit_quaternion(q_WG, NAME, name)), triple(self.p_BG))
+        low, high = self.workspace_low, self.workspace_high
+        return [
+            f"{name} takes the {what} to {np.round(p, 3).tolist()} m, out of the workspace from {low.tolist()} to "
+            f"{high.tolist()} m"
+            for what, p in (("gripper", p_WG), ("robot's centre of mass", p_WG - np.array(back)))
+            if not np.all((low <= p) & (p <= high))
+        ]
+
+    def _velocity_faults(self) -> list[str]:
+        faults: list[str] = []
+        for name, v in zip(("release_velocity", "receive_velocity"), self.velocities(), strict=True):
+            if v == 0.0:
+                faults.append(f"{name} must be given, since none is stated for the behaviour {self.behaviour.name}")
+            elif not v > self.gate_speed:
+                faults.append(
+                    f"{name} = {v:g} m/s must exceed gate_speed = {self.gate_speed:g} m/s, or rest itself trips it"
+                )
+        return faults
+
+    def _time_faults(self) -> list[str]:
+        times = ("settle_time", "gripper_time", "signal_time") + ("pause",) * (self.task is HandoverTask.COLLABORATIVE)
+        return [
+            f"{name} = {getattr(self, name):g} s must not exceed patience = {self.patience:g} s, or it gives up first"
+            for name in times
+            if self.task is not HandoverTask.HOLD and not getattr(self, name) <= self.patience
+        ]

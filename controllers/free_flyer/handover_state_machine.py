@@ -1,0 +1,310 @@
+"""The sequence of a free-flyer's handovers. [Fernandes2020] chapter 3, figures 3.1 to 3.3."""
+
+import enum
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.controllers.free_flyer.handover_parameters import NAME, HandoverTask, Params, UnusableHandover
+from handover.controllers.free_flyer.rotations import angle_between, rows_of, unit_quaternion
+from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
+from handover.cosim.blocks.plain_rotation import Quaternion, Triple, cross, norm, triple, turned
+from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
+
+__all__ = [
+    "HandoverPhase",
+    "HandoverStateMachine",
+    "HandoverTask",
+    "Inputs",
+    "Outputs",
+    "Params",
+    "UnusableHandover",
+]
+
+
+class HandoverPhase(enum.IntEnum):
+    """States of figure 3.1, and its two ends."""
+
+    OPEN_GRIPPER = 0
+    MOVE_TO_OBJECT = 1
+    GRASP_OBJECT = 2
+    MOVE_TO_HANDOVER = 3
+    ACTIVATE_IMPEDANCE = 4
+    SIGNAL = 5
+    CHECK_VELOCITY = 6
+    RELEASE_OBJECT = 7
+    CLOSE_GRIPPER = 8
+    CHECK_ANGLE = 9
+    DEACTIVATE_IMPEDANCE = 10
+    RETREAT = 11
+    DONE = 12
+    GIVEN_UP = 13
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """The navigation's estimate of the base, and the gripper's angle."""
+
+    p_WB_meas: Vector3[Metre] = port(np.zeros(3), "estimated position of the centre of mass")
+    q_WB_meas: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "estimated attitude")
+    v_WB_meas: Vector3[MetrePerSecond] = port(np.zeros(3), "estimated velocity of the centre of mass, in the world")
+    w_WB_meas: Vector3[RadianPerSecond] = port(np.zeros(3), "estimated angular velocity, in the world")
+    gripper_angle: Radian = port(0.0, "angle between the gripper's main links")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """Where the gripper is to be, which controller is on, and what gripper and light do."""
+
+    phase: HandoverPhase = output("what the robot is doing")
+    p_WG_goal: Vector3[Metre] = output("where the gripper is to be")
+    q_WG_goal: Vector4[Number] = output("orientation that it is to have")
+    impedance: bool = output("impedance control is on")
+    pose: bool = output("pose control is on")
+    closure: Number = output("gripper command: 0 open, 1 closed", minimum=0.0, maximum=1.0)
+    light: bool = output("signal light: its beginning tells the person that the robot is ready")
+    failed_receptions: int = output("times that the gripper closed on nothing", minimum=0.0)
+    speed_G: MetrePerSecond = output("speed of the gripper, low-passed, as it is monitored", minimum=0.0)
+
+
+class HandoverStateMachine:
+    """Leads through a handover by the states of figure 3.1.
+
+    - Robot to human, figure 3.2: OPEN_GRIPPER, MOVE_TO_OBJECT (at the end straight ahead, for what is touched floats
+      away), GRASP_OBJECT, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until the gripper is faster than
+      release_velocity, RELEASE_OBJECT, DEACTIVATE_IMPEDANCE, RETREAT, DONE.
+    - Human to robot, figure 3.3: OPEN_GRIPPER, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until it
+      is faster than receive_velocity, CLOSE_GRIPPER, CHECK_ANGLE; above angle_threshold it holds the object and goes on
+      as above, else the reception has failed: OPEN_GRIPPER, and from SIGNAL again.
+    - Collaborative, sec. 5.5: robot to human up to RELEASE_OBJECT, then, from ACTIVATE_IMPEDANCE, human to robot.
+    - Hold: ACTIVATE_IMPEDANCE for good.
+
+    Conditions of this implementation besides: impedance control begins only at rest near the handover place
+    (gate_error, gate_speed), and the light only once the gripper is at rest again under it and within `tolerance`,
+    after a failure too, since a transient trips the threshold with no person there. The threshold counts from the light
+    on, once the speed was below it. The gripper's velocity is v + w x R p_BG. GIVEN_UP, holding the pose and not moving
+    the gripper, is entered after `patience` in a phase, after `attempts` failures, and when an object that was fetched
+    is not between the fingers.
+
+    Raises:
+        UnusableHandover: by the constructor, for goals out of reach, or thresholds or times that cannot work; all are
+            named.
+        UnusableOrientation: the estimated attitude is zero or not finite.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
+        ("phase", "p_WG_goal", "q_WG_goal", "impedance", "pose", "closure", "light", "failed_receptions", "speed_G"),
+        ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "gripper_angle"),
+    )
+    period: ClassVar[Fraction | None] = Fraction(2, 125)
+
+    def __init__(self, params: Params) -> None:
+        params.check()
+        self._params = params
+        self._T = float(Fraction(2, 125))
+        self._release, self._receive = params.velocities()
+        self._p_BG = triple(params.p_BG)
+        q_handover = unit_quaternion(params.q_WG_handover, NAME, "q_WG_handover")
+        self._handover: tuple[Triple, Quaternion] = (triple(params.p_WG_handover), q_handover)
+        self._retreat: tuple[Triple, Quaternion] = (triple(params.p_WG_retreat), q_handover)
+        q_object = unit_quaternion(params.q_WG_object, NAME, "q_WG_object")
+        self._standoff: tuple[Triple, Quaternion] = (triple(params.standoff()), q_object)
+        self._object: tuple[Triple, Quaternion] = (triple(params.object_goal()), q_object)
+        holds = params.task is HandoverTask.HOLD
+        self._monitor = VelocityMonitor(params.filter_time, self._T)
+        self._phase = HandoverPhase.ACTIVATE_IMPEDANCE if holds else HandoverPhase.OPEN_GRIPPER
+        self._goal: tuple[Triple, Quaternion] | None = self._handover if holds else None
+        self._impedance = holds
+        self._closure = 0.0
+        self._receiving = params.task is HandoverTask.HUMAN_TO_ROBOT
+        self._failed = 0
+        self._steps = 0  # in this phase
+        self._settled = 0  # steps in a row at rest and in place
+        self._rules = {
+            HandoverPhase.OPEN_GRIPPER: self._open_gripper,
+            HandoverPhase.MOVE_TO_OBJECT: self._move_to_object,
+            HandoverPhase.GRASP_OBJECT: self._grasp_object,
+            HandoverPhase.MOVE_TO_HANDOVER: self._move_to_handover,
+            HandoverPhase.ACTIVATE_IMPEDANCE: self._activate_impedance,
+            HandoverPhase.SIGNAL: self._signal,
+            HandoverPhase.CHECK_VELOCITY: self._check_velocity,
+            HandoverPhase.RELEASE_OBJECT: self._release_object,
+            HandoverPhase.CLOSE_GRIPPER: self._close_gripper,
+            HandoverPhase.CHECK_ANGLE: self._check_angle,
+            HandoverPhase.DEACTIVATE_IMPEDANCE: self._deactivate_impedance,
+            HandoverPhase.RETREAT: self._retreat_from_handover,
+        }
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        """Return what a step would give; nothing is decided."""
+        before = self.get_state()
+        y = self.step(t, self._T, u)
+        self.set_state(before)
+        return y
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Measure, decide, and return the commands that hold until t + dt; at most one transition."""
+        q_WB = unit_quaternion(u.q_WB_meas, NAME, "q_WB_meas")
+        r = r_x, r_y, r_z = turned(rows_of(q_WB), self._p_BG)
+        p_x, p_y, p_z = u.p_WB_meas.tolist()
+        v_x, v_y, v_z = u.v_WB_meas.tolist()
+        t_x, t_y, t_z = cross(triple(u.w_WB_meas), r)
+        self._monitor.measure((v_x + t_x, v_y + t_y, v_z + t_z))
+        here = (p_x + r_x, p_y + r_y, p_z + r_z), q_WB
+        if self._goal is None:
+            self._goal = here
+        self._judge_place(here)
+        rule = self._rules.get(self._phase)
+        following = rule(u.gripper_angle) if rule else None
+        if following is None and rule and self._is_late():
+            following = HandoverPhase.GIVEN_UP
+        self._steps += 1
+        if following is not None:
+            self._enter(following, here)
+        p_WG, q_WG = self._goal
+        return Outputs(
+            phase=self._phase,
+            p_WG_goal=np.array(p_WG),
+            q_WG_goal=np.array(q_WG),
+            impedance=self._impedance,
+            pose=not self._impedance,
+            closure=self._closure,
+            light=self._phase is HandoverPhase.SIGNAL,
+            failed_receptions=self._failed,
+            speed_G=self._monitor.speed,
+        )
+
+    def get_state(self) -> bytes:
+        """Return phase, goal, counters and the monitor's filter."""
+        counters = (self._failed, self._steps, self._settled)
+        switches = (self._impedance, self._closure, self._receiving)
+        return pickle.dumps((int(self._phase), self._goal, counters, switches, self._monitor.get_state()))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this machine or of one with equal parameters."""
+        phase, self._goal, counters, switches, monitor = pickle.loads(state)
+        self._phase = HandoverPhase(phase)
+        self._failed, self._steps, self._settled = counters
+        self._impedance, self._closure, self._receiving = switches
+        self._monitor.set_state(monitor)
+
+    def _judge_place(self, here: tuple[Triple, Quaternion]) -> None:
+        """Count the steps for which the gripper has been at rest at its goal."""
+        p, (p_WG, q_WG), goal = self._params, here, self._goal
+        if goal is None or self._monitor.speed >= p.gate_speed:
+            self._settled = 0
+            return
+        (a, b, c), (x, y, z) = goal[0], p_WG
+        to_handover = self._phase is HandoverPhase.MOVE_TO_HANDOVER
+        near = norm((a - x, b - y, c - z)) < (p.gate_error if to_handover else p.tolerance)
+        self._settled = self._settled + 1 if near and angle_between(goal[1], q_WG) < p.tolerance_angle else 0
+
+    def _arrived(self) -> bool:
+        return self._settled * self._T >= self._params.settle_time - self._T / 2.0 and self._settled > 0
+
+    def _lasted(self, time: float) -> bool:
+        return self._steps * self._T >= time - self._T / 2.0
+
+    def _is_late(self) -> bool:
+        holds = self._params.task is HandoverTask.HOLD
+        return not holds and self._lasted(self._params.patience)
+
+    def _enter(self, phase: HandoverPhase, here: tuple[Triple, Quaternion]) -> None:
+        goals = {
+            HandoverPhase.MOVE_TO_OBJECT: self._standoff,
+            HandoverPhase.MOVE_TO_HANDOVER: self._handover,
+            HandoverPhase.RETREAT: self._retreat,
+            HandoverPhase.GIVEN_UP: here,
+        }
+        closures = {
+            HandoverPhase.OPEN_GRIPPER: 0.0,
+            HandoverPhase.GRASP_OBJECT: 1.0,
+            HandoverPhase.RELEASE_OBJECT: 0.0,
+            HandoverPhase.CLOSE_GRIPPER: 1.0,
+        }
+        switches = {
+            HandoverPhase.ACTIVATE_IMPEDANCE: True,
+            HandoverPhase.DEACTIVATE_IMPEDANCE: False,
+            HandoverPhase.GIVEN_UP: False,
+        }
+        self._phase, self._steps, self._settled = phase, 0, 0
+        self._goal = goals.get(phase, self._goal)
+        self._closure = closures.get(phase, self._closure)
+        self._impedance = switches.get(phase, self._impedance)
+        if phase is HandoverPhase.SIGNAL:
+            self._monitor.disarm()
+
+    def _open_gripper(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        if not self._lasted(self._params.gripper_time):
+            return None
+        if self._impedance:  # after a failed reception: signal again, once what was the push is over
+            return HandoverPhase.SIGNAL if self._arrived() else None
+        return HandoverPhase.MOVE_TO_HANDOVER if self._receiving else HandoverPhase.MOVE_TO_OBJECT
+
+    def _move_to_object(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        if not self._arrived():
+            return None
+        if self._goal != self._object:
+            self._goal, self._settled = self._object, 0
+            return None
+        return HandoverPhase.GRASP_OBJECT
+
+    def _grasp_object(self, angle: float) -> HandoverPhase | None:
+        if not self._lasted(self._params.gripper_time):
+            return None
+        return HandoverPhase.MOVE_TO_HANDOVER if self._holds_something(angle) else HandoverPhase.GIVEN_UP
+
+    def _move_to_handover(self, angle: float) -> HandoverPhase | None:
+        if not self._receiving and not self._holds_something(angle):  # lost on the way
+            return HandoverPhase.GIVEN_UP
+        return HandoverPhase.ACTIVATE_IMPEDANCE if self._arrived() else None
+
+    def _activate_impedance(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        p = self._params
+        waits = p.task is HandoverTask.COLLABORATIVE and self._receiving and not self._lasted(p.pause)
+        if p.task is HandoverTask.HOLD or waits or not self._arrived():
+            return None
+        return HandoverPhase.SIGNAL
+
+    def _signal(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        self._moved_by_a_person()
+        return HandoverPhase.CHECK_VELOCITY if self._lasted(self._params.signal_time) else None
+
+    def _check_velocity(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        if not self._moved_by_a_person():
+            return None
+        return HandoverPhase.CLOSE_GRIPPER if self._receiving else HandoverPhase.RELEASE_OBJECT
+
+    def _release_object(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        if not self._lasted(self._params.gripper_time):
+            return None
+        if self._params.task is HandoverTask.COLLABORATIVE:
+            self._receiving = True
+            return HandoverPhase.ACTIVATE_IMPEDANCE
+        return HandoverPhase.DEACTIVATE_IMPEDANCE
+
+    def _close_gripper(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        return HandoverPhase.CHECK_ANGLE if self._lasted(self._params.gripper_time) else None
+
+    def _check_angle(self, angle: float) -> HandoverPhase | None:
+        if self._holds_something(angle):
+            return HandoverPhase.DEACTIVATE_IMPEDANCE
+        self._failed += 1
+        return HandoverPhase.GIVEN_UP if self._failed >= self._params.attempts else HandoverPhase.OPEN_GRIPPER
+
+    def _deactivate_impedance(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        return HandoverPhase.RETREAT if self._lasted(self._params.settle_time) else None
+
+    def _retreat_from_handover(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+        return HandoverPhase.DONE if self._arrived() else None
+
+    def _holds_something(self, angle: float) -> bool:
+        return angle > self._params.angle_threshold
+
+    def _moved_by_a_person(self) -> bool:
+        return self._monitor.exceeds(self._receive if self._receiving else self._release)

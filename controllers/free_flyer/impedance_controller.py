@@ -1,0 +1,165 @@
+"""A free-flyer's gripper that yields like a spring and a damper. [Fernandes2020] sec. 3.3.3 and 4.1.2."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.controllers.free_flyer.body import FlyerBody, UnusableController, stability_faults
+from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Behaviour, Inputs, Outputs
+from handover.controllers.free_flyer.rotations import rotation_vector, rows_of, seen_from, unit_quaternion
+from handover.controllers.free_flyer.sampled_loop import SampledLoop
+from handover.cosim.blocks.plain_rotation import ZERO, cross, norm, rows, triple, turned, turned_back
+from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
+from handover.cosim.blocks.units import (
+    Kilogram,
+    KilogramMetre2,
+    Metre,
+    NewtonMetrePerRadian,
+    NewtonMetreSecondPerRadian,
+    NewtonPerMetre,
+    NewtonSecondPerMetre,
+    Second,
+)
+
+__all__ = ["Behaviour", "ImpedanceController", "Inputs", "Outputs", "Params", "UnusableController"]
+
+_NAME = "ImpedanceController"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Gains of table 4.1 or custom ones, and what the robot knows of itself: public values of Astrobee, arm assumed."""
+
+    behaviour: Behaviour = parameter(
+        Behaviour.RIGID, "gains of [Fernandes2020] table 4.1, or CUSTOM for the four matrices below"
+    )
+    stiffness_translation: Matrix3[NewtonPerMetre] = parameter(
+        7.0 * MASS * np.eye(3), "CUSTOM: linear k_D, in the goal's axes"
+    )
+    damping_translation: Matrix3[NewtonSecondPerMetre] = parameter(
+        15.0 * np.eye(3), "CUSTOM: linear k_B, in the goal's axes"
+    )
+    stiffness_rotation: Matrix3[NewtonMetrePerRadian] = parameter(
+        70.0 * INERTIA, "CUSTOM: rotational k_D, in the goal's axes"
+    )
+    damping_rotation: Matrix3[NewtonMetreSecondPerRadian] = parameter(
+        5.0 * np.eye(3), "CUSTOM: rotational k_B, in the goal's axes"
+    )
+    mass: Kilogram = parameter(MASS, "mass of the robot", minimum=0.0, maximum=1e4)
+    I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
+    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
+    delay: Second = parameter(
+        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
+    )
+    lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
+
+    def body(self) -> FlyerBody:
+        """Return the robot's model of itself."""
+        return FlyerBody(mass=self.mass, I_B=self.I_B, p_BG=self.p_BG)
+
+    def gains(self) -> ImpedanceGains:
+        """Return the gains that the behaviour means."""
+        if self.behaviour is not Behaviour.CUSTOM:
+            return published_gains(self.behaviour, self.body())
+        return ImpedanceGains(
+            stiffness_translation=self.stiffness_translation,
+            damping_translation=self.damping_translation,
+            stiffness_rotation=self.stiffness_rotation,
+            damping_rotation=self.damping_rotation,
+        )
+
+
+class ImpedanceController:
+    """u = J^T (-k_B x' + k_D x~), eq. (3.25), with x~ = x_d - x and x_d' = 0: no force sensor is needed.
+
+    x is the gripper's pose. Its error is p_WG_goal - p_WG and, in place of differences of Euler angles, the rotation
+    vector of R_GD, D being the goal's frame, by the shorter way round; x' is the gripper's velocity and angular
+    velocity. All of them and the gains are in the goal's axes, so that spring and damper are fixed to the goal, and the
+    linearised loop is the same for any goal. With fixed joints J is eq. (3.11) of the base alone: with f the force in
+    the brackets and tau its torque, the command is, in B, F = f and M = tau + p_BG x f. Eq. (4.3) turns generalised
+    forces of Euler angles into these; with twists it is a rotation into B.
+
+    At construction the loop near the goal (12 states, 18 with a lag) is closed at the period with python-control, with
+    the expected delay and lag but without saturation. Rigid and with the default lag it bears a delay of 16 ms, without
+    lag 26 ms. The period is that of Astrobee's software, 1/62.5 s; sec. 4.1.2 prints 67.5 Hz.
+
+    Raises:
+        UnusableController: by the constructor, for an impossible body, gains that are not positive definite, or a loop
+            that is not stable.
+        UnusableOrientation: a quaternion is zero or not finite.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "f_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
+        "tau_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
+        "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
+        "error_R": ("q_WB_meas", "q_WG_goal"),
+    }
+    period: ClassVar[Fraction | None] = Fraction(2, 125)
+
+    def __init__(self, params: Params) -> None:
+        body, gains, period = params.body(), params.gains(), float(Fraction(2, 125))
+        faults = body.faults() + (gains.faults() if params.behaviour is Behaviour.CUSTOM else [])
+        faults = faults or stability_faults(
+            body, lambda factor: gains.scaled(factor).law(body), period, params.delay, params.lag
+        )
+        if faults:
+            raise UnusableController(_NAME, faults)
+        self.loop = SampledLoop(body.linear_plant(params.lag), gains.law(body), period, params.delay)
+        self._pole_radius = self.loop.pole_radius
+        self._damping_ratio, self._pole_frequency = self.loop.least_damped
+        self._p_BG = triple(params.p_BG)
+        self._k, self._d = rows(gains.stiffness_translation), rows(gains.damping_translation)
+        self._k_R, self._d_R = rows(gains.stiffness_rotation), rows(gains.damping_rotation)
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the command for the measurements; the law has no memory."""
+        return self._command(u)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the command for the measurements of t, which holds until t + dt."""
+        return self._command(u)
+
+    def get_state(self) -> bytes:
+        """Return nothing: there is no state."""
+        return b""
+
+    def set_state(self, state: bytes) -> None:
+        """Do nothing: there is no state."""
+
+    def _command(self, u: Inputs) -> Outputs:
+        q_WD = unit_quaternion(u.q_WG_goal, _NAME, "q_WG_goal")
+        q_WB = unit_quaternion(u.q_WB_meas, _NAME, "q_WB_meas")
+        r_x, r_y, r_z = r = turned(rows_of(q_WB), self._p_BG)
+        p_x, p_y, p_z = u.p_WB_meas.tolist()
+        g_x, g_y, g_z = u.p_WG_goal.tolist()
+        e = (g_x - p_x - r_x, g_y - p_y - r_y, g_z - p_z - r_z)
+        q_DB = seen_from(q_WD, q_WB)
+        phi = rotation_vector(q_DB)
+        f, tau = ZERO, ZERO
+        if u.active:
+            w = triple(u.w_WB_meas)
+            v_x, v_y, v_z = u.v_WB_meas.tolist()
+            t_x, t_y, t_z = cross(w, r)
+            R_WD, R_DB = rows_of(q_WD), rows_of(q_DB)
+            k_x, k_y, k_z = turned(self._k, turned_back(R_WD, e))
+            d_x, d_y, d_z = turned(self._d, turned_back(R_WD, (v_x + t_x, v_y + t_y, v_z + t_z)))
+            f = turned_back(R_DB, (k_x - d_x, k_y - d_y, k_z - d_z))
+            k_x, k_y, k_z = turned(self._k_R, phi)
+            d_x, d_y, d_z = turned(self._d_R, turned_back(R_WD, w))
+            m_x, m_y, m_z = turned_back(R_DB, (-k_x - d_x, -k_y - d_y, -k_z - d_z))
+            l_x, l_y, l_z = cross(self._p_BG, f)
+            tau = (m_x + l_x, m_y + l_y, m_z + l_z)
+        return Outputs(
+            f_cmd=np.array(f) if u.active else np.zeros(3),
+            tau_cmd=np.array(tau) if u.active else np.zeros(3),
+            error_p=norm(e),
+            error_R=norm(phi),
+            pole_radius=self._pole_radius,
+            damping_ratio=self._damping_ratio,
+            pole_frequency=self._pole_frequency,
+        )

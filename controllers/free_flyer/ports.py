@@ -1,0 +1,66 @@
+"""Ports that a free-flyer's controllers share: each turns the navigation's estimate and a goal into thrust.
+
+How a free-flyer's gripper yields. [Fernandes2020] sec. 4.1.2.
+
+Public values of the free-flyer Astrobee, the robot of [Fernandes2020], and where its gripper is assumed to be.
+"""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.units import (
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonMetre,
+    Number,
+    Radian,
+    RadianPerSecond,
+)
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """The navigation's estimate of the base, the gripper's goal, and whether to act."""
+
+    p_WB_meas: Vector3[Metre] = port(np.zeros(3), "estimated position of the centre of mass")
+    q_WB_meas: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "estimated attitude")
+    v_WB_meas: Vector3[MetrePerSecond] = port(np.zeros(3), "estimated velocity of the centre of mass, in the world")
+    w_WB_meas: Vector3[RadianPerSecond] = port(np.zeros(3), "estimated angular velocity, in the world")
+    p_WG_goal: Vector3[Metre] = port(np.array([0.0, -0.07, 0.0]), "where the gripper is to be")
+    q_WG_goal: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "orientation that it is to have")
+    active: bool = port(False, "the controller is on")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """Command in B at the centre of mass, zero when not active; the gripper's error; what linear theory says."""
+
+    f_cmd: Vector3[Newton] = output("commanded force, in B")
+    tau_cmd: Vector3[NewtonMetre] = output("commanded torque about the centre of mass, in B")
+    error_p: Metre = output("distance of the gripper from its goal", minimum=0.0)
+    error_R: Radian = output("angle between the gripper and its goal", minimum=0.0)
+    pole_radius: Number = output("largest |z| of the linearised loop", minimum=0.0)
+    damping_ratio: Number = output("least damping ratio of the linearised loop")
+    pole_frequency: RadianPerSecond = output("frequency of the pole with that ratio", minimum=0.0)
+
+
+class Behaviour(enum.IntEnum):
+    """Gains of the impedance control, and with them the velocities that tell of a person: table 4.1 or one's own."""
+
+    RIGID = 0
+    COMPLIANT = 1
+    CUSTOM = 2
+
+
+MASS = 9.584
+"""kg"""
+
+INERTIA = np.diag([0.1534, 0.1427, 0.1623])
+"""About the centre of mass, kg m2."""
+
+ARM = np.array([-0.30, 0.0, 0.0])
+"""Gripper seen from the centre of mass, m; assumed."""

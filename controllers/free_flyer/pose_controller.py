@@ -1,0 +1,283 @@
+"""Flies a free-flyer's gripper to a pose: the PID for getting about. [Fernandes2020] sec. 3.1.1 and 4.1.2."""
+
+import pickle
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.controllers.free_flyer.body import FlyerBody, UnusableController, stability_faults
+from handover.controllers.free_flyer.gains import PidGains, pid_law
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Inputs, Outputs
+from handover.controllers.free_flyer.profile import Bounds, Profile, Reference, profile_between
+from handover.controllers.free_flyer.rotations import (
+    angle_between,
+    rotation_vector,
+    rows_of,
+    seen_from,
+    unit_quaternion,
+)
+from handover.controllers.free_flyer.sampled_loop import SampledLoop
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Quaternion,
+    Rows,
+    Triple,
+    cross,
+    norm,
+    rows,
+    triple,
+    turned,
+    turned_back,
+)
+from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
+from handover.cosim.blocks.units import (
+    Kilogram,
+    KilogramMetre2,
+    Metre,
+    MetrePerSecond,
+    MetrePerSecond2,
+    Newton,
+    NewtonMetre,
+    PerSecond,
+    PerSecond2,
+    PerSecond3,
+    RadianPerSecond,
+    RadianPerSecond2,
+    Second,
+)
+
+__all__ = ["Inputs", "Outputs", "Params", "PoseController", "UnusableController"]
+
+_NAME = "PoseController"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Gains of Astrobee's public software; bounds of the way that leave half of the weakest thrust for control."""
+
+    k_P: PerSecond2 = parameter(0.6, "acceleration per position error", minimum=0.0, maximum=1e4)
+    k_I: PerSecond3 = parameter(1e-4, "acceleration per integral of the position error", minimum=0.0, maximum=1e4)
+    k_D: PerSecond = parameter(1.2, "acceleration per velocity error", minimum=0.0, maximum=1e4)
+    k_P_R: PerSecond2 = parameter(4.0, "angular acceleration per attitude error", minimum=0.0, maximum=1e4)
+    k_I_R: PerSecond3 = parameter(0.002, "angular acceleration per integral of that", minimum=0.0, maximum=1e4)
+    k_D_R: PerSecond = parameter(3.2, "angular acceleration per rate error", minimum=0.0, maximum=1e4)
+    speed: MetrePerSecond = parameter(0.1, "largest speed on the way (assumed)", minimum=1e-3, maximum=10.0)
+    acceleration: MetrePerSecond2 = parameter(
+        0.02, "largest acceleration on the way (assumed)", minimum=1e-4, maximum=100.0
+    )
+    rate: RadianPerSecond = parameter(0.17, "largest angular speed on the way (assumed)", minimum=1e-3, maximum=10.0)
+    turning: RadianPerSecond2 = parameter(
+        0.1, "largest angular acceleration on the way (assumed)", minimum=1e-4, maximum=100.0
+    )
+    f_max: Vector3[Newton] = parameter(
+        np.array([0.55, 0.39, 0.45]), "largest force, along the axes of B", minimum=0.0, maximum=1e4
+    )
+    tau_max: Vector3[NewtonMetre] = parameter(
+        np.array([0.064, 0.040, 0.075]), "largest torque, about the axes of B", minimum=0.0, maximum=1e4
+    )
+    mass: Kilogram = parameter(MASS, "mass of the robot", minimum=0.0, maximum=1e4)
+    I_B: Matrix3[KilogramMetre2] = parameter(INERTIA, "inertia about the centre of mass, in B")
+    p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass (assumed)", minimum=-5.0, maximum=5.0)
+    delay: Second = parameter(
+        0.0, "expected time from a measurement to its command's arrival at the propulsion", minimum=0.0, maximum=0.2
+    )
+    lag: Second = parameter(0.02, "expected time constant of the propulsion (assumed)", minimum=0.0, maximum=2.0)
+
+    def body(self) -> FlyerBody:
+        """Return the robot's model of itself."""
+        return FlyerBody(mass=self.mass, I_B=self.I_B, p_BG=self.p_BG)
+
+    def position_gains(self) -> PidGains:
+        """Return the gains of the translation."""
+        return PidGains(k_P=self.k_P, k_I=self.k_I, k_D=self.k_D)
+
+    def attitude_gains(self) -> PidGains:
+        """Return the gains of the rotation."""
+        return PidGains(k_P=self.k_P_R, k_I=self.k_I_R, k_D=self.k_D_R)
+
+    def faults(self) -> list[str]:
+        """Return what of gains, body and bounds cannot be."""
+        faults = self.body().faults()
+        faults += self.position_gains().faults("position gains") + self.attitude_gains().faults("attitude gains")
+        force, torque = self.mass * self.acceleration, self.turning * float(np.max(np.abs(self.I_B)))
+        if force > np.min(self.f_max):
+            faults.append(
+                f"acceleration = {self.acceleration:g} m/s2 takes {force:.3g} N, more than the least of f_max = "
+                f"{self.f_max.tolist()} N; at most {np.min(self.f_max) / self.mass:.3g} m/s2"
+            )
+        if torque > np.min(self.tau_max):
+            faults.append(
+                f"turning = {self.turning:g} rad/s2 takes {torque:.3g} N m, more than the least of tau_max = "
+                f"{self.tau_max.tolist()} N m; at most {self.turning * np.min(self.tau_max) / torque:.3g} rad/s2"
+            )
+        return faults
+
+
+class PoseController:
+    """Takes the gripper to a pose by a PID of the base along a way of its own, as Astrobee's mobility does.
+
+    When it becomes active, and whenever the goal changes, a way (`Profile`) begins where the base is, with the velocity
+    that it has, and ends at rest where the gripper is at its goal. Along it, with e the position error in W, phi the
+    rotation vector of the attitude error in B, and sums over past samples for the integrals,
+
+        F = R_WB^T m (k_P e + k_I sum e T + k_D (v_ref - v) + a_ref)
+        M = I_B (k_P_R phi + k_I_R sum phi T + k_D_R (w_ref - w) + dw_ref) + w x I_B w.
+
+    Both are cut at the propulsion's limits, axis by axis, and the sum of what is cut stands still meanwhile. Turned
+    off, the controller forgets sums and way.
+
+    At construction the loop near the goal is closed at the period with python-control, with the expected delay and
+    lag but without saturation.
+
+    Raises:
+        UnusableController: by the constructor, for an impossible body, bounds beyond the thrust, or a loop that is not
+            stable.
+        UnusableOrientation: a quaternion is zero or not finite.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "f_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
+        "tau_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
+        "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
+        "error_R": ("q_WB_meas", "q_WG_goal"),
+    }
+    period: ClassVar[Fraction | None] = Fraction(2, 125)
+
+    def __init__(self, params: Params) -> None:
+        body, self._T = params.body(), float(Fraction(2, 125))
+        position, attitude = params.position_gains(), params.attitude_gains()
+        faults = params.faults() or stability_faults(
+            body,
+            lambda factor: pid_law(body, position.scaled(factor), attitude.scaled(factor), self._T),
+            self._T,
+            params.delay,
+            params.lag,
+        )
+        if faults:
+            raise UnusableController(_NAME, faults)
+        self.loop = SampledLoop(
+            body.linear_plant(params.lag), pid_law(body, position, attitude, self._T), self._T, params.delay
+        )
+        self._pole_radius = self.loop.pole_radius
+        self._damping_ratio, self._pole_frequency = self.loop.least_damped
+        self._position, self._attitude, self._mass = position, attitude, params.mass
+        self._I_B, self._p_BG = rows(params.I_B), triple(params.p_BG)
+        self._f_max, self._tau_max = triple(params.f_max), triple(params.tau_max)
+        self._bounds = Bounds(
+            speed=params.speed, acceleration=params.acceleration, rate=params.rate, turning=params.turning
+        )
+        self._forget()
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        """Return the command that a step would give; the way does not begin."""
+        before = self.get_state()
+        y = self.step(t, self._T, u)
+        self.set_state(before)
+        return y
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the command for the measurements of t, which holds until t + dt."""
+        q_WB = unit_quaternion(u.q_WB_meas, _NAME, "q_WB_meas")
+        q_goal = unit_quaternion(u.q_WG_goal, _NAME, "q_WG_goal")
+        p, goal, R_WB = triple(u.p_WB_meas), triple(u.p_WG_goal), rows_of(q_WB)
+        r_x, r_y, r_z = turned(R_WB, self._p_BG)
+        e = (goal[0] - p[0] - r_x, goal[1] - p[1] - r_y, goal[2] - p[2] - r_z)
+        f, tau = ZERO, ZERO
+        if u.active:
+            v = triple(u.v_WB_meas)
+            reference = self._way(p, v, q_WB, goal, q_goal).at(self._elapsed * self._T)
+            f = self._force(reference, p, v, R_WB)
+            tau = self._torque(reference, q_WB, triple(u.w_WB_meas), R_WB)
+            self._elapsed += 1
+        elif self._profile is not None:
+            self._forget()
+        return Outputs(
+            f_cmd=np.array(f) if u.active else np.zeros(3),
+            tau_cmd=np.array(tau) if u.active else np.zeros(3),
+            error_p=norm(e),
+            error_R=angle_between(q_goal, q_WB),
+            pole_radius=self._pole_radius,
+            damping_ratio=self._damping_ratio,
+            pole_frequency=self._pole_frequency,
+        )
+
+    def get_state(self) -> bytes:
+        """Return the way, the time on it, its goal and the sums."""
+        way = None if self._profile is None else vars(self._profile)
+        return pickle.dumps((way, self._elapsed, self._goal, self._sum_e, self._sum_phi))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this controller or of one with equal parameters."""
+        way, self._elapsed, self._goal, self._sum_e, self._sum_phi = pickle.loads(state)
+        self._profile = None if way is None else Profile(**way)
+
+    def _forget(self) -> None:
+        self._profile: Profile | None = None
+        self._elapsed = 0
+        self._goal: tuple[Triple, Quaternion] | None = None
+        self._sum_e: Triple = ZERO
+        self._sum_phi: Triple = ZERO
+
+    def _way(self, p: Triple, v: Triple, q_WB: Quaternion, goal: Triple, q_goal: Quaternion) -> Profile:
+        """Return the way to the goal: the one under way, or one from here.
+
+        The sums are kept when the goal changes, since what they hold against does not change with it.
+        """
+        if self._profile is not None and self._goal == (goal, q_goal):
+            return self._profile
+        r_x, r_y, r_z = turned(rows_of(q_goal), self._p_BG)
+        base_goal = (goal[0] - r_x, goal[1] - r_y, goal[2] - r_z)
+        self._profile = profile_between(p, v, q_WB, base_goal, q_goal, self._bounds)
+        self._goal, self._elapsed = (goal, q_goal), 0
+        return self._profile
+
+    def _force(self, reference: Reference, p: Triple, v: Triple, R_WB: Rows) -> Triple:
+        g, m, s = self._position, self._mass, self._sum_e
+        (r_x, r_y, r_z), (p_x, p_y, p_z) = reference.p, p
+        e_x, e_y, e_z = r_x - p_x, r_y - p_y, r_z - p_z
+        (r_x, r_y, r_z), (v_x, v_y, v_z) = reference.v, v
+        a_x, a_y, a_z = reference.a
+        f = turned_back(
+            R_WB,
+            (
+                m * (g.k_P * e_x + g.k_I * s[0] + g.k_D * (r_x - v_x) + a_x),
+                m * (g.k_P * e_y + g.k_I * s[1] + g.k_D * (r_y - v_y) + a_y),
+                m * (g.k_P * e_z + g.k_I * s[2] + g.k_D * (r_z - v_z) + a_z),
+            ),
+        )
+        cut = _cut(f, self._f_max)
+        if cut == f:
+            T = self._T
+            self._sum_e = (s[0] + T * e_x, s[1] + T * e_y, s[2] + T * e_z)
+        return cut
+
+    def _torque(self, reference: Reference, q_WB: Quaternion, w_WB: Triple, R_WB: Rows) -> Triple:
+        g, s = self._attitude, self._sum_phi
+        phi = f_x, f_y, f_z = rotation_vector(seen_from(q_WB, reference.q))
+        w = w_x, w_y, w_z = turned_back(R_WB, w_WB)
+        r_x, r_y, r_z = turned_back(R_WB, reference.w)
+        d_x, d_y, d_z = turned_back(R_WB, reference.dw)
+        t_x, t_y, t_z = turned(
+            self._I_B,
+            (
+                g.k_P * f_x + g.k_I * s[0] + g.k_D * (r_x - w_x) + d_x,
+                g.k_P * f_y + g.k_I * s[1] + g.k_D * (r_y - w_y) + d_y,
+                g.k_P * f_z + g.k_I * s[2] + g.k_D * (r_z - w_z) + d_z,
+            ),
+        )
+        c_x, c_y, c_z = cross(w, turned(self._I_B, w))
+        tau = (t_x + c_x, t_y + c_y, t_z + c_z)
+        cut = _cut(tau, self._tau_max)
+        if cut == tau:
+            T = self._T
+            self._sum_phi = (s[0] + T * phi[0], s[1] + T * phi[1], s[2] + T * phi[2])
+        return cut
+
+
+def _cut(v: Triple, largest: Triple) -> Triple:
+    x, y, z = v
+    a, b, c = largest
+    return min(max(x, -a), a), min(max(y, -b), b), min(max(z, -c), c)

@@ -1,0 +1,1 @@
+"""What runs on the Helix's computer: vision, filters, kinematics, visual servoing."""

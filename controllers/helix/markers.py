@@ -1,0 +1,111 @@
+"""Finds fiducial markers in a picture and the pixels of their corners, after [Vervloet2025] sec. 3.2.4.
+
+Where the corners of the wrist's markers are, after [Vervloet2025] sec. 3.2.4.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.controllers.helix.stereo import Pixels, Region
+from handover.cosim.blocks.ports import Floats
+
+SIDES = 8
+
+
+class MarkerRing:
+    """Eight ArUco markers around z_R, number i at i * 45 degrees from x_R towards y_R, middles in the plane z_R = 0.
+
+    Marker i's frame M has z out of its face, y along z_R (towards the gripper) and x = y x z; its printed top is at
+    +y_M. Shifting a marker along -z_M by the apothem gives the wrist, and from there along y_M the gripper.
+
+    Attributes:
+        corners: shape (8, 4, 3), in R, in m: upper left, upper right, lower right, lower left as printed.
+        outline: shape (16, 3), in R, in m: corners of the box around all markers, with the margin they are printed in.
+
+    Args:
+        apothem: distance of the markers from the axis, in m.
+        marker: side of a marker, in m.
+    """
+
+    def __init__(self, apothem: float, marker: float) -> None:
+        angle = np.arange(SIDES) * 2.0 * np.pi / SIDES
+        z_RM = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)])
+        x_RM = np.column_stack([-np.sin(angle), np.cos(angle), np.zeros(SIDES)])
+        square = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+        flat = square[:, :1] * x_RM[:, None] + square[:, 1:] * np.array([0.0, 0.0, 1.0])
+        self.corners = apothem * z_RM[:, None] + 0.5 * marker * flat
+        half = apothem * np.tan(np.pi / SIDES)
+        self.outline = (apothem * z_RM[:, None] + half * flat[:, [0, 3]]).reshape(-1, 3)
+
+
+_ZOOM = 3  # enlargement of a region; corners of enlarged markers come out twice as exact
+_NEAR = 5.0  # marker sides around the largest marker found; the ring is smaller than that
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Numbers, shape (n,), each once, and corners, shape (n, 4, 2), in px, in the order in which they are printed."""
+
+    ids: NDArray[np.int64]
+    corners: Floats
+
+
+NO_MARKERS = Markers(np.empty(0, dtype=np.int64), np.empty((0, 4, 2)))
+
+
+class MarkerReader:
+    """Reads ArUco markers 0 to 7 of DICT_4X4_50.
+
+    Args:
+        shift: how far refined corners come out inside of the printed ones, along the diagonal, in px: blur rounds the
+            corners off.
+    """
+
+    def __init__(self, shift: float) -> None:
+        self._shift = shift
+        self._coarse = _detector(threshold_windows=(3, 13), refined=False)
+        self._fine = _detector(threshold_windows=(13, 13), refined=True)
+
+    def read(self, picture: Pixels, region: Region) -> Markers:
+        """Return the markers in a region of a picture, corners refined."""
+        if region.empty:
+            return NO_MARKERS
+        gray = cv2.cvtColor(region.of(picture), cv2.COLOR_BGR2GRAY)
+        enlarged = np.asarray(cv2.resize(gray, None, fx=_ZOOM, fy=_ZOOM, interpolation=cv2.INTER_CUBIC), np.uint8)
+        found = _read(self._fine, enlarged)
+        corners = (found.corners + 0.5) / _ZOOM - 0.5 + region.origin  # pixels' middles are whole
+        outwards = corners - corners.mean(axis=1, keepdims=True)
+        return Markers(found.ids, corners + self._shift * outwards / np.linalg.norm(outwards, axis=2, keepdims=True))
+
+    def search(self, picture: Pixels) -> Region:
+        """Return the region of a picture around the largest marker in it that holds a whole ring; empty if none."""
+        gray = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        found = _read(self._coarse, gray)
+        if not len(found.ids):
+            return Region(0, 0, 0, 0)
+        sides = np.linalg.norm(found.corners - np.roll(found.corners, 1, axis=1), axis=2).max(axis=1)
+        largest = int(np.argmax(sides))
+        return Region.around(found.corners[largest], _NEAR * float(sides[largest]), picture)
+
+
+def _read(detector: cv2.aruco.ArucoDetector, gray: Pixels) -> Markers:
+    quads, numbers, _ = detector.detectMarkers(gray)
+    if not len(quads):
+        return NO_MARKERS
+    ids = np.asarray(numbers, dtype=np.int64).ravel()
+    corners = np.asarray(quads, dtype=np.float64).reshape(-1, 4, 2)
+    once = (ids < SIDES) & (np.bincount(ids, minlength=SIDES)[ids] == 1)  # a number seen twice tells nothing
+    order = np.argsort(ids[once])
+    return Markers(ids[once][order], corners[once][order])
+
+
+def _detector(threshold_windows: tuple[int, int], refined: bool) -> cv2.aruco.ArucoDetector:
+    p = cv2.aruco.DetectorParameters()
+    p.adaptiveThreshWinSizeMin, p.adaptiveThreshWinSizeMax = threshold_windows
+    if refined:
+        p.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        p.relativeCornerRefinmentWinSize = 1.0  # a whole marker cell
+    return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), p)

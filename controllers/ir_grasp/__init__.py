@@ -1,0 +1,1 @@
+"""What runs on the soft hand's computer: the infrared reflex."""

@@ -1,0 +1,332 @@
+"""Grasp refinement by infrared reflexes: center the hand on an object, close, pull and shake. [Luberto] algorithm 1."""
+
+import enum
+import math
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.controllers.ir_grasp.descent import Descent, Verdict
+from handover.controllers.ir_grasp.moves import Move, Probing, Reading, X
+from handover.controllers.ir_grasp.parameters import Params, Strategy, UnusableReflex
+from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
+from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre, Tick
+
+__all__ = [
+    "Inputs",
+    "IrReflex",
+    "Outputs",
+    "Params",
+    "Phase",
+    "Stop",
+    "Strategy",
+    "UnusableReading",
+    "UnusableReflex",
+    "Visibility",
+]
+
+_PERIOD = Fraction(3, 200)  # one round of the three sensors, at 5 ms each (assumed)
+
+
+class UnusableReading(Refusal):
+    """An input that is no number; `faults` names all of them."""
+
+    block = "IrReflex"
+
+
+class Phase(enum.IntEnum):
+    """What the hand is doing; CHECK to STEP are the steps 3 to 9 of algorithm 1."""
+
+    REACH = 0
+    CHECK = 1
+    APPROACH = 2
+    RECOVER = 3
+    PROBE = 4
+    STEP = 5
+    CLOSE = 6
+    PULL = 7
+    SHAKE = 8
+    DONE = 9
+
+
+class Stop(enum.IntEnum):
+    """Why the refinement ended.
+
+    The cost is small, steps or recoveries are used up, there is no progress, no finger sees the object, or none of it
+    was wanted.
+    """
+
+    RUNNING = 0
+    THRESHOLD = 1
+    PATIENCE = 2
+    STALLED = 3
+    OUT_OF_SIGHT = 4
+    BLIND = 5
+    FORWARD = 6
+
+
+_STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdict.USED_UP: Stop.PATIENCE}
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """What the hand's sensors and the encoders of arm and motor say."""
+
+    ticks: Vector3[Tick] = port(np.zeros(3), "reading of the thumb's, index's and ring's sensor")
+    p_WH: Vector2[Metre] = port(np.zeros(2), "wrist, in the world")
+    yaw: Radian = port(0.0, "heading of the hand")
+    sigma: Number = port(0.0, "closure of the hand: 0 open, 1 closed")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """Commands, and what the controller makes of its sensors at this instant."""
+
+    p_WH_cmd: Vector2[Metre] = output("commanded wrist, in the world")
+    yaw_cmd: Radian = output("commanded heading of the hand")
+    sigma_cmd: Number = output("commanded closure: 0 open, 1 closed", minimum=0.0, maximum=1.0)
+    phase: Phase = output("what the hand is doing")
+    case: Visibility = output("fingers that see the object, fig. 9")
+    cost: SquareMetre = output("f, eq. (4), of the distances less their target, or as printed")
+    distance: Vector3[Metre] = output("distance of thumb, index and ring by eq. (11)")
+    steps: int = output("Gauss-Newton steps made")
+    stop: Stop = output("why the refinement ended")
+
+
+class IrReflex:
+    """Algorithm 1 as a machine of phases: probe the Jacobian (eq. 7), step by Gauss-Newton (eqs. 9, 10), close.
+
+    Control inputs are x = [p_x, p_y, yaw, sigma], the planar part of the source's seven. A phase ends when the encoders
+    have come to the command (or time is up); it is judged by the mean of some scans at rest.
+
+    - REACH: to the pre-grasp pose. Then BLIND closes at once and FORWARD after going forward_distance ahead.
+    - CHECK: all fingers see the object: PROBE. None does: APPROACH. Some do: RECOVER (see `Recovery`). A finger that is
+      not in the cost is given two closing motions to see, and no more: it may lag behind however long.
+    - PROBE: each input in turn, and back, by its probing move, be it beyond the reach. Every probe_every steps;
+      between, Broyden's update of J.
+    - STEP: x + alpha dx within max_step and the reach. A step that raises f is taken back and alpha halved.
+    - CLOSE: when f is at most the threshold, or at the best pose if steps, recoveries or progress end (`Stop`). A
+      hand whose recoveries end with the object out of sight closes where it is: it may have pushed the object along.
+    - PULL, SHAKE, DONE: pull_distance back, then a sine across.
+
+    The residuals are r_i = weight_i (d_i - target) over fingers with a weight: with the printed r_i = d_i the least
+    cost is at contact, where the fingers push the object away.
+
+    Raises:
+        UnusableReflex: by the constructor, for values that contradict each other or are out of range; all are named.
+        UnusableReading: by `step`, for inputs that are not finite; all are named.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
+        ("p_WH_cmd", "yaw_cmd", "sigma_cmd", "phase", "case", "cost", "distance", "steps", "stop"),
+        ("ticks", "p_WH", "yaw", "sigma"),
+    )
+    period: ClassVar[Fraction | None] = _PERIOD
+
+    def __init__(self, params: Params) -> None:
+        params.check()
+        self.params = p = params
+        self._calibration = p.calibration
+        self._ticks_seen, self._ticks_lost = (self._calibration.ticks(y) for y in (p.epsilon, p.distance_max))
+        self._weight: X = tuple(p.weight.tolist())
+        self._target = 0.0 if p.literal else p.target
+        self._move = Move(tuple(p.tolerance.tolist()), max(1, _periods(p.calm)))
+        self._recovery = Recovery(p.recovery_step, p.recovery_closing, p.recovery_least)
+        self._probing = Probing(tuple(p.probe.tolist()))
+        self._descent = Descent(p)
+        self._stop = Stop.RUNNING
+        self._recoveries, self._closings, self._shaken = 0, 0, 0
+        pregrasp = (*p.p_WH_pregrasp.tolist(), p.yaw_pregrasp, p.sigma_pregrasp)
+        self._go(Phase.REACH, pregrasp, 0, p.travel_time)
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the command in force and what the sensors say; no time passes."""
+        ticks = u.ticks.tolist()
+        distances = self._distances(ticks)
+        p_x, p_y, yaw, sigma = self._command()
+        return Outputs(
+            p_WH_cmd=np.array([p_x, p_y]),
+            yaw_cmd=yaw,
+            sigma_cmd=sigma,
+            phase=self._phase,
+            case=self._case(ticks),
+            cost=0.5 * sum((w * (d - self._target)) ** 2 for w, d in zip(self._weight, distances, strict=True)),
+            distance=np.array(distances),
+            steps=self._descent.steps,
+            stop=self._stop,
+        )
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        """Go on with the move under way; when it is over, decide on the next one by its reading."""
+        _refuse(u)
+        if self._phase is Phase.SHAKE:
+            self._shake()
+        elif self._phase is not Phase.DONE:
+            reading = self._move.advance((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
+            if reading is not None:
+                self._decide(reading)
+        return self.outputs(t + dt, u)
+
+    def _decide(self, reading: Reading) -> None:
+        p = self.params
+        if self._phase is Phase.REACH and p.strategy is Strategy.FORWARD:
+            self._go(Phase.APPROACH, self._ahead(p.forward_distance), 0, p.travel_time)
+        elif self._phase is Phase.REACH and p.strategy is Strategy.BLIND:
+            self._close(Stop.BLIND)
+        elif self._phase is Phase.APPROACH and p.strategy is Strategy.FORWARD:
+            self._close(Stop.FORWARD)
+        elif self._phase in (Phase.REACH, Phase.APPROACH, Phase.RECOVER):
+            self._go(Phase.CHECK, self._move.goal, p.scans)
+        elif self._phase is Phase.CHECK:
+            self._check(reading)
+        elif self._phase is Phase.PROBE:
+            self._probe(reading)
+        elif self._phase is Phase.STEP:
+            self._judge(reading)
+        elif self._phase is Phase.CLOSE:
+            self._go(Phase.PULL, self._ahead(-p.pull_distance), 0, p.travel_time)
+        elif self._phase is Phase.PULL:
+            self._phase = Phase.SHAKE if p.shake_cycles else Phase.DONE
+
+    def _check(self, reading: Reading) -> None:
+        """Step 3 of algorithm 1: which fingers see the object, and so what comes next."""
+        case = self._case(reading.ticks)
+        suffices = all(self._in_cost(reading.ticks, self._ticks_seen))
+        if case is Visibility.ALL_SEEN or (suffices and self._closings >= self.params.waited_closings):
+            r = self._residuals(self._distances(reading.ticks))
+            self._descent.measure(reading.x, r, self._move.goal)
+            if self._descent.reached:
+                self._close(Stop.THRESHOLD)
+            else:
+                self._begin_probing(reading.x, r)
+        else:
+            self._recover(case, only_lags=suffices)
+
+    def _recover(self, case: Visibility, *, only_lags: bool) -> None:
+        """Steps 4 and 5: approach, or move around the object."""
+        p, x = self.params, self._move.goal
+        motion = self._recovery.motion(case, may_close=x[3] + p.recovery_closing <= p.sigma_limit)
+        goal = self._descent.within_reach(displaced(x, motion))
+        self._closings += only_lags
+        self._recoveries += 1
+        if self._recoveries > p.max_recoveries or (goal == x and not only_lags):
+            self._close(Stop.OUT_OF_SIGHT if case is Visibility.NONE else Stop.PATIENCE)
+        else:
+            self._go(Phase.APPROACH if case is Visibility.NONE else Phase.RECOVER, goal, 0)
+
+    def _begin_probing(self, x: X, r: Floats) -> None:
+        self._probing.begin(self._move.goal, x, r)
+        self._go(Phase.PROBE, self._probing.command, self.params.scans)
+
+    def _probe(self, reading: Reading) -> None:
+        """Steps 6 and 7: take a column's measurement, or, back at the beginning, step."""
+        r, known = self._residuals(self._distances(reading.ticks)), self._in_cost(reading.ticks, self._ticks_lost)
+        if not self._probing.done:
+            self._probing.take(reading.x, r, known)
+            self._go(Phase.PROBE, self._probing.command, self.params.scans)
+        elif not all(known):
+            self._lose()
+        else:
+            self._descent.measure(reading.x, r, self._move.goal)
+            self._descent.probed(self._probing.jacobian)
+            self._step()
+
+    def _step(self) -> None:
+        """Steps 8 and 9."""
+        self._go(Phase.STEP, self._descent.next_command(self._move.goal), self.params.scans)
+
+    def _judge(self, reading: Reading) -> None:
+        """Step 10; a finger of the cost that lost the object leads back to step 3."""
+        if not all(self._in_cost(reading.ticks, self._ticks_lost)):
+            self._lose()
+            return
+        r = self._residuals(self._distances(reading.ticks))
+        verdict = self._descent.judge(reading.x, r, self._move.goal)
+        if verdict in _STOPS:
+            self._close(_STOPS[verdict])
+        elif verdict is Verdict.BACK:
+            self._go(Phase.CHECK, self._descent.best, self.params.scans)
+        elif verdict is Verdict.PROBE:
+            self._begin_probing(reading.x, r)
+        else:
+            self._step()
+
+    def _lose(self) -> None:
+        """Go back to step 3; counted, since readings at the edge of sight could lead there for ever."""
+        self._recoveries += 1
+        if self._recoveries > self.params.max_recoveries:
+            self._close(Stop.PATIENCE)
+            return
+        self._go(Phase.CHECK, self._move.goal, self.params.scans)
+
+    def _close(self, stop: Stop) -> None:
+        """Grasp the object: here, or, if the cost is not small but fingers still see, from the best pose known."""
+        self._stop = stop
+        x = self._descent.best if stop in (Stop.STALLED, Stop.PATIENCE) and self._descent.best else self._move.goal
+        self._go(Phase.CLOSE, (*x[:3], 1.0), 0, self.params.closing_time)
+
+    def _shake(self) -> None:
+        self._shaken += 1
+        if self._shaken * float(_PERIOD) >= self.params.shake_cycles / self.params.shake_frequency:
+            self._phase = Phase.DONE
+
+    def _command(self) -> X:
+        """Return the goal of the move, with the shake."""
+        x = self._move.goal
+        if self._phase is not Phase.SHAKE:
+            return x
+        p = self.params
+        across = p.shake_amplitude * math.sin(2.0 * math.pi * p.shake_frequency * self._shaken * float(_PERIOD))
+        return (x[0] - across * math.sin(x[2]), x[1] + across * math.cos(x[2]), x[2], x[3])
+
+    def _go(self, phase: Phase, goal: X, scans: int, time: float | None = None) -> None:
+        self._phase = phase
+        self._move.start(goal, scans, _periods(self.params.move_time if time is None else time))
+
+    def _ahead(self, distance: float) -> X:
+        p_x, p_y, yaw, sigma = self._move.goal
+        return (p_x + distance * math.cos(yaw), p_y + distance * math.sin(yaw), yaw, sigma)
+
+    def _distances(self, ticks: Sequence[float]) -> list[float]:
+        return [min(self._calibration.distance(x), self.params.distance_max) for x in ticks]
+
+    def _residuals(self, distances: Sequence[float]) -> Floats:
+        return np.array([w * (d - self._target) for w, d in zip(self._weight, distances, strict=True) if w > 0.0])
+
+    def _in_cost(self, ticks: Sequence[float], least: float) -> list[bool]:
+        """Return which fingers of the cost read so many ticks."""
+        return [x >= least for w, x in zip(self._weight, ticks, strict=True) if w > 0.0]
+
+    def _case(self, ticks: Sequence[float]) -> Visibility:
+        return Visibility(sum(1 << i for i, x in enumerate(ticks) if x >= self._ticks_seen))
+
+    def get_state(self) -> bytes:
+        """Return phase, move, recovery, probing, descent and counters."""
+        parts = [part.get_state() for part in (self._move, self._recovery, self._probing, self._descent)]
+        counters = (self._recoveries, self._closings, self._shaken)
+        return pickle.dumps((int(self._phase), int(self._stop), parts, counters))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state that `get_state` gave."""
+        phase, stop, parts, (self._recoveries, self._closings, self._shaken) = pickle.loads(state)
+        self._phase, self._stop = Phase(phase), Stop(stop)
+        for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
+            part.set_state(saved)
+
+
+def _refuse(u: Inputs) -> None:
+    """Raise UnusableReading for what is no number: no move would ever arrive, and no finger would ever see."""
+    told = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
+    wrong = [name for name, values in told.items() if not all(map(math.isfinite, values))]
+    if wrong:
+        raise UnusableReading([f"{name} must be finite, not {told[name]}" for name in wrong])
+
+
+def _periods(time: float) -> int:
+    return round(time / float(_PERIOD))

@@ -1,0 +1,186 @@
+"""Parameters of the infrared reflex, and what is wrong with them. [Luberto] sec. IV and V.
+
+From ticks to distance by the constant characteristic of the infrared sensors. [Luberto] eq. (11).
+"""
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
+from handover.cosim.blocks.start_values import parameter_faults
+from handover.cosim.blocks.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
+
+_FULL_SCALE = 4095.0
+_ENOUGH = 60  # halvings of 4095 ticks: beyond the last bit of a float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """y = a e^(b x) + c e^(d x): distance y in m over ADC output x in ticks, from 0 to 4095; falls as x grows."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+
+    def distance(self, ticks: float) -> float:
+        """Return the distance y, in m, that stands for an ADC output, by eq. (11)."""
+        return self.a * math.exp(self.b * ticks) + self.c * math.exp(self.d * ticks)
+
+    def ticks(self, distance: float) -> float:
+        """Return the ADC output x, in ticks, that stands for a distance in m, by halving; 0 or 4095 beyond the curve.
+
+        Compared with it, a reading is judged without working out its distance.
+        """
+        low, high = 0.0, _FULL_SCALE
+        for _ in range(_ENOUGH):
+            middle = (low + high) / 2.0
+            low, high = (middle, high) if self.distance(middle) > distance else (low, middle)
+        return (low + high) / 2.0
+
+    def faults(self) -> list[str]:
+        """Return what keeps the curve from falling, so that a reading would have no one distance."""
+        faults = [
+            f"{name} = {value:g} m must be above 0" for name, value in (("a", self.a), ("c", self.c)) if value <= 0.0
+        ]
+        falling = (("b", self.b), ("d", self.d))
+        return faults + [f"{name} = {value:g} 1/tick must be below 0" for name, value in falling if value >= 0.0]
+
+
+_INPUTS = ("p_x", "p_y", "yaw", "sigma")
+
+
+class UnusableReflex(Refusal):
+    """Values with which the reflex cannot work; `faults` lists all of them."""
+
+    block = "IrReflex"
+
+
+class Strategy(enum.IntEnum):
+    """What is done between the pre-grasp pose and closing: algorithm 1, nothing, or going a stated way forward."""
+
+    REFLEX = 0
+    BLIND = 1
+    FORWARD = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Vectors of four are in the order of the control inputs p_x (m), p_y (m), yaw (rad), sigma (1).
+
+    All values but the sensors' range and the fingers in the cost are own choices: the source does not give them.
+    `literal` takes eqs. (4) and (9) as printed: the residual is the distance itself, every step is probed anew,
+    and threshold_literal ends it.
+    """
+
+    strategy: Strategy = parameter(Strategy.REFLEX, "correct by the sensors, close as is, or go forward and close")
+    literal: bool = parameter(False, "eqs. (4) and (9) as printed: no target distance, no scaling, no damping")
+    p_WH_pregrasp: Vector2[Metre] = parameter(
+        np.array([-0.20, 0.0]), "wrist at the pre-grasp pose, in the world", minimum=-2.0, maximum=2.0
+    )
+    yaw_pregrasp: Radian = parameter(0.0, "heading of the hand there", minimum=-math.pi, maximum=math.pi)
+    sigma_pregrasp: Number = parameter(0.0, "closure there", minimum=0.0, maximum=1.0)
+    forward_distance: Metre = parameter(
+        0.035, "how far the strategy FORWARD goes before it closes", minimum=0.0, maximum=0.5
+    )
+    a: Metre = parameter(0.062, "constant of eq. (11)", minimum=0.0, maximum=1.0)
+    b: PerTick = parameter(-0.0030, "constant of eq. (11)", minimum=-1.0, maximum=0.0)
+    c: Metre = parameter(0.022, "constant of eq. (11)", minimum=0.0, maximum=1.0)
+    d: PerTick = parameter(-0.00043, "constant of eq. (11)", minimum=-1.0, maximum=0.0)
+    epsilon: Metre = parameter(0.060, "distance up to which a finger sees the object", minimum=0.0, maximum=1.0)
+    distance_max: Metre = parameter(0.065, "distance that stands for seeing nothing", minimum=0.0, maximum=1.0)
+    weight: Vector3[Number] = parameter(
+        np.array([1.0, 0.0, 1.0]), "weight of thumb, index and ring in the cost; 0 leaves one out", minimum=0.0
+    )
+    target: Metre = parameter(0.010, "distance that the fingers are brought to", minimum=0.0, maximum=0.06)
+    threshold: SquareMetre = parameter(1.6e-5, "cost at which the hand closes", minimum=0.0, maximum=1.0)
+    threshold_literal: SquareMetre = parameter(1.5e-4, "the same, of the literal variant", minimum=0.0, maximum=1.0)
+    scale: Vector4[Number] = parameter(
+        np.array([0.02, 0.02, 0.1, 0.1]), "what counts as one unit of each input in a step's length", minimum=0.0
+    )
+    damping: Metre = parameter(0.004, "lambda of the damped step", minimum=0.0, maximum=1.0)
+    alpha: Number = parameter(0.8, "step scaling, eq. (10)", minimum=0.0, maximum=1.0)
+    max_step: Vector4[Number] = parameter(
+        np.array([0.012, 0.012, 0.10, 0.10]), "largest step of each input, to which alpha is cut", minimum=0.0
+    )
+    probe: Vector4[Number] = parameter(
+        np.array([0.004, 0.004, 0.04, 0.03]), "probing move of each input", minimum=0.0, maximum=1.0
+    )
+    probe_every: int = parameter(4, "steps from one probing to the next; between, Broyden's update", minimum=1)
+    reach: Vector3[Number] = parameter(
+        np.array([0.10, 0.10, 0.6]), "how far p_x, p_y, yaw may leave the pre-grasp pose", minimum=0.0, maximum=10.0
+    )
+    sigma_limit: Number = parameter(0.6, "largest closure before the hand closes for good", minimum=0.0, maximum=1.0)
+    recovery_step: Metre = parameter(0.010, "approaching and recovering motion", minimum=0.0, maximum=0.1)
+    recovery_closing: Number = parameter(0.05, "closing motion of a recovery", minimum=0.0, maximum=1.0)
+    recovery_least: Metre = parameter(0.002, "recovering motion that is not halved further", minimum=0.0, maximum=0.1)
+    max_recoveries: int = parameter(25, "approaching and recovering motions at most", minimum=0)
+    waited_closings: int = parameter(2, "closing motions made for a finger that is not in the cost to see", minimum=0)
+    max_steps: int = parameter(25, "Gauss-Newton steps at most", minimum=1)
+    progress: Number = parameter(0.05, "part of the cost that a step must take off", minimum=0.0, maximum=1.0)
+    stalled_steps: int = parameter(3, "steps in a row without progress before the hand closes", minimum=1)
+    scans: int = parameter(3, "scans that a reading is the mean of", minimum=1, maximum=100)
+    calm: Second = parameter(0.15, "rest before a reading", minimum=0.0, maximum=10.0)
+    tolerance: Vector4[Number] = parameter(
+        np.array([5e-4, 5e-4, 5e-3, 5e-3]), "distance of encoders and command that ends a move", minimum=0.0
+    )
+    move_time: Second = parameter(1.5, "time after which a correcting move counts as done", minimum=0.0, maximum=60.0)
+    travel_time: Second = parameter(10.0, "the same, of the way to the pre-grasp pose and of the pull", minimum=0.0)
+    closing_time: Second = parameter(2.0, "time that the hand is given to close", minimum=0.0, maximum=60.0)
+    pull_distance: Metre = parameter(0.15, "how far the closed hand is pulled back", minimum=0.0, maximum=1.0)
+    shake_amplitude: Metre = parameter(0.015, "amplitude of the shake, across the hand", minimum=0.0, maximum=0.2)
+    shake_frequency: Hertz = parameter(1.5, "frequency of the shake", minimum=0.01, maximum=10.0)
+    shake_cycles: int = parameter(3, "cycles of the shake", minimum=0, maximum=1000)
+
+    @property
+    def calibration(self) -> Calibration:
+        """The sensors' characteristic, eq. (11)."""
+        return Calibration(self.a, self.b, self.c, self.d)
+
+    def check(self) -> None:
+        """Raise UnusableReflex, with all faults, if the reflex cannot work with these values."""
+        faults = parameter_faults(self) or [*self.calibration.faults(), *self._input_faults(), *self._range_faults()]
+        if faults:
+            raise UnusableReflex(faults)
+
+    def _input_faults(self) -> list[str]:
+        faults: list[str] = []
+        for j, name in enumerate(_INPUTS):
+            vectors = ("scale", "max_step", "probe", "tolerance")
+            faults += [f"{v} of {name} must be above 0" for v in vectors if not getattr(self, v)[j] > 0.0]
+            if not self.tolerance[j] < 0.5 * self.probe[j]:
+                faults.append(
+                    f"tolerance of {name}, {self.tolerance[j]:g}, must be less than half its probing move, "
+                    f"{self.probe[j]:g}, or the move may go unnoticed"
+                )
+        if not self.damping > 0.0:
+            faults.append("damping must be above 0, or the step of a singular Jacobian is not defined")
+        if not self.alpha > 0.0:
+            faults.append("alpha must be above 0, or no step is ever made")
+        if not np.any(self.weight > 0.0):
+            faults.append("weight: at least one finger must be in the cost")
+        return faults
+
+    def _range_faults(self) -> list[str]:
+        faults: list[str] = []
+        if not self.target < self.epsilon:
+            faults.append(f"target {self.target:g} m must be less than epsilon {self.epsilon:g} m, the range of sight")
+        if not self.epsilon < self.distance_max:
+            faults.append(f"epsilon {self.epsilon:g} m must be less than distance_max {self.distance_max:g} m")
+        nearest, farthest = (self.calibration.distance(x) for x in (4095.0, 0.0))
+        if not nearest < self.target:
+            faults.append(f"target {self.target:g} m must exceed {nearest:.4g} m, the least that eq. (11) can tell")
+        if not farthest >= self.distance_max:
+            faults.append(f"distance_max {self.distance_max:g} m must not exceed {farthest:.4g} m, eq. (11) at 0 ticks")
+        if not self.sigma_pregrasp <= self.sigma_limit:
+            faults.append(f"sigma_pregrasp {self.sigma_pregrasp:g} must not exceed sigma_limit {self.sigma_limit:g}")
+        if not 0.0 < self.recovery_least <= self.recovery_step:
+            faults.append(
+                f"recovery_least {self.recovery_least:g} m must be above 0 and at most recovery_step "
+                f"{self.recovery_step:g} m"
+            )
+        return faults

@@ -1,0 +1,1 @@
+"""What runs on the VSL arm's computer: paths, rigid and learned kinematics."""

@@ -1,0 +1,220 @@
+"""Point-to-point trajectories of an arm with three joints. [Gandarias2020] sec. III-C, algorithms 1 and 2."""
+
+import bisect
+import math
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics, place
+from handover.controllers.vsl.paths import Path, Segment, segments_of
+from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.blocks.start_values import parameter_faults
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
+
+__all__ = ["Elbow", "Inputs", "Outputs", "Params", "Path", "TrajectoryPlanner", "UnusablePath"]
+
+_MARGIN = 0.001
+"""How near to a singularity a path may come, m (assumed): there a joint turns about seven times faster than usual."""
+
+_PERIOD = Fraction(1, 50)  # s
+_SAME_TIME = 1e-9  # s, what sums of intervals lose
+
+
+class UnusablePath(Refusal):
+    """A path that the arm cannot follow; `faults` names the first bad point of each segment."""
+
+    block = "TrajectoryPlanner"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Path and speed. [Gandarias2020] states neither the arm's lengths nor speeds: they are assumed."""
+
+    path: Path = parameter(Path.CURVE, "path: of the paper, or (CUSTOM) straight from x_0 to x_g")
+    x_0: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.05]), "first point of a CUSTOM path in the world")
+    x_g: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.35]), "last point of a CUSTOM path in the world")
+    N: int = parameter(100, "points in each segment after its first", minimum=1, maximum=10000)
+    V: MetrePerSecond = parameter(0.05, "speed along the path", minimum=1e-4, maximum=2.0)
+    elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
+    L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
+    L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
+    L_3: Metre = parameter(0.225, "length of link 3", minimum=0.001, maximum=10.0)
+    pressure: Vector2[Pascal] = parameter(
+        np.array([5e4, 5e4]), "pressure of links 2 and 3 above the air's", minimum=0.0, maximum=1e6
+    )
+    settle: Second = parameter(
+        3.0, "time at the first point before the path begins, to get there and calm down", minimum=0.0, maximum=600.0
+    )
+    qd_0: Vector3[RadianPerSecond] = parameter(
+        np.array([0.8, 0.8, 0.8]), "joint speeds off the path; 0 is the servo's own limit", minimum=0.0, maximum=100.0
+    )
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """When to go."""
+
+    go: bool = port(True, "the path begins, once settled, when this is true; later it is not looked at")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """Where to go."""
+
+    p_WG_goal: Vector3[Metre] = output("point of the path to move to, in the world")
+    q_ref: Vector3[Radian] = output("joint angles that put the tip of a rigid arm there, [Gandarias2020] eqs. (2)-(4)")
+    qd_ref: Vector3[RadianPerSecond] = output(
+        "joint velocities on the way there, by the inverse Jacobian, [Gandarias2020] eq. (8)"
+    )
+    p_cmd: Vector2[Pascal] = output("pressure commands of links 2 and 3")
+    segment: int = output("segment of the path, from 1; 0 before it begins")
+    moving: bool = output("the tip is on its way along the path")
+    done: bool = output("the path has ended")
+
+
+class TrajectoryPlanner:
+    """Goes along lines and arcs point by point at constant speed. [Gandarias2020] algorithms 1 and 2, corrected.
+
+    The first point x_0 is held for the settling time, then until `go`. Each segment has N steps of equal length and
+    time T = length / (N V): during the k-th, the goal is x_{k+1} with q_{k+1} from the inverse kinematics, and the
+    joint velocities are q'_k = J(q_k)^-1 x'_k, so that the joints arrive as the step ends. Between points the goal
+    stays. The last point is held. Where T is shorter than the period, points are left out. Joint 1 goes on past half a
+    turn instead of all the way back.
+
+    Raises:
+        UnusablePath: by the constructor, for values out of range, points out of reach or singular, no length.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
+        ("p_WG_goal", "q_ref", "qd_ref", "segment", "moving", "done"), ("go",)
+    )
+    period: ClassVar[Fraction | None] = _PERIOD
+
+    def __init__(self, params: Params) -> None:
+        self._params = p = params
+        self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
+        segments = segments_of(p.path, p.x_0, p.x_g)
+        faults = parameter_faults(p) or _faults(segments, p, self._kinematics)
+        if faults:
+            raise UnusablePath(faults)
+        self._points: list[Floats] = []
+        self._q: list[Floats] = []
+        self._qd: list[Floats] = []
+        self._ends: list[float] = []
+        """When each step ends, s after the path began; of as many entries as those above."""
+        self._x_0, self._q_0 = segments[0].x_0, self._kinematics.inverse(segments[0].x_0)
+        for segment in segments:
+            self._add(segment)
+        self._waited = 0
+        self._gone: int | None = None
+        """Periods since the path began."""
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the command that a step from here would begin with."""
+        return self._command(self._begins(u))
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the command that holds until t + dt."""
+        gone = self._begins(u)
+        y = self._command(gone)
+        if gone is None:
+            self._waited += 1
+        else:
+            self._gone = gone + 1
+        return y
+
+    def get_state(self) -> bytes:
+        """Return the periods waited, and those since the path began."""
+        return pickle.dumps((self._waited, self._gone))
+
+    def set_state(self, state: bytes) -> None:
+        """Go back to a state of this planner or of one with equal parameters."""
+        self._waited, self._gone = pickle.loads(state)
+
+    def _begins(self, u: Inputs) -> int | None:
+        """Return the periods since the path began, 0 if it begins here, None if it does not yet."""
+        if self._gone is not None:
+            return self._gone
+        settled = self._waited * float(_PERIOD) >= self._params.settle - _SAME_TIME
+        return 0 if settled and u.go else None
+
+    def _command(self, gone: int | None) -> Outputs:
+        p = self._params
+        last = len(self._ends) - 1
+        k = -1 if gone is None else bisect.bisect_right(self._ends, gone * float(_PERIOD) + _SAME_TIME)
+        moving = 0 <= k <= last
+        i = min(k, last)
+        return Outputs(
+            p_WG_goal=np.array(self._x_0 if k < 0 else self._points[i]),
+            q_ref=np.array(self._q_0 if k < 0 else self._q[i]),
+            qd_ref=np.array(self._qd[i] if moving else p.qd_0),
+            p_cmd=np.array(p.pressure),
+            segment=0 if k < 0 else i // p.N + 1,
+            moving=moving,
+            done=k > last,
+        )
+
+    def _add(self, segment: Segment) -> None:
+        p = self._params
+        points, velocities = segment.sampled(p.N, p.V)
+        q = [self._kinematics.inverse(x) for x in points]
+        before = self._q[-1] if self._q else self._q_0
+        for k, theta_1 in enumerate(np.unwrap([before[0], *(angles[0] for angles in q)])[1:]):
+            q[k][0] = theta_1
+        began = self._ends[-1] if self._ends else 0.0
+        for k in range(p.N):
+            self._points.append(points[k + 1])
+            self._q.append(q[k + 1])
+            self._qd.append(self._kinematics.joint_velocities(q[k], velocities[k]))
+            self._ends.append(began + (k + 1) * segment.length / (p.N * p.V))
+
+
+def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -> list[str]:
+    faults: list[str] = []
+    for i, segment in enumerate(segments):
+        if segment.length < 1e-6:
+            faults.append("x_0 and x_g are the same point: a path has a length")
+            continue
+        fault = _fault_at_points(segment, p, kinematics) or _fault_between(segment, p, kinematics)
+        if fault is not None:
+            faults.append(
+                f"segment {i + 1} of {len(segments)}, {fault}; a path stays {_MARGIN * 1000:.0f} mm or more off "
+                f"joint 1's axis and off both limits of reach: |L_2 - L_3| = {kinematics.reach[0]:.4g} m and "
+                f"L_2 + L_3 = {kinematics.reach[1]:.4g} m from the shoulder (0, 0, {p.L_1:.4g}) m"
+            )
+    return faults
+
+
+def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
+    """Say which of a segment's points is the first bad one, and why."""
+    bad = [(k, x, f) for k, x in enumerate(segment.sampled(p.N, p.V)[0]) if (f := _fault(x, kinematics))]
+    if not bad:
+        return None
+    k, x, fault = bad[0]
+    others = f" (and {len(bad) - 1} more of this segment)" if len(bad) > 1 else ""
+    return f"point {k} of {p.N}, {place(x)}{others}: {fault}"
+
+
+def _fault_between(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
+    """Say where a segment whose points are good runs through a singularity between them, and through which."""
+    for x in segment.sampled(math.ceil(segment.length / _MARGIN), p.V)[0]:
+        if fault := _fault(x, kinematics):
+            return f"between its points, at {place(x)}: {fault}"
+    return None
+
+
+def _fault(x: Floats, kinematics: VslKinematics) -> str | None:
+    if not np.all(np.isfinite(x)):
+        return "it is not finite"
+    try:
+        kinematics.inverse(x)
+    except Unreachable as e:
+        return e.fault
+    fault = kinematics.singularity(x, _MARGIN)
+    return fault and f"singular: {fault}"
