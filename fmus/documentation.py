@@ -1,4 +1,9 @@
-"""documentation/index.html of an FMU: what the block declares and what its docstring says, as a page."""
+"""documentation/index.html of an FMU: what the block declares and what its docstring says, as a page.
+
+A docstring's parts as the documentation page has them: paragraphs, lists, formulas, and the errors that it names.
+
+The papers that blocks are after, by the key with which docstrings cite them.
+"""
 
 import enum
 import re
@@ -11,11 +16,92 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from handover.cosim.blocks.variable import Causality, Kind, Variable
-from handover.fmus.docstring import parse
 from handover.fmus.layout import SAMPLE_CLOCK, Form
 from handover.fmus.model_description import Model, enumerations
-from handover.fmus.papers import cited
 from handover.fmus.sources import Package
+
+_RAISES = "Raises:"
+_NAMES = re.compile(r"(\w+(?:, \w+)*): (.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a docstring.
+
+    Attributes:
+        kind: `paragraph`, `list` or `formula`.
+        texts: one text, or one for each item of a list; a formula's keeps its lines.
+    """
+
+    kind: str
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Docstring:
+    """What a docstring says, and the errors it names: their names with when they are raised."""
+
+    parts: tuple[Part, ...]
+    errors: tuple[tuple[str, str], ...]
+
+
+def parse(text: str) -> Docstring:
+    """Return a docstring's parts; `text` is without the indentation that it has in its source."""
+    parts: list[Part] = []
+    errors: list[tuple[str, str]] = []
+    for chunk in re.split(r"\n[ \t]*\n", text.strip("\n")):
+        lines = chunk.splitlines()
+        if lines and lines[0].strip() == _RAISES:
+            errors += [_error(item) for item in _markdown_items(lines[1:], r"    \S")]
+        elif chunk.startswith("    "):
+            parts.append(Part("formula", ("\n".join(line.removeprefix("    ") for line in lines),)))
+        elif chunk.strip():
+            parts += _markdown_prose(lines)
+    return Docstring(tuple(parts), tuple(errors))
+
+
+def _markdown_prose(lines: list[str]) -> list[Part]:
+    """Return a paragraph, a list, or a list that follows upon a line of text."""
+    first = next((i for i, line in enumerate(lines) if line.startswith("- ")), len(lines))
+    paragraph = [Part("paragraph", (_joined(lines[:first]),))] if first else []
+    items = tuple(item.removeprefix("- ") for item in _markdown_items(lines[first:], "- "))
+    return [*paragraph, Part("list", items)] if items else paragraph
+
+
+def _markdown_items(lines: list[str], begin: str) -> list[str]:
+    """Return the items of lines, of which each first one matches `begin`, as one line each."""
+    found: list[list[str]] = []
+    for line in lines:
+        if re.match(begin, line) or not found:
+            found.append([])
+        found[-1].append(line)
+    return [_joined(item) for item in found]
+
+
+def _joined(lines: list[str]) -> str:
+    return " ".join(line.strip() for line in lines)
+
+
+def _error(text: str) -> tuple[str, str]:
+    match = _NAMES.fullmatch(text)
+    return (match[1], match[2]) if match else ("", text)
+
+
+PAPERS = {
+    "Fernandes2020": 'Fernandes, "Object handover between humans and robots in microgravity", MSc thesis, '
+    "Instituto Superior Tecnico, Lisbon 2020",
+    "Gandarias2020": 'Gandarias et al., "Open-loop position control in collaborative, modular '
+    'Variable-Stiffness-Link (VSL) robots", IEEE Robotics and Automation Letters 2020',
+    "Luberto": 'Luberto et al., "Enhancing adaptive grasp planning through a simple sensor-based reflex mechanism"',
+    "Vervloet2025": 'Vervloet, "A first step to visual servoing based autonomous handovers with soft robots", '
+    "TU Delft 2025",
+}
+
+
+def cited(text: str) -> dict[str, str]:
+    """Return the papers that a text cites as `[key]`."""
+    return {key: paper for key, paper in PAPERS.items() if f"[{key}]" in text}
+
 
 _FORMS = {
     Form.FMI2: "FMI 2.0 for co-simulation",

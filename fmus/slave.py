@@ -7,8 +7,7 @@ from typing import Any
 from handover.cosim.blocks.block import UnfitAdvance
 from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers, UnfitState, join, split
-from handover.fmus.derivatives import derivative_reader
-from handover.fmus.exchange import input_reader, output_writer
+from handover.fmus.exchange import derivative_reader, input_reader, output_writer
 from handover.fmus.layout import Form, Layout
 from handover.fmus.parameters import read_parameters
 from handover.fmus.table import table

@@ -8,11 +8,11 @@ import pytest
 from workshop import Workshop
 from written_blocks import write_block
 
+from handover.fmus.binaries import universal
 from handover.fmus.build import UnknownVersion, UnusableName, UnusableStep, build_block, cached
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit
 from handover.fmus.compile import UnknownPlatform, host_platform
 from handover.fmus.sources import closure
-from handover.fmus.universal import universal
 
 
 def test_the_catalog_knows_its_units_without_loading_them():

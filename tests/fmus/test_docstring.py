@@ -2,7 +2,7 @@
 
 from textwrap import dedent
 
-from handover.fmus.docstring import Part, parse
+from handover.fmus.documentation import Part, parse
 
 DOCSTRING = dedent(
     """\

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from handover.fmus.build import build_block
-from handover.fmus.documentation import seconds
-from handover.fmus.papers import PAPERS, cited
+from handover.fmus.documentation import PAPERS, cited, seconds
 
 HOUSE = Path(__file__).parents[2]
 
