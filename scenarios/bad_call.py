@@ -43,7 +43,7 @@ def told_in_one_line() -> Generator[None, None, None]:
     from handover.fmus.binaries import NotCompiled  # what builds and records is loaded by commands that do it
     from handover.fmus.compile import CompilationError, UnknownPlatform
     from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
-    from handover.scenarios.parameters import BadParameter
+    from handover.scenarios.experiment.parameters import BadParameter
     from handover.scenarios.run_folder import BadRunFolder
 
     try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 
 
 def scenario_named(name: str) -> type[Experiment[Any]]:

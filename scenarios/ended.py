@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from handover.cosim.exceptions import UnitFailure
-from handover.scenarios.experiment import Outcome
+from handover.scenarios.experiment.experiment import Outcome
 
 
 @dataclass(frozen=True, kw_only=True)

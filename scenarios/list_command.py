@@ -13,7 +13,7 @@ from handover.fmus.catalog import UNITS, Entry, import_block
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.console import open_console, print_rows
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")

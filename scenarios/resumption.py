@@ -10,7 +10,7 @@ from typing import Any
 from handover.cosim.exceptions import one_line
 from handover.cosim.master.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.experiment import Watch
+from handover.scenarios.experiment.experiment import Watch
 
 
 @dataclass(frozen=True)

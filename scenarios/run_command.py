@@ -17,12 +17,12 @@ from handover.fmus.build import cached
 from handover.scenarios.bad_call import BadCall, told_in_one_line
 from handover.scenarios.chosen import fmus_of, replacements, scenario_named
 from handover.scenarios.ending import end_with
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.headed_options import HeadedCommand, HeadedOption
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.limit_arguments import limit_options, limits
 from handover.scenarios.master_arguments import coupling_of, master_options
-from handover.scenarios.parameters import parse_parameters
 from handover.scenarios.progress import progress_bar
 from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out

@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import IterationCount
-from handover.scenarios.experiment import Experiment, Metric
+from handover.scenarios.experiment.experiment import Experiment, Metric
 
 
 def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:

@@ -10,9 +10,9 @@ import numpy as np
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.master.master import Master
 from handover.scenarios.conversions import conversions_of
-from handover.scenarios.experiment import Metric, Outcome
+from handover.scenarios.experiment.display_unit import unit_symbol
+from handover.scenarios.experiment.experiment import Metric, Outcome
 from handover.scenarios.resumption import Spent
-from handover.scenarios.shown_unit import unit_symbol
 from handover.scenarios.task import Task
 from handover.scenarios.told_system import told_system
 from handover.scenarios.told_value import told_value

@@ -11,7 +11,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.scenarios.ended import Ended
-from handover.scenarios.experiment import Outcome, Watch
+from handover.scenarios.experiment.experiment import Outcome, Watch
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.reporting.kept_pictures import write_pictures
 from handover.scenarios.resumption import Resumption, Spent, pack

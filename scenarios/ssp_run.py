@@ -14,7 +14,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios import supervisor
 from handover.scenarios.bad_call import BadCall
-from handover.scenarios.experiment import Experiment, Figure, FmuOf, Outcome, Watch
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf, Outcome, Watch
 from handover.scenarios.run_folder import sha256_of
 
 _MOST_SIGNALS = 6
@@ -85,7 +85,7 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
 
 def draw_outputs(units: Iterable[str], record: Record, folder: Path) -> list[Figure]:
     """Draw the first real outputs of each unit over time, an axis for each."""
-    from handover.scenarios.plotting import COLOURS, figure  # what draws takes long to load
+    from handover.scenarios.experiment.plotting import COLOURS, figure  # what draws takes long to load
 
     figures: list[Figure] = []
     for name in units:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.run_folder import RunFolder
 
 

@@ -11,9 +11,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
 from handover.scenarios.campaign.point_layout import PointLayout, layout_of
 from handover.scenarios.campaign.statistics import Interval
-from handover.scenarios.experiment import Figure
-from handover.scenarios.plotting import COLOURS, figure
-from handover.scenarios.shown_unit import ShownUnit, shown_unit
+from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure
 
 _LINE = 0.24
 """Height of a point of a list, in inches."""

@@ -13,7 +13,7 @@ from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.shown_unit import shown_unit
+from handover.scenarios.experiment.display_unit import shown_unit
 
 _MOST_METRICS = 4
 _MOST_INTERVALS = 150

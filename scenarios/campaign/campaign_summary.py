@@ -13,7 +13,7 @@ from handover.scenarios.campaign.campaign_results import CampaignResults, PointR
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.tally import Tally
 from handover.scenarios.console import open_console
-from handover.scenarios.shown_unit import shown_unit
+from handover.scenarios.experiment.display_unit import shown_unit
 
 _MOST_POINTS = 12
 _MOST_REASONS = 5

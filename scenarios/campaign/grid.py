@@ -9,8 +9,8 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.plan import MOST_RUNS
-from handover.scenarios.experiment import Experiment
-from handover.scenarios.parameters import BadParameter, parse_value, text_of, texts_by_name
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import BadParameter, parse_value, text_of, texts_by_name
 
 
 def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[dict[str, str]]:

@@ -16,8 +16,8 @@ from handover.scenarios.bad_call import told_in_one_line
 from handover.scenarios.campaign.refused_run import REFUSALS, write_refused_run
 from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 from handover.scenarios.chosen import scenario_named
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.parameters import parse_parameters
 from handover.scenarios.resumption import Spent
 from handover.scenarios.run_folder import RunFolder, is_full
 from handover.scenarios.runner import carry_out

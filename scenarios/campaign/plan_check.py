@@ -10,8 +10,8 @@ from handover.cosim.master.master import Master
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
 from handover.scenarios.chosen import fmus_of, replacements, scenario_named
-from handover.scenarios.experiment import Experiment
-from handover.scenarios.parameters import BadParameter, parse_parameters, text_of
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import BadParameter, parse_parameters, text_of
 
 _MOST_TOLD = 8
 """Faults that are told; there may be one a point."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
-from handover.scenarios.shown_unit import shown_unit
+from handover.scenarios.experiment.display_unit import shown_unit
 
 _MOST_COLOURS = 6
 _MOST_NAMES = 10

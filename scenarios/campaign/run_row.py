@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from handover.scenarios.campaign.plan import PlannedRun
-from handover.scenarios.experiment import Metric
+from handover.scenarios.experiment.experiment import Metric
 
 
 @dataclass(frozen=True, kw_only=True)

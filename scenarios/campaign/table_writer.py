@@ -16,8 +16,8 @@ from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.run_row import RunRow
 from handover.scenarios.chosen import scenario_named
-from handover.scenarios.experiment import Metric
-from handover.scenarios.parameters import parse_value
+from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.experiment.parameters import parse_value
 from handover.scenarios.run_folder import told_if_not_written
 
 _SHARE = 0.005

@@ -10,14 +10,14 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch
 from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_handover
-from handover.scenarios.paper import paper_values
-from handover.scenarios.parameters import BadParameter
-from handover.scenarios.reporting.replay import Replay
-from handover.scenarios.reporting.time_plot import TimePlot
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""

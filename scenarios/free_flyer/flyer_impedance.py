@@ -9,15 +9,14 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.paper import PublishedValue, paper_values
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from handover.scenarios.free_flyer.published import published_of_push
 from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
-from handover.scenarios.paper import paper_values
-from handover.scenarios.reporting.published_value import PublishedValue
-from handover.scenarios.reporting.replay import Replay
-from handover.scenarios.reporting.time_plot import TimePlot
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):

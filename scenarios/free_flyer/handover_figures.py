@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.plotting import COLOURS, figure, leave_room, shade_phases
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.handover_watch import HandoverWatch
 from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
 from handover.scenarios.free_flyer.thrust_figure import draw_thrust
-from handover.scenarios.paper import paper_values
-from handover.scenarios.plotting import COLOURS, figure, leave_room, shade_phases
 
 _FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("person.{}_WO", "object", {"color": COLOURS[2], "lw": 4.5, "alpha": 0.4}),

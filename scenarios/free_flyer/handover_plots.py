@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.thrust_plots import plot_thrust
-from handover.scenarios.paper import paper_values
-from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 _PHASES = "decision.phase"
 _TOUCHES = {"HAND": "a pull", "GRIPPER": "a push"}

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.stability import stability_metrics
 from handover.scenarios.free_flyer.transfer import Transfer

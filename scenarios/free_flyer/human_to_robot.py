@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.free_flyer.flyer_handover import FlyerHandover
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.published import published_of_receiving
-from handover.scenarios.reporting.published_value import PublishedValue
 
 
 class HumanToRobot(FlyerHandover):

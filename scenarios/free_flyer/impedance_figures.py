@@ -7,13 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.free_flyer.impedance_model import Errors
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
 from handover.scenarios.free_flyer.scene import draw_scene, robot_at
 from handover.scenarios.free_flyer.thrust_figure import draw_thrust
-from handover.scenarios.plotting import COLOURS, figure
 
 _PUSH_COLOUR = "#fbe3cf"
 _CALCULATED = "calculated, [Fernandes2020] eq. (4.4)"

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.behaviour import Behaviour
-from handover.scenarios.paper import paper_values
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -4,11 +4,11 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.time_plot import Curve, TimePlot
 from handover.scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Motion, errors_of
 from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
 from handover.scenarios.free_flyer.thrust_plots import plot_thrust
-from handover.scenarios.paper import paper_values
-from handover.scenarios.reporting.time_plot import Curve, TimePlot
 
 
 def plot_push(parameters: Parameters, record: Record) -> list[TimePlot]:

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.impedance_model import MOTION_SIGNALS, Errors, Motion, errors_of
 from handover.scenarios.free_flyer.impedance_parameters import Parameters
 from handover.scenarios.free_flyer.stability import stability_metrics
-from handover.scenarios.paper import paper_values
 
 _REST_POSITION, _REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
 from handover.scenarios.free_flyer.impedance_parameters import Parameters as PushParameters
 from handover.scenarios.free_flyer.impedance_parameters import Wrench
-from handover.scenarios.reporting.published_value import PublishedValue
 
 _PAPER = "free_flyer"
 

@@ -6,10 +6,9 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, faceted, hull
 from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
-from handover.scenarios.paper import paper_values
-from handover.scenarios.reporting.meshes import Mesh, faceted, hull
-from handover.scenarios.reporting.replay import Body, Line, Replay
 
 _PUSH, _TWIST, _WAY = "#d1602b", "#8357a8", "#b58a1b"
 _PER_NEWTON, _PER_NEWTON_METRE = 0.04, 0.08

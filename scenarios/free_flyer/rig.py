@@ -4,7 +4,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.paper import paper_values
+from handover.scenarios.experiment.paper import paper_values
 
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")

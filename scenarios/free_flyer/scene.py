@@ -13,9 +13,9 @@ from matplotlib.colors import to_rgb
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
-from handover.scenarios.paper import paper_values
-from handover.scenarios.plotting import figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.plotting import figure
 
 _CUBE, _ARM, _JAW, _SKIN, _THING = "#c9d3df", "#8793a3", "#2f6db5", "#e3b591", "#d1602b"
 

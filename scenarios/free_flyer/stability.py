@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment import Metric
+from handover.scenarios.experiment.experiment import Metric
 
 _SLOWEST = {"pose": "the slowest mode, the integrator's"}
 _PERIOD = 2 / 125

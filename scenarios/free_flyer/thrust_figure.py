@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, leave_room
 from handover.scenarios.free_flyer.thrust_plots import BEYOND, QUANTITIES, commanded_wrench
-from handover.scenarios.plotting import COLOURS, figure, leave_room
 
 
 def draw_thrust(

@@ -6,7 +6,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.reporting.time_plot import Curve, TimePlot
+from handover.scenarios.experiment.time_plot import Curve, TimePlot
 
 BEYOND = 2.0
 """How far plots reach beyond what the thrusters give at most: a command may be twenty times as much."""

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from handover.scenarios.experiment import Metric
+from handover.scenarios.experiment.experiment import Metric
 
 
 @dataclass

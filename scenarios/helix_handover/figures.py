@@ -8,11 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.pictures import CameraPicture
+from handover.scenarios.experiment.plotting import COLOURS, figure, shade_phases
 from handover.scenarios.helix_handover.parameters import Parameters
 from handover.scenarios.helix_handover.plots import gripper_to_ball, tendon_name
-from handover.scenarios.plotting import COLOURS, figure, shade_phases
-from handover.scenarios.reporting.camera_picture import CameraPicture
 
 _SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
 

@@ -9,15 +9,15 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.paper import PublishedValue
+from handover.scenarios.experiment.pictures import CameraPicture
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.published import published_of
 from handover.scenarios.helix_handover.rig import calibration
 from handover.scenarios.helix_handover.watch import HandoverWatch
-from handover.scenarios.reporting.camera_picture import CameraPicture
-from handover.scenarios.reporting.published_value import PublishedValue
-from handover.scenarios.reporting.replay import Replay
-from handover.scenarios.reporting.time_plot import TimePlot
 
 
 class HelixHandover(Experiment[HandoverWatch]):

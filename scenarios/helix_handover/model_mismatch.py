@@ -6,7 +6,7 @@ import numpy as np
 
 from handover.controllers.helix.constant_curvature import forward_kinematics
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.paper import paper_values
+from handover.scenarios.experiment.paper import paper_values
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Number, Second
-from handover.scenarios.paper import paper_values
+from handover.scenarios.experiment.paper import paper_values
 
 
 class Place(enum.IntEnum):

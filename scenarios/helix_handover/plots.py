@@ -4,8 +4,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
 from handover.scenarios.helix_handover.parameters import Parameters
-from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 _PHASES = "servo.phase"
 _FOLLOWED = (("gripper", "arm.p_WG", "servo.p_WG_est"), ("ball", "hand.p_WO", "servo.p_WO_est"))

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.helix_handover.parameters import Cover, Parameters, Tuning
-from handover.scenarios.paper import paper_values
-from handover.scenarios.reporting.published_value import PublishedValue
 
 _PAPER = "helix_handover"
 

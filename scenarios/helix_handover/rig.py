@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
-from handover.scenarios.paper import paper_values
+from handover.scenarios.experiment.paper import paper_values
 
 
 def calibration() -> dict[str, Any]:

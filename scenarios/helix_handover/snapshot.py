@@ -9,9 +9,9 @@ import numpy as np
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.rig import camera_of
-from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
 
 MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
 _PERIOD = Fraction(1, 30)

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
 from handover.scenarios.helix_handover.parameters import Cover, Parameters
 from handover.scenarios.helix_handover.snapshot import is_covered, take_pictures
-from handover.scenarios.reporting.camera_picture import CameraPicture
 
 _SETTLING = 1.0
 """How long the ball must stay in the closed gripper, s (assumed)."""

@@ -13,10 +13,10 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import FINGERS, finger_points, palm_outline, sensor_rays
 from handover.plants.ir_grasp.objects import outlines
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, shade_phases
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import FINGER_NAMES, closing_cost, cost, in_sight
-from handover.scenarios.plotting import COLOURS, figure, shade_phases
 
 FINGER_COLOURS = COLOURS[:3]
 """Of thumb, index and ring, as the page gives them to the curves of the distances."""

@@ -9,15 +9,15 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.paper import PublishedValue
+from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.published import published_of
 from handover.scenarios.ir_grasp.situation import Situation
 from handover.scenarios.ir_grasp.watch import GraspWatch
-from handover.scenarios.parameters import BadParameter
-from handover.scenarios.reporting.published_value import PublishedValue
-from handover.scenarios.reporting.replay import Replay
-from handover.scenarios.reporting.time_plot import TimePlot
 
 
 class IrGrasp(Experiment[GraspWatch]):

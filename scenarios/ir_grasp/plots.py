@@ -5,8 +5,8 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 FINGER_NAMES = ("thumb", "index", "ring")
 _PHASES = "reflex.phase"

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from handover.controllers.ir_grasp.parameters import Strategy
+from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.reporting.published_value import PublishedValue
 
 FINGERS = ("thumb", "index", "ring")
 """As table II is kept in `paper.toml`."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix_handover.parameters import Tuning
-from handover.scenarios.paper import paper_values
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from handover.controllers.helix.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
-from handover.scenarios.plotting import COLOURS, figure
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.published.helix_1_arm import Helix1Arm
 from handover.scenarios.published.helix_1_telling import published
 

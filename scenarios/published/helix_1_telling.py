@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from handover.scenarios.paper import paper_values
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.published.claim import Claim
 from handover.scenarios.published.helix_1_arm import Helix1Arm
 from handover.scenarios.published.verdict_rules import nothing_measured

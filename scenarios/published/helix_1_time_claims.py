@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
 from handover.scenarios.campaign.statistics import FEWEST, LEVEL, time_interval
-from handover.scenarios.paper import paper_values
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.published.claim import Claim, Verdict
 from handover.scenarios.published.helix_1_arm import Helix1Arm
 from handover.scenarios.published.helix_1_telling import missing, published, too_few

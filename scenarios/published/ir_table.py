@@ -7,7 +7,7 @@ from typing import ClassVar
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.published.claim import Claim
 from handover.scenarios.published.comparison_table import ComparisonTable

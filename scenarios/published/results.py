@@ -6,7 +6,7 @@ from pathlib import Path
 
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_table import CampaignTable
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.claim import Claim
 from handover.scenarios.published.published_experiment import PublishedExperiment
 from handover.scenarios.run_folder import told_if_not_written, write_whole

@@ -7,9 +7,9 @@ from markupsafe import Markup
 
 from handover.scenarios.campaign.campaign_results import CampaignResults
 from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment.display_unit import shown_unit
 from handover.scenarios.published.claim import Claim, verdict_counts
 from handover.scenarios.reporting.claims_section import verdict_html
-from handover.scenarios.shown_unit import shown_unit
 
 _MOST_VALUES = 10
 

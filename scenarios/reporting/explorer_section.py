@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.reporting.page import template
 from handover.scenarios.reporting.plot_html import json_html
 from handover.scenarios.reporting.section import Section
 from handover.scenarios.reporting.thinned import changes_of, rows_of_curve
-from handover.scenarios.shown_unit import unit_symbol
 
 _BUDGET = 1_400_000
 """Bytes in the page for all signals, about."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from handover.scenarios.experiment import Figure
+from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.reporting.section import Section
 
 

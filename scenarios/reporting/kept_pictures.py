@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.run_folder import BadRunFolder, told_if_not_written, write_whole
 
 _TOLD = ("t", "camera", "role", "width", "height")

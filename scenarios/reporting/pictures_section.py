@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 from markupsafe import Markup
 
-from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.reporting.kept_pictures import read_pictures
 from handover.scenarios.reporting.page import template
 from handover.scenarios.reporting.section import Section

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from handover.scenarios.campaign.campaign_results import CampaignResults, PointResults
+from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
 from handover.scenarios.reporting.rows_table import Cell, rows_table
 from handover.scenarios.reporting.section import Section
-from handover.scenarios.shown_unit import ShownUnit, shown_unit
 
 
 def points_section(results: CampaignResults) -> Section | None:

@@ -6,8 +6,8 @@ from typing import Any
 from markupsafe import Markup
 
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.parameters import BadParameter, parameters_of
-from handover.scenarios.reporting.published_value import PublishedValue
+from handover.scenarios.experiment.paper import PublishedValue
+from handover.scenarios.experiment.parameters import BadParameter, parameters_of
 from handover.scenarios.reporting.rows_table import rows_table
 from handover.scenarios.reporting.section import Section
 from handover.scenarios.reporting.told_metric import told

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.replay import Body, Line, Replay
 from handover.scenarios.reporting.page import asset
 from handover.scenarios.reporting.plot_html import json_html
-from handover.scenarios.reporting.replay import Body, Line, Replay
 from handover.scenarios.reporting.replay_frames import frame_rows, phase_changes
 from handover.scenarios.reporting.section import Section
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.run_folder import BadRunFolder, RunFolder
 from handover.scenarios.told_value import told_value
 

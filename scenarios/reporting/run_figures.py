@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from handover.cosim.record.reader import Record, RecordedSignals
-from handover.scenarios.experiment import Figure, Watch
-from handover.scenarios.parameters import BadParameter, parameters_of
+from handover.scenarios.experiment.experiment import Figure, Watch
+from handover.scenarios.experiment.parameters import BadParameter, parameters_of
 from handover.scenarios.reporting.kept_pictures import read_pictures
 from handover.scenarios.reporting.run_facts import RunFacts
 from handover.scenarios.reporting.run_record import record_of

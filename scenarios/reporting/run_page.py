@@ -7,7 +7,7 @@ from typing import Any
 from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.parameters import BadParameter, parameters_of
+from handover.scenarios.experiment.parameters import BadParameter, parameters_of
 from handover.scenarios.reporting.cpu_section import cpu_section
 from handover.scenarios.reporting.explorer_section import explorer_section
 from handover.scenarios.reporting.graph_section import graph_section

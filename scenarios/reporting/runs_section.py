@@ -10,9 +10,9 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
 from handover.scenarios.reporting.rows_table import Cell, rows_table
 from handover.scenarios.reporting.section import Section
-from handover.scenarios.shown_unit import ShownUnit, shown_unit
 
 _MOST_ROWS = 2000
 _MOST_METRICS = 6

@@ -6,9 +6,9 @@ from typing import Any, cast
 from markupsafe import Markup
 
 from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.experiment.display_unit import shown_unit
 from handover.scenarios.reporting.rows_table import rows_table
 from handover.scenarios.reporting.section import Section
-from handover.scenarios.shown_unit import shown_unit
 from handover.scenarios.told_value import told_value
 
 

@@ -10,10 +10,10 @@ from markupsafe import Markup
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
 from handover.scenarios.reporting.plot_html import COLOURS, plot_html
 from handover.scenarios.reporting.section import Section
 from handover.scenarios.reporting.thinned import changes_of, rows_of_curve, rows_of_steps
-from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
 
 TIME_AXIS = "time (s)"
 _MOST = 900

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from handover.scenarios.shown_unit import shown_unit
+from handover.scenarios.experiment.display_unit import shown_unit
 
 
 def told(metric: Mapping[str, Any]) -> str:

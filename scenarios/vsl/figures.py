@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment import Figure
-from handover.scenarios.plotting import COLOURS, figure, shade_phases
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, shade_phases
 from handover.scenarios.vsl.parameters import Parameters
 from handover.scenarios.vsl.path_point import distance
 from handover.scenarios.vsl.plots import BY_SERVOS, errors

@@ -9,10 +9,10 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.scenarios.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.parameters import BadParameter
-from handover.scenarios.reporting.replay import Replay
-from handover.scenarios.reporting.time_plot import TimePlot
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.vsl.parameters import Parameters
 from handover.scenarios.vsl.watch import PathWatch
 

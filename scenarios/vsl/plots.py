@@ -4,7 +4,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.reporting.time_plot import Curve, Level, TimePlot
+from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
 from handover.scenarios.vsl.parameters import Parameters
 
 BY_SERVOS = "tip by the servos, links taken as rigid"

@@ -6,8 +6,7 @@ from handover.controllers.vsl.paths import segments_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.vsl.parameters import Params as ArmParams
-from handover.scenarios.reporting.meshes import ball, prism
-from handover.scenarios.reporting.replay import Body, Line, Replay
+from handover.scenarios.experiment.replay import Body, Line, Replay, ball, prism
 from handover.scenarios.vsl.parameters import Parameters
 
 _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"

@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
 from handover.scenarios.vsl.parameters import Parameters
 from handover.scenarios.vsl.path_point import PathPoint, distance, distance_to_path
 

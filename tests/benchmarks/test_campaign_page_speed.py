@@ -16,7 +16,7 @@ from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.run_row import RunRow
 from handover.scenarios.campaign.table_writer import table_of
-from handover.scenarios.experiment import Metric
+from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.reporting.campaign_page import write_campaign_page
 
 pytestmark = pytest.mark.slow

@@ -16,7 +16,7 @@ from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 
 SEED = 0
 

@@ -4,7 +4,7 @@ import pytest
 
 from handover.scenarios.campaign.statistics import FEWEST
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.published.helix_1 import Helix1
 
 PERIODS = {"0.1": "1.38", "0.2": "1.51", "0.4": "1.45"}

@@ -38,7 +38,7 @@ def test_names_of_points_do_not_overlap(points: list[dict[str, str]], tmp_path: 
         labels = (axis.get_ticklabels() for axis in (canvas.axes[0].xaxis, canvas.axes[0].yaxis))
         boxes.extend([each.get_window_extent() for each in along if each.get_text()] for along in labels)
 
-    monkeypatch.setattr("handover.scenarios.plotting._save", look)
+    monkeypatch.setattr("handover.scenarios.experiment.plotting._save", look)
     draw_campaign(results_of("ir_grasp", points), tmp_path)
     assert len(boxes) == 2
     assert max(map(len, boxes)) >= min(len(points), 6)

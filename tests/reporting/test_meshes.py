@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from handover.scenarios.reporting.meshes import Mesh, ball, merged, prism, rod
+from handover.scenarios.experiment.replay import Mesh, ball, merged, prism, rod
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
 ROUND_VOLUME = np.pi * 0.1**2 * 1.0 + 4.0 / 3.0 * np.pi * 0.1**3

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.reporting.kept_pictures import write_pictures
 from handover.scenarios.reporting.pictures_section import pictures_section
 from handover.scenarios.run_folder import RunFolder

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.reporting.meshes import prism
-from handover.scenarios.reporting.replay import Body, Line, Replay
+from handover.scenarios.experiment.replay import Body, Line, Replay, prism
 from handover.scenarios.reporting.replay_section import replay_section
 
 ROWS = 1000

@@ -5,9 +5,9 @@ from typing import Any
 
 from handover.fmus.build import cached
 from handover.scenarios.ended import Ended
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.parameters import parse_parameters
 from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task

@@ -3,10 +3,10 @@
 import pytest
 
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
+from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
 from handover.scenarios.helix_handover.helix_handover import HelixHandover
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.parameters import BadParameter
 from handover.scenarios.vsl.vsl_hybrid import VslHybrid
 
 

@@ -7,7 +7,7 @@ import pytest
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import checked_plan, unit_fmus
-from handover.scenarios.parameters import BadParameter
+from handover.scenarios.experiment.parameters import BadParameter
 
 
 def plan(**given: object) -> CampaignPlan:

@@ -13,7 +13,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.run_row import RunRow
 from handover.scenarios.campaign.table_writer import table_of
 from handover.scenarios.campaign.tally import Tally
-from handover.scenarios.experiment import Metric
+from handover.scenarios.experiment.experiment import Metric
 
 
 def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> str:

@@ -13,7 +13,7 @@ from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.command import main
-from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.experiment.parameters import parse_parameters
 
 CHEAP = "ir_grasp"
 STOPS = {"ir_grasp": Fraction(1, 2), "helix_handover": Fraction(3, 10)}

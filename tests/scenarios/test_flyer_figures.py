@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib import image
 
+from handover.scenarios.experiment.plotting import figure, leave_room, shade_phases
 from handover.scenarios.free_flyer.scene import Solid, draw_scene
-from handover.scenarios.plotting import figure, leave_room, shade_phases
 
 NAMES = {0: "FLY", 1: "CLOSE_GRIPPER", 2: "CHECK_ANGLE", 3: "RETREAT"}
 

@@ -11,13 +11,13 @@ from flyer_runs import metric, run
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
+from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.free_flyer.collaborative import Collaborative
 from handover.scenarios.free_flyer.failed_reception import FailedReception
 from handover.scenarios.free_flyer.flyer_handover import FlyerHandover
 from handover.scenarios.free_flyer.handover_parameters import Parameters
 from handover.scenarios.free_flyer.human_to_robot import HumanToRobot
 from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
-from handover.scenarios.parameters import BadParameter
 
 HANDOVERS = (RobotToHuman, HumanToRobot, FailedReception, Collaborative)
 FREE, GRIPPER, HAND, BOTH = range(4)

@@ -15,7 +15,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.experiment import Outcome
+from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handover.scenarios.reporting.camera_picture import CameraPicture, Mark
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.reporting.kept_pictures import read_pictures, write_pictures
 from handover.scenarios.run_folder import BadRunFolder
 

@@ -11,9 +11,9 @@ from flyer_runs import run
 
 import handover.scenarios
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.parameters import parse_parameters
+from handover.scenarios.experiment.paper import PublishedValue
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.reporting.published_section import published_section
-from handover.scenarios.reporting.published_value import PublishedValue
 
 FAST = {
     "ir_grasp": {(): 3},

@@ -12,8 +12,8 @@ from flyer_runs import run
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.parameters import parse_parameters
-from handover.scenarios.reporting.replay import Body, Line
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.experiment.replay import Body, Line
 from handover.scenarios.reporting.replay_section import replay_section
 
 MUST_SHOW = {

@@ -15,9 +15,9 @@ from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.command import main
 from handover.scenarios.ended import Ended
-from handover.scenarios.experiment import Outcome
+from handover.scenarios.experiment.experiment import Outcome
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.listing import print_summary
-from handover.scenarios.parameters import parse_parameters
 from handover.scenarios.run_folder import RunFolder
 
 fcntl = pytest.importorskip("fcntl")

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from handover.scenarios.experiment import Metric
+from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.reporting.told_metric import told
 from handover.scenarios.run_metrics import peak_memory
 from handover.scenarios.run_summary import metric_data

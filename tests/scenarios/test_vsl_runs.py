@@ -16,9 +16,9 @@ from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Observer
 from handover.fmus.build import cached
 from handover.scenarios.ended import Ended
-from handover.scenarios.experiment import Outcome
+from handover.scenarios.experiment.experiment import Outcome
+from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.parameters import BadParameter, parse_parameters
 from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task

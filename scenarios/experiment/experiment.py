@@ -12,10 +12,10 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
-from handover.scenarios.reporting.camera_picture import CameraPicture
-from handover.scenarios.reporting.published_value import PublishedValue
-from handover.scenarios.reporting.replay import Replay
-from handover.scenarios.reporting.time_plot import TimePlot
+from handover.scenarios.experiment.paper import PublishedValue
+from handover.scenarios.experiment.pictures import CameraPicture
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 
 FmuOf = Callable[[str], Path]
 """Gives a unit's FMU by the unit's name in the system."""

@@ -8,7 +8,7 @@ import numpy as np
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.exceptions import nearest
-from handover.scenarios.experiment import Experiment
+from handover.scenarios.experiment.experiment import Experiment
 
 
 class BadParameter(ValueError):
