@@ -37,23 +37,23 @@ class RobotSystem:
 SYSTEMS = (
     RobotSystem(
         "Helix, a tendon-driven soft arm",
-        {"helix_handover": "handover.scenarios.helix_handover.helix_handover:HelixHandover"},
+        {"helix_handover": "handover.scenarios.helix.helix_handover:HelixHandover"},
     ),
     RobotSystem(
         "VSL arm, with links of variable stiffness",
         {
-            "vsl_model_based": "handover.scenarios.vsl.vsl_model_based:VslModelBased",
-            "vsl_hybrid": "handover.scenarios.vsl.vsl_hybrid:VslHybrid",
+            "vsl_model_based": "handover.scenarios.vsl.path_experiments:VslModelBased",
+            "vsl_hybrid": "handover.scenarios.vsl.path_experiments:VslHybrid",
         },
     ),
     RobotSystem(
         "Free-flyer, in microgravity",
         {
-            "flyer_impedance": "handover.scenarios.free_flyer.flyer_impedance:FlyerImpedance",
-            "flyer_robot_to_human": "handover.scenarios.free_flyer.robot_to_human:RobotToHuman",
-            "flyer_human_to_robot": "handover.scenarios.free_flyer.human_to_robot:HumanToRobot",
-            "flyer_failed_reception": "handover.scenarios.free_flyer.failed_reception:FailedReception",
-            "flyer_collaborative": "handover.scenarios.free_flyer.collaborative:Collaborative",
+            "flyer_impedance": "handover.scenarios.free_flyer.impedance:FlyerImpedance",
+            "flyer_robot_to_human": "handover.scenarios.free_flyer.handovers:RobotToHuman",
+            "flyer_human_to_robot": "handover.scenarios.free_flyer.handovers:HumanToRobot",
+            "flyer_failed_reception": "handover.scenarios.free_flyer.handovers:FailedReception",
+            "flyer_collaborative": "handover.scenarios.free_flyer.handovers:Collaborative",
         },
     ),
     RobotSystem(

@@ -18,7 +18,7 @@ from handover.fmus.compile import CompilationError, UnknownPlatform
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.progress import progress_bar
-from handover.scenarios.vsl_training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
+from handover.scenarios.vsl.training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
 
 _PATH = click.Path(path_type=Path)
 

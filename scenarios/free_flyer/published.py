@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from handover.scenarios.experiment.paper import PublishedValue
-from handover.scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
-from handover.scenarios.free_flyer.impedance_parameters import Parameters as PushParameters
-from handover.scenarios.free_flyer.impedance_parameters import Wrench
+from handover.scenarios.free_flyer.parameters import HandoverParameters, Wrench
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushParameters
 
 _PAPER = "free_flyer"
 

@@ -1,4 +1,7 @@
-"""A soft hand corrects its grasp by infrared reflexes, closes, pulls and shakes. [Luberto] sec. V."""
+"""A soft hand corrects its grasp by infrared reflexes, closes, pulls and shakes. [Luberto] sec. V.
+
+What the paper tells of a grasp with given parameters. [Luberto] table II.
+"""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -7,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.controllers.ir_grasp.parameters import Strategy
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
@@ -14,10 +18,29 @@ from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimePlot
-from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.published import published_of
-from handover.scenarios.ir_grasp.situation import Situation
-from handover.scenarios.ir_grasp.watch import GraspWatch
+from handover.scenarios.ir_grasp.evaluation import GraspWatch
+from handover.scenarios.ir_grasp.parameters import Parameters, Situation
+
+FINGERS = ("thumb", "index", "ring")
+"""As table II is kept in `paper.toml`."""
+
+
+def published_of(p: Parameters) -> Sequence[PublishedValue]:
+    """Return table II's distances of the object in such a pose; nothing for other strategies than the reflex."""
+    if p.strategy is not Strategy.REFLEX or p.literal:
+        return ()
+    pose = "perturbed" if p.perturbed else "nominal"
+    thing = p.thing.name.lower().removesuffix("_a").removesuffix("_b")
+    return [
+        PublishedValue(
+            metric=f"final_distance_{finger}",
+            paper="ir_grasp",
+            name=f"final_distance_{pose}_{thing}",
+            index=(k,),
+            note="of several grasps together; how they were summed up is not told",
+        )
+        for k, finger in enumerate(FINGERS)
+    ]
 
 
 class IrGrasp(Experiment[GraspWatch]):
@@ -109,7 +132,7 @@ class IrGrasp(Experiment[GraspWatch]):
 
     def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments, distances and cost, and the commands."""
-        from handover.scenarios.ir_grasp.figures import draw_grasp  # what draws takes long to load
+        from handover.scenarios.ir_grasp.plots import draw_grasp  # what draws takes long to load
 
         return draw_grasp(parameters, watch.moments, record, folder)
 

@@ -1,12 +1,18 @@
-"""Parameters of the infrared grasp; origins of the defaults are in `paper.toml`."""
+"""Parameters of the infrared grasp; origins of the defaults are in `paper.toml`.
+
+Where object and hand are before a grasp: what vision saw, and what became of it since.
+"""
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from handover.controllers.ir_grasp.parameters import Strategy
-from handover.cosim.blocks.ports import parameter
+from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Radian
-from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.hand import PALM
+from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,3 +47,47 @@ class Parameters:
     run_up: Metre = parameter(
         0.12, "distance of the wrist from the pre-grasp pose at the start", minimum=0.0, maximum=0.5
     )
+
+
+_PALM_FRONT = max(x for x, _ in PALM)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """Drawn by a seed, in W: the object's place and turn from its reference pose, the pre-grasp pose, the hand's start.
+
+    Vision saw the object at the origin of W in its reference pose, hence a hand that comes along x.
+    """
+
+    p_WO: Floats
+    turn: float
+    p_WH_pregrasp: Floats
+    yaw: float
+    p_WH_start: Floats
+
+    @classmethod
+    def draw(cls, p: Parameters, seed: int) -> "Situation":
+        """Draw one; the numbers do not depend on the strategy, and of the parameters only what they scale."""
+        rng = np.random.default_rng(seed)
+        distance, direction, turn = rng.random(3)
+        miss = rng.standard_normal(3)
+        shift = p.shift_least + (p.shift_most - p.shift_least) * distance
+        angle = p.shift_spread * (2.0 * direction - 1.0)
+        yaw = p.vision_yaw * float(miss[2])
+        pregrasp = asked_for(p.thing, p.standoff) + p.vision_position * miss[:2]
+        return cls(
+            p_WO=shift * np.array([math.cos(angle), math.sin(angle)]) if p.perturbed else np.zeros(2),
+            turn=p.turn_most * (2.0 * float(turn) - 1.0) if p.perturbed else 0.0,
+            p_WH_pregrasp=pregrasp,
+            yaw=yaw,
+            p_WH_start=pregrasp - p.run_up * np.array([math.cos(yaw), math.sin(yaw)]),
+        )
+
+
+def asked_for(thing: Thing, standoff: float) -> Floats:
+    """Return the wrist's place before the middle of the object's width, its palm a standoff from its nearest point."""
+    yaw = SOLIDS[thing].yaw
+    R_WO = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    points: Floats = np.vstack([outline @ np.transpose(R_WO) for outline in outlines(thing)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([low[0] - standoff - _PALM_FRONT, (low[1] + high[1]) / 2.0])

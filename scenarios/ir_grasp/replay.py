@@ -8,9 +8,8 @@ from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import FINGERS, PALM, finger_points, sensor_rays
 from handover.plants.ir_grasp.objects import outlines
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, merged, prism
-from handover.scenarios.ir_grasp.figures import FINGER_COLOURS, PALM_COLOUR, THING_COLOUR
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.plots import FINGER_NAMES
+from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES, PALM_COLOUR, THING_COLOUR
 
 _BEAM = "#8357a8"
 _HEIGHT, _PALM_LOW, _PALM_HIGH, _THING_HIGH = 0.025, 0.012, 0.038, 0.055

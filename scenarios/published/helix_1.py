@@ -8,7 +8,7 @@ from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix_handover.parameters import Place, Tuning
+from handover.scenarios.helix.parameters import Place, Tuning
 from handover.scenarios.published.claim import Claim
 from handover.scenarios.published.comparison_table import ComparisonTable
 from handover.scenarios.published.helix_1_arm import Helix1Arm

@@ -9,7 +9,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix_handover.parameters import Tuning
+from handover.scenarios.helix.parameters import Tuning
 
 
 @dataclass(frozen=True)

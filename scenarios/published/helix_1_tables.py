@@ -6,7 +6,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import Statistic
-from handover.scenarios.helix_handover.parameters import Place, Tuning
+from handover.scenarios.helix.parameters import Place, Tuning
 from handover.scenarios.published.comparison_table import ComparisonTable
 from handover.scenarios.published.helix_1_arm import Helix1Arm
 from handover.scenarios.published.helix_1_telling import published

@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.ir_grasp.figures import FINGER_COLOURS
-from handover.scenarios.ir_grasp.plots import FINGER_NAMES
+from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 from handover.scenarios.published.ir_table_runs import ARMS, OBJECTS, POSES, REFLEX, Count, IrTableRuns
 
 _OURS, _THEIRS = COLOURS[0], COLOURS[1]

@@ -1,10 +1,21 @@
-"""What the report draws of a run along a path over time."""
+"""What the report draws of a run along a path over time.
+
+Figures of a run along a path: the path, the arm's shape, errors, and joints, currents and pressures over time.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, shade_phases
 from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
+from handover.scenarios.vsl.evaluation import PathWatch, distance
 from handover.scenarios.vsl.parameters import Parameters
 
 BY_SERVOS = "tip by the servos, links taken as rigid"
@@ -91,3 +102,194 @@ def _both(name: str, commanded: Floats, measured: Floats) -> list[Curve]:
         Curve(label=f"{name}, measured", values=measured, group=name),
         Curve(label=f"{name}, commanded", values=commanded, held=True, faint=True, group=name),
     ]
+
+
+_SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[5]
+_ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
+"""The arm's lines at its three moments: where they lie over each other, all are seen."""
+
+_LINES = (("desired", ":"), ("commanded", "--"), ("measured", "-"))
+"""What the lines of joints and pressures are."""
+
+_DISTANCE = "horizontal distance from the base (mm)"
+
+_APART = 0.01
+"""Points nearer to each other than this are shown once, m (assumed)."""
+
+
+def draw_path_run(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    made = [_error_over_time(watch, record, folder), _signals(record, folder)]
+    if not watch.points:
+        return made
+    return [_path(watch, folder), _shapes(parameters, watch, record, folder), _errors(watch, folder), *made]
+
+
+def _path(watch: PathWatch, folder: Path) -> Figure:
+    points = watch.points
+    lines: list[tuple[Sequence[Floats], dict[str, Any]]] = [
+        (list(watch.path), {"color": _DESIRED, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
+        (
+            [p.servo for p in points],
+            {"color": _SERVO, "ls": "--", "lw": 1.3, "label": BY_SERVOS},
+        ),
+        ([p.tracked for p in points], {"color": _TIP, "lw": 1.3, "label": "tip by the tracker"}),
+    ]
+    if watch.hybrid:
+        label = "tip by the hybrid forward model"
+        lines.append(([p.estimated for p in points], {"color": _ESTIMATE, "ls": ":", "lw": 1.8, "label": label}))
+    places = [_in_plane(np.array(positions), watch) for positions, _ in lines]
+    xlim, zlim = _limits(np.hstack([np.array(place) for place in places]))
+    size = (6.4, min(1.5 + 5.6 * (zlim[1] - zlim[0]) / (xlim[1] - xlim[0]), 7.6))
+    with figure(folder / "path", 1, size=size) as (axes,):
+        for place, (_, style) in zip(places, lines, strict=True):
+            axes.plot(*place, **style)
+        axes.plot(*_in_plane(watch.path[:1], watch), "o", ms=6, color=_DESIRED, label="start")
+        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal", xlim=xlim, ylim=zlim)
+        axes.figure.legend(ncols=2, loc="outside lower center")
+    return Figure("path", "The path: desired, by the servos' encoders, and of the tip. Equal scales.")
+
+
+def _shapes(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> Figure:
+    shapes = record["arm.shape"]
+    with figure(folder / "shape", 1, size=(8.0, 5.2)) as (axes,):
+        axes.plot(*_in_plane(watch.path, watch), color=_DESIRED, lw=3.0, alpha=0.35, label="desired path")
+        for k, (role, t) in enumerate(_moments(watch).items()):
+            arm_x, arm_z = _along_tip(shapes[np.searchsorted(record.time, t - 1e-9)], watch)
+            axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
+            if parameters.load > 0.0:
+                axes.plot(arm_x[-1], arm_z[-1] - 8.0, "s", ms=9, color=COLOURS[k])
+        if parameters.load > 0.0:
+            axes.plot([], [], "s", ms=9, color="#9aa3af", label=f"load, {parameters.load * 1000:.0f} g")
+        axes.axhspan(-30.0, 0.0, color="#d8dde4", lw=0, zorder=0)
+        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
+        axes.figure.legend(ncols=5, loc="outside lower center", columnspacing=1.2, handlelength=1.6)
+    load = f" with its load of {parameters.load * 1000:.0f} g (squares)" if parameters.load > 0.0 else ""
+    return Figure("shape", f"Centre line of the arm{load} at three moments, above the ground. Equal scales.")
+
+
+def _errors(watch: PathWatch, folder: Path) -> Figure:
+    groups = {
+        "tip by servos,\nto desired": [distance(p.servo, p.desired) for p in watch.points],
+        "tip by tracker,\nto desired": [p.error for p in watch.points],
+        "tip by servos,\nto true tip": [distance(p.servo, p.true) for p in watch.points],
+    }
+    if watch.hybrid:
+        groups["hybrid model,\nto true tip"] = [distance(p.estimated, p.true) for p in watch.points]
+    colours = (_SERVO, _TIP, COLOURS[4], _ESTIMATE)
+    with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
+        for k, (values, colour) in enumerate(zip(groups.values(), colours, strict=False)):
+            _draw_box(boxes, k, np.array(values) * 1000, colour)
+        boxes.set_xticks(range(len(groups)), list(groups), fontsize="small")
+        boxes.set(ylabel="error (mm)", ylim=(0.0, None))
+        boxes.grid(visible=False, axis="x")
+        where, label = _spread(watch)
+        reach.plot(where, [p.error * 1000 for p in watch.points], ".", color=_TIP)
+        reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
+    caption = (
+        "Left: 25th to 75th percentile (box), range, median (line) and mean (dot), of distances of the tip by the "
+        "servos' encoders and rigid links, by the tracker, or by the hybrid model, to the desired points or to the "
+        "true tip. Right: error of the tip over the desired point's place."
+    )
+    return Figure("errors", caption)
+
+
+def _error_over_time(watch: PathWatch, record: Record, folder: Path) -> Figure:
+    t = record.time
+    moving = record["planner.moving"]
+    segments = {0: "before", **{n: f"segment {n}" for n in range(1, int(np.max(record["planner.segment"])) + 1)}}
+    with figure(folder / "error", 1, size=(8.0, 3.8)) as (axes,):
+        shade_phases(axes, t, record["planner.segment"], segments)
+        of_curves = errors(record, hybrid=watch.hybrid)
+        for (label, error), colour in zip(of_curves.items(), (_TIP, _SERVO, _ESTIMATE), strict=False):
+            axes.plot(t[moving], 1000 * error[moving], color=colour, lw=1.2, label=label)
+        axes.axhline(
+            watch.parameters.tolerance * 1000, color="#4d5866", lw=0.8, ls="--", label="tolerance for the mean"
+        )
+        axes.set(xlabel="time (s)", ylabel="distance to desired point (mm)", ylim=(0.0, None), xlim=(t[0], t[-1]))
+        axes.figure.legend(ncols=2, loc="outside lower center")
+    return Figure("error", "Distance to the desired point over time, on the path. Dashed: the tolerance for its mean.")
+
+
+def _signals(record: Record, folder: Path) -> Figure:
+    t = record.time
+    with figure(folder / "signals", 3, size=(8.0, 7.0)) as (joints, currents, pressures):
+        for k in range(3):
+            colour, name = COLOURS[k], f"J{k + 1}"
+            for signal, style in (("planner.q_ref", ":"), ("kinematics.q_cmd", "--"), ("arm.q_meas", "-")):
+                joints.plot(t, np.degrees(record[signal][:, k]), color=colour, ls=style, lw=1.2)
+            joints.plot([], [], color=colour, label=name)
+            currents.plot(t, record["arm.i_meas"][:, k], color=colour, lw=0.9, label=name)
+        for k in range(2):
+            colour, lw = COLOURS[k + 1], (2.6, 1.0)[k]  # equal pressures lie over each other
+            pressures.plot(t, record["planner.p_cmd"][:, k] / 1e5, color=colour, ls="--", lw=lw)
+            pressures.plot(t, record["arm.p_meas"][:, k] / 1e5, color=colour, lw=lw, label=f"link {k + 2}")
+        for axes, styles in ((joints, _LINES), (pressures, _LINES[1:])):
+            for name, style in styles:
+                axes.plot([], [], color=_DESIRED, ls=style, lw=1.2, label=name)
+        joints.set(ylabel="joint angle (°)")
+        currents.set(ylabel="current (A)")
+        pressures.set(ylabel="pressure (bar)", xlabel="time (s)", ylim=(0.0, None))
+        for axes in (joints, currents, pressures):
+            axes.set_xlim(t[0], t[-1])
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    caption = "Joints (desired: those of rigid links, the planner's), currents, pressures, over time."
+    return Figure("signals", caption)
+
+
+def _moments(watch: PathWatch) -> dict[str, float]:
+    """Return three moments by what they are; on a path that reaches farthest at an end, the second is half way."""
+    first, last = watch.points[0], watch.points[-1]
+    role, second = "farthest reach", max(watch.points, key=lambda p: p.reach)
+    if min(distance(second.desired, end.desired) for end in (first, last)) < _APART:
+        role, second = "half way", watch.points[len(watch.points) // 2]
+    return {"start": first.t, role: second.t, "end": last.t}
+
+
+def _spread(watch: PathWatch) -> tuple[Floats, str]:
+    """Return the points' reach, mm, and what it is; their height for a path that reaches equally far throughout."""
+    r, z = (1000 * np.array(values) for values in zip(*((p.reach, p.desired[2]) for p in watch.points), strict=True))
+    return (z, "z in W (mm)") if np.ptp(r) < 1000 * _APART else (r, _DISTANCE)
+
+
+def _limits(places: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return limits of both axes around points, shape (2, n), mm, with a margin."""
+    low, high = places.min(axis=1), places.max(axis=1)
+    margin = 0.06 * float(np.max(high - low))
+    x, z = ((float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True))
+    return _widened(x, z), _widened(z, x)
+
+
+def _widened(limits: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
+    """Return an axis's limits, at least half as far apart as the other axis's."""
+    middle = (limits[0] + limits[1]) / 2.0
+    half = max(limits[1] - limits[0], (others[1] - others[0]) / 2.0) / 2.0
+    return middle - half, middle + half
+
+
+def _draw_box(axes: Axes, x: float, values: Floats, colour: str) -> None:
+    low, q1, median, q3, high = np.percentile(values, (0, 25, 50, 75, 100))
+    axes.vlines(x, low, high, color=colour, lw=1.2)
+    axes.bar(x, q3 - q1, width=0.5, bottom=q1, color=colour, alpha=0.35, edgecolor=colour)
+    axes.hlines(median, x - 0.25, x + 0.25, color=colour, lw=2.0)
+    axes.plot(x, np.mean(values), "o", ms=4, color=colour)
+
+
+def _in_plane(positions: Floats, watch: PathWatch) -> tuple[Floats, Floats]:
+    """Return x of a path in the plane XZ, else the distance from the first joint's axis, and the height, mm."""
+    mm = positions * 1000
+    return (mm[:, 0] if _flat(watch) else np.hypot(mm[:, 0], mm[:, 1])), mm[:, 2]
+
+
+def _along_tip(shape: Floats, watch: PathWatch) -> tuple[Floats, Floats]:
+    """Return the same of the arm; off the plane XZ what points away from its tip is negative."""
+    mm, tip = shape * 1000, shape[-1, :2]
+    return (mm[:, 0] if _flat(watch) else mm[:, :2] @ (tip / np.linalg.norm(tip))), mm[:, 2]
+
+
+def _flat(watch: PathWatch) -> bool:
+    return bool(np.all(np.abs(watch.path[:, 1]) < 1e-6))
+
+
+def _horizontal(watch: PathWatch) -> str:
+    return "x in W (mm)" if _flat(watch) else _DISTANCE

@@ -17,8 +17,8 @@ from handover.cosim.fmu.description import describe_fmu, indices_of
 from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block, cached
-from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
-from handover.scenarios.free_flyer.impedance_parameters import Parameters
+from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 
 BLOCK = "sample_units.every_kind:EveryKind"
 
@@ -148,7 +148,7 @@ def test_our_own_master_runs_both_forms_alike():
 
 
 def poses(fmu: Callable[[str], Path]) -> list[bytes]:
-    parameters = Parameters()
+    parameters = ImpedanceParameters()
     system = FlyerImpedance().build(parameters, 0, fmu)
     told: list[bytes] = []
 

@@ -4,10 +4,10 @@ import pytest
 
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
 from handover.scenarios.experiment.parameters import BadParameter
-from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
-from handover.scenarios.helix_handover.helix_handover import HelixHandover
+from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.vsl.vsl_hybrid import VslHybrid
+from handover.scenarios.vsl.path_experiments import VslHybrid
 
 
 def faults(*given: str) -> list[str]:

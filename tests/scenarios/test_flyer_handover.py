@@ -12,12 +12,14 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.experiment.parameters import BadParameter
-from handover.scenarios.free_flyer.collaborative import Collaborative
-from handover.scenarios.free_flyer.failed_reception import FailedReception
-from handover.scenarios.free_flyer.flyer_handover import FlyerHandover
-from handover.scenarios.free_flyer.handover_parameters import Parameters
-from handover.scenarios.free_flyer.human_to_robot import HumanToRobot
-from handover.scenarios.free_flyer.robot_to_human import RobotToHuman
+from handover.scenarios.free_flyer.handovers import (
+    Collaborative,
+    FailedReception,
+    FlyerHandover,
+    HumanToRobot,
+    RobotToHuman,
+)
+from handover.scenarios.free_flyer.parameters import HandoverParameters
 
 HANDOVERS = (RobotToHuman, HumanToRobot, FailedReception, Collaborative)
 FREE, GRIPPER, HAND, BOTH = range(4)
@@ -29,7 +31,7 @@ def holders(record: Record) -> list[int]:
 
 
 def test_a_command_acts_in_the_step_that_follows_its_measurement():
-    system = RobotToHuman().build(Parameters(), 0, lambda name: cached(RobotToHuman.units[name], 3))
+    system = RobotToHuman().build(HandoverParameters(), 0, lambda name: cached(RobotToHuman.units[name], 3))
     schedule = Schedule(system)
     assert [s.unit for s in schedule.sampled] == ["decision", "impedance", "pose"]
     assert [s.unit for s in schedule.continuous] == ["thrusters", "robot", "person"]

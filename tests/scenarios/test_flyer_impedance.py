@@ -9,7 +9,7 @@ from flyer_runs import metric, run
 from handover.cosim.exceptions import UnitRefused
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import BadParameter
-from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
+from handover.scenarios.free_flyer.impedance import FlyerImpedance
 
 
 def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_path: Path):

@@ -18,8 +18,8 @@ from handover.plants.free_flyer.parameters import Params as PersonParams
 from handover.plants.free_flyer.push import Params as PushParams
 from handover.plants.free_flyer.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
-from handover.scenarios.free_flyer.handover_parameters import Parameters as HandoverParameters
-from handover.scenarios.free_flyer.impedance_parameters import Parameters as PushScenarioParameters
+from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushScenarioParameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 

@@ -11,8 +11,8 @@ from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand_and_object import Holder
-from handover.scenarios.free_flyer.handover_parameters import Parameters
-from handover.scenarios.free_flyer.handover_watch import HandoverWatch
+from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
+from handover.scenarios.free_flyer.parameters import HandoverParameters
 
 PLACE = np.array([0.0, -0.07, 0.0])
 
@@ -75,7 +75,7 @@ def given() -> list[tuple[float, Signals]]:
 
 
 def to_person() -> HandoverWatch:
-    return HandoverWatch(Parameters(), ("HAND",))
+    return HandoverWatch(HandoverParameters(), ("HAND",))
 
 
 def test_an_object_that_always_was_in_a_hand_is_handed_over():
@@ -131,7 +131,7 @@ def test_a_gripper_that_closed_beside_the_object_is_told():
 
 
 def received(failed: int) -> HandoverWatch:
-    watch = HandoverWatch(Parameters(), ("GRIPPER",), failures=1)
+    watch = HandoverWatch(HandoverParameters(), ("GRIPPER",), failures=1)
     return follow(
         watch,
         (0.0, signals(Phase.MOVE_TO_HANDOVER, Holder.HAND)),
@@ -154,7 +154,7 @@ def test_the_staged_failure_must_have_been_noticed():
 
 def asked_again() -> HandoverWatch:
     """Return a watch that saw a first push at 20 s, found in vain, and another signal at 30 s."""
-    watch = HandoverWatch(Parameters(), ("GRIPPER",), failures=1)
+    watch = HandoverWatch(HandoverParameters(), ("GRIPPER",), failures=1)
     return follow(
         watch,
         (10.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.HAND)),

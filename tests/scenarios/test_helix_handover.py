@@ -16,8 +16,8 @@ import pytest
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
-from handover.scenarios.helix_handover.helix_handover import HelixHandover
-from handover.scenarios.helix_handover.parameters import Parameters
+from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.helix.parameters import Parameters
 
 
 def command(*arguments: str | Path) -> list[str]:

@@ -7,8 +7,7 @@ import pytest
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import Thing, outlines
-from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.situation import Situation
+from handover.scenarios.ir_grasp.parameters import Parameters, Situation
 
 EXACT: dict[str, Any] = {"vision_position": 0.0, "vision_yaw": 0.0}
 

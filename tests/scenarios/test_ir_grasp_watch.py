@@ -8,8 +8,8 @@ from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
+from handover.scenarios.ir_grasp.evaluation import GraspWatch
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.watch import GraspWatch
 
 HELD = (0.1, 0.0)
 """Where a held object is, in H."""

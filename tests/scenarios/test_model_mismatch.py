@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handover.scenarios.helix_handover.model_mismatch import model_mismatch
+from handover.scenarios.helix.evaluation import model_mismatch
 
 HANGING = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
 

@@ -3,18 +3,18 @@
 from pathlib import Path
 from typing import Any
 
+import handover.scenarios.helix_handover
 import numpy as np
 import pytest
 import tomli
 
-import handover.scenarios.helix_handover
 from handover.controllers.helix.servo_parameters import Params as ServoParams
 from handover.plants.helix.handover_partner import Params as HandParams
 from handover.plants.helix.stereo_camera import Params as CameraParams
 from handover.plants.helix.tendon_design import Params as ArmParams
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.helix_handover.parameters import Parameters, Place, Tuning
-from handover.scenarios.helix_handover.rig import calibration
+from handover.scenarios.helix.cameras import calibration
+from handover.scenarios.helix.parameters import Parameters, Place, Tuning
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
 

@@ -1,8 +1,8 @@
 import pytest
 
 from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
-from handover.scenarios.helix_handover.helix_handover import HelixHandover
-from handover.scenarios.helix_handover.parameters import Cover, Place
+from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.helix.parameters import Cover, Place
 
 
 def test_values_are_parsed_by_their_declared_kind():

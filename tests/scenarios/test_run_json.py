@@ -14,7 +14,7 @@ from flyer_runs import run
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.command import main
-from handover.scenarios.free_flyer.flyer_impedance import FlyerImpedance
+from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.run_summary import parameter_rows
 from handover.scenarios.task import Task

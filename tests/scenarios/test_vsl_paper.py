@@ -18,10 +18,10 @@ from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl.parameters import Params as ArmParams
-from handover.scenarios import vsl_training_data
+from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.training import SPLIT
 from handover.scenarios.vsl_train_command import vsl_train
-from handover.scenarios.vsl_training import SPLIT
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
@@ -106,7 +106,7 @@ def test_the_training_is_as_told(paper: Paper):
     assert told.pop("points") == points
     assert told.pop("split") == list(SPLIT) == paper["published"]["split"]["value"]
     assert {n: np.ravel(v).tolist() for n, v in told.items()} == {
-        n: np.ravel(getattr(vsl_training_data, n.upper())).tolist() for n in told
+        n: np.ravel(getattr(training_data, n.upper())).tolist() for n in told
     }
 
 

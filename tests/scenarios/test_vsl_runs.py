@@ -22,9 +22,7 @@ from handover.scenarios.interruption import Interruption
 from handover.scenarios.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task
-from handover.scenarios.vsl.path_experiment import PathExperiment
-from handover.scenarios.vsl.vsl_hybrid import VslHybrid
-from handover.scenarios.vsl.vsl_model_based import VslModelBased
+from handover.scenarios.vsl.path_experiments import PathExperiment, VslHybrid, VslModelBased
 
 BOTH = [VslModelBased, VslHybrid]
 

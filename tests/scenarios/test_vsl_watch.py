@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
+from handover.scenarios.vsl.evaluation import PathWatch, distance_to_path
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
-from handover.scenarios.vsl.path_point import distance_to_path
-from handover.scenarios.vsl.watch import PathWatch
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -9,9 +9,9 @@ from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.helix.handover_partner import Holder
-from handover.scenarios.helix_handover.parameters import Cover, Parameters
-from handover.scenarios.helix_handover.rig import camera_of
-from handover.scenarios.helix_handover.watch import HandoverWatch
+from handover.scenarios.helix.cameras import camera_of
+from handover.scenarios.helix.evaluation import HandoverWatch
+from handover.scenarios.helix.parameters import Cover, Parameters
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
 P_WG = np.array([0.16, 0.0, -0.6])

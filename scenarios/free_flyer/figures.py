@@ -1,6 +1,11 @@
-"""Figures of a handover as in [Fernandes2020] figs. 4.29-4.38: paths, gripper, thrust, the scene at three moments."""
+"""Figures of a handover as in [Fernandes2020] figs. 4.29-4.38: paths, gripper, thrust, the scene at three moments.
 
-from collections.abc import Callable
+Figures of a push: errors as in [Fernandes2020] figs. 4.5-4.16, thrust, and the scene at three moments.
+
+What the controllers command of the thrusters, and what the thrusters give.
+"""
+
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +18,43 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, leave_room, shade_phases
-from handover.scenarios.free_flyer.handover_parameters import Parameters
-from handover.scenarios.free_flyer.handover_watch import HandoverWatch
+from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
+from handover.scenarios.free_flyer.impedance_evaluation import Errors, ImpedanceWatch
+from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.plots import BEYOND, QUANTITIES, commanded_wrench
 from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
-from handover.scenarios.free_flyer.thrust_figure import draw_thrust
+
+
+def draw_thrust(
+    record: Record, controllers: Sequence[str], folder: Path, shade: Callable[[Axes, bool], None]
+) -> Figure:
+    """Draw force and torque in B over time; commands of several controllers are added, as the thrusters do.
+
+    The axes show what the thrusters give; commands run out of them. `shade` marks times in given axes,
+    with names if so told.
+    """
+    t = record.time
+    with figure(folder / "thrust", 2, size=(9.0, 6.2)) as axes:
+        for axis, (what, quantity, unit) in zip(axes, QUANTITIES, strict=True):
+            commanded = commanded_wrench(record, controllers, what)
+            given = record[f"thrusters.{what}_B"]
+            for i, name in enumerate("xyz"):
+                axis.plot(t, commanded[:, i], color=COLOURS[i], lw=0.9, alpha=0.45, label=f"{name}, commanded")
+                axis.plot(t, given[:, i], color=COLOURS[i], lw=1.2, label=f"{name}, given")
+            limit = BEYOND * float(np.abs(given).max())
+            if float(np.abs(commanded).max()) > limit > 0.0:
+                axis.set_ylim(-limit, limit)
+            axis.set(ylabel=f"{quantity.lower()} ({unit})", xlim=(t[0], t[-1]))
+            shade(axis, axis is axes[0])
+            leave_room(axis)
+        axes[1].set_xlabel("time (s)")
+        handles, labels = axes[0].get_legend_handles_labels()
+        axes[0].figure.legend(handles, labels, ncols=(len(labels) + 1) // 2, loc="outside lower center")
+    caption = (
+        "Force and torque on the robot in B; pale: as commanded, where the thrusters give less, cut off far beyond."
+    )
+    return Figure("thrust", caption)
+
 
 _FOLLOWED: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("person.{}_WO", "object", {"color": COLOURS[2], "lw": 4.5, "alpha": 0.4}),
@@ -30,7 +68,7 @@ _WATCHING = ("SIGNAL", "CHECK_VELOCITY")
 """Phases in which the threshold of the gripper's speed counts."""
 
 
-def draw_handover(parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
+def draw_handover(parameters: HandoverParameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
     """Draw all figures of a run into a folder; return them in the order of a report."""
     if len(record.time) < 2:
         return []
@@ -75,7 +113,7 @@ def _phase_names(record: Record) -> dict[int, str]:
     return record.items("decision.phase")
 
 
-def _gripper(parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> Figure:
+def _gripper(parameters: HandoverParameters, watch: HandoverWatch, record: Record, folder: Path) -> Figure:
     published = paper_values("free_flyer", "published")
     t, names_of = record.time, _phase_names(record)
     watching = np.isin(record["decision.phase"], [code for code, name in names_of.items() if name in _WATCHING])
@@ -128,3 +166,64 @@ def _scenes(watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
     middle = (record["robot.p_WG"] + record["person.p_WH"]) / 2
     near = {title: middle[rows[title]] for title in between}
     return [scene, draw_near({title: seen[title] for title in between}, near, folder)]
+
+
+_PUSH_COLOUR = "#fbe3cf"
+_CALCULATED = "calculated, [Fernandes2020] eq. (4.4)"
+
+
+def draw_push(parameters: ImpedanceParameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
+    """Draw all figures of a run into a folder; return them in the order of a report."""
+    if len(record.time) < 2:
+        return []
+    errors = watch.errors()
+    return [
+        _errors(parameters, errors, folder),
+        _scene(errors, parameters, record, folder),
+        draw_thrust(record, ("impedance",), folder, _push(parameters)),
+    ]
+
+
+def _errors(parameters: ImpedanceParameters, errors: Errors, folder: Path) -> Figure:
+    p = parameters
+    t = errors.t
+    columns = (
+        ("rest - actual (mm)", 1000 * errors.p, 1000 * errors.p_model, "error of position"),
+        ("rest - actual (rad)", *errors.without_jumps, "error of orientation"),
+    )
+    with figure(folder / "errors", 3, 2, size=(10.0, 7.0)) as axes:
+        for column, (unit, actual, calculated, what) in enumerate(columns):
+            limit = 1.1 * max(float(np.nanmax(np.abs(actual))), float(np.nanmax(np.abs(calculated))), 1e-3)
+            for i, name in enumerate("xyz"):
+                axis = axes[2 * i + column]
+                axis.axvspan(p.begin, p.end, color=_PUSH_COLOUR, lw=0, zorder=0, label=_told(p))
+                axis.plot(t, calculated[:, i], color=COLOURS[1], lw=1.0, alpha=0.75, label=_CALCULATED)
+                axis.plot(t, actual[:, i], color=COLOURS[0], lw=1.5, label="actual")
+                axis.set(xlim=(0, t[-1]), ylim=(-limit, limit), ylabel=f"{name}: {unit}")
+            axes[column].set_title(what)
+            axes[4 + column].set_xlabel("time (s)")
+        axes[0].figure.legend(*axes[0].get_legend_handles_labels(), ncols=3, loc="outside lower center")
+    return Figure("errors", f"Error of the gripper's pose, rest minus actual, in the whole run; {_told(p)}.")
+
+
+def _push(p: ImpedanceParameters) -> Callable[[Axes, bool], None]:
+    """Return what shades the time of the push."""
+
+    def shade(axes: Axes, named: bool) -> None:
+        axes.axvspan(p.begin, p.end, color=_PUSH_COLOUR, lw=0, zorder=0, label=_told(p) if named else None)
+
+    return shade
+
+
+def _told(p: ImpedanceParameters) -> str:
+    what = f"pushed with {p.force:g} N along" if p.kind is Wrench.FORCE else f"twisted with {p.torque:g} N m about"
+    return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
+
+
+def _scene(errors: Errors, parameters: ImpedanceParameters, record: Record, folder: Path) -> Figure:
+    """Draw the start, the greatest error (of position, or of orientation for a twist), and the end."""
+    size = np.linalg.norm(errors.p if parameters.kind is Wrench.FORCE else errors.R, axis=1)
+    rows = (0, int(np.argmax(size)), len(record.time) - 1)
+    titles = (f"{record.time[r]:.1f} s, {what}" for r, what in zip(rows, ("start", "farthest", "end"), strict=True))
+    moments = {title: robot_at(record, r, 0.0) for title, r in zip(titles, rows, strict=True)}
+    return draw_scene(moments, "Blue: jaws.", folder)

@@ -1,4 +1,13 @@
-"""A free-flyer and a person pass an object to each other: what the four handovers have in common."""
+"""A free-flyer and a person pass an object to each other: what the four handovers have in common.
+
+The robot gives an object, waits, and takes it back: it holds things for a person. [Fernandes2020] sec. 5.5, T3.
+
+A push without the object: the robot finds its gripper empty and asks again. [Fernandes2020] sec. 3.2.2, 4.3.2.
+
+A person puts an object into the robot's gripper, which closes when it is pushed. [Fernandes2020] sec. 4.3.2.
+
+The robot fetches an object, brings it to a person and lets go when the person pulls. [Fernandes2020] sec. 4.3.1.
+"""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -11,13 +20,14 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimePlot
-from handover.scenarios.free_flyer.handover_parameters import Parameters
-from handover.scenarios.free_flyer.handover_watch import HandoverWatch
-from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_handover
+from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
+from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
+from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_handover
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""
@@ -26,7 +36,7 @@ _FLIGHT = 120
 class FlyerHandover(Experiment[HandoverWatch]):
     """Subclasses say what the robot is to do, what the person does, and who is to have the object in turn."""
 
-    parameters_type: ClassVar[type[Parameters]] = Parameters
+    parameters_type: ClassVar[type[HandoverParameters]] = HandoverParameters
     units: ClassVar[Mapping[str, str]] = {
         "decision": "HandoverStateMachine",
         "impedance": "ImpedanceController",
@@ -60,7 +70,7 @@ class FlyerHandover(Experiment[HandoverWatch]):
     failures: ClassVar[int] = 0
     """How many receptions the person is to feign."""
 
-    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+    def build(self, parameters: HandoverParameters, seed: int, fmu: FmuOf) -> System:
         """Wire robot, thrusters, controllers and person.
 
         Raises:
@@ -100,12 +110,12 @@ class FlyerHandover(Experiment[HandoverWatch]):
         wire_handover(s)
         return s
 
-    def stop_time(self, parameters: Parameters) -> Fraction:
+    def stop_time(self, parameters: HandoverParameters) -> Fraction:
         """Return the robot's patience for each signal, and time for flying."""
         waits = len(self.receivers) + self.failures
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
 
-    def watch(self, parameters: Parameters) -> HandoverWatch:
+    def watch(self, parameters: HandoverParameters) -> HandoverWatch:
         """Return the judge of one handover."""
         return HandoverWatch(parameters, self.receivers, self.failures)
 
@@ -113,19 +123,19 @@ class FlyerHandover(Experiment[HandoverWatch]):
         """Return the robot's own computing: deciding and controlling."""
         return ("decision", "impedance", "pose")
 
-    def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
+    def draw(self, parameters: HandoverParameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw paths, gripper, thrust over time, and the scene at three moments."""
-        from handover.scenarios.free_flyer.handover_figures import draw_handover  # what draws takes long to load
+        from handover.scenarios.free_flyer.figures import draw_handover  # what draws takes long to load
 
         return draw_handover(parameters, watch, record, folder)
 
-    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+    def plots(self, parameters: HandoverParameters, record: Record) -> Sequence[TimePlot]:
         """Return the gripper's place, speed and angle, who holds the object, and thrust over time."""
-        from handover.scenarios.free_flyer.handover_plots import plot_handover
+        from handover.scenarios.free_flyer.plots import plot_handover
 
         return plot_handover(parameters, record, self.receivers)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+    def replay(self, parameters: HandoverParameters, record: Record) -> Replay:  # noqa: ARG002
         """Return robot, hand and object in space."""
         from handover.scenarios.free_flyer.replay import replay_handover
 
@@ -141,3 +151,52 @@ def _check_reach(p_WG: Floats) -> None:
         place = ", ".join(f"{x:g}" for x in p_WG)
         told = f"the hand would be {away:.2f} m from where it rests, and can be {reach:g} m from it"
         raise BadParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {told}"])
+
+
+class Collaborative(FlyerHandover):
+    """The person takes at the robot's first signal and gives at its second."""
+
+    name: ClassVar[str] = "flyer_collaborative"
+    title: ClassVar[str] = "a free-flyer gives an object to a person, waits, and takes it back"
+    task: ClassVar[str] = "collaborative"
+    person: ClassVar[Mapping[str, Any]] = {"motion": "take", "motion_again": "give", "object_with": "free"}
+    receivers: ClassVar[tuple[str, ...]] = ("HAND", "GRIPPER")
+
+
+class FailedReception(FlyerHandover):
+    """The person pushes the gripper first and gives only at the robot's second signal."""
+
+    name: ClassVar[str] = "flyer_failed_reception"
+    title: ClassVar[str] = "a free-flyer closes its gripper on nothing, notices, and asks again"
+    task: ClassVar[str] = "human_to_robot"
+    person: ClassVar[Mapping[str, Any]] = {"motion": "push", "motion_again": "give", "object_with": "hand"}
+    receivers: ClassVar[tuple[str, ...]] = ("GRIPPER",)
+    failures: ClassVar[int] = 1
+
+
+class HumanToRobot(FlyerHandover):
+    """The person gives, the robot takes."""
+
+    name: ClassVar[str] = "flyer_human_to_robot"
+    title: ClassVar[str] = "a person gives an object to a free-flyer"
+    task: ClassVar[str] = "human_to_robot"
+    person: ClassVar[Mapping[str, Any]] = {"motion": "give", "object_with": "hand"}
+    receivers: ClassVar[tuple[str, ...]] = ("GRIPPER",)
+
+    def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
+        """Return the threshold of sec. 4.1.2."""
+        return published_of_receiving(parameters)
+
+
+class RobotToHuman(FlyerHandover):
+    """The robot gives, the person takes."""
+
+    name: ClassVar[str] = "flyer_robot_to_human"
+    title: ClassVar[str] = "a free-flyer fetches an object and gives it to a person"
+    task: ClassVar[str] = "robot_to_human"
+    person: ClassVar[Mapping[str, Any]] = {"motion": "take", "object_with": "free"}
+    receivers: ClassVar[tuple[str, ...]] = ("HAND",)
+
+    def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
+        """Return what sec. 4.1.2 and 4.3 tell."""
+        return published_of_giving(parameters)

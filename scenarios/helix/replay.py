@@ -12,7 +12,7 @@ from handover.plants.helix.shapes import Limb, gripper, hand
 from handover.plants.helix.stereo_camera import Params as CameraParams
 from handover.plants.helix.tendon_design import Params as ArmParams
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, merged, prism, rod
-from handover.scenarios.helix_handover.rig import camera_of
+from handover.scenarios.helix.cameras import camera_of
 
 _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
 _SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8357a8", "#d1602b"

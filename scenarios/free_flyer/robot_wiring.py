@@ -1,9 +1,17 @@
-"""How the free-flyer's units are wired: the robot with its thrusters and one or two controllers that command them."""
+"""How the free-flyer's units are wired: the robot with its thrusters and one or two controllers that command them.
+
+What the robot's controllers found out about their own closed loops at the start.
+"""
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
+from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.paper import paper_values
 
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
@@ -57,3 +65,28 @@ def wire_handover(s: System) -> None:
         s.connect(getattr(robot.y, name), getattr(person.u, name))
     for name in ("closure", "light"):
         s.connect(getattr(decision.y, name), getattr(person.u, name))
+
+
+_SLOWEST = {"pose": "the slowest mode, the integrator's"}
+_PERIOD = 2 / 125
+"""Period of the controllers, s."""
+
+
+def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str, Metric]:
+    """Return the outermost pole's margin and decay, and the least damping ratio, of each controller's closed loop."""
+    made: dict[str, Metric] = {}
+    for name in controllers:
+        radius, damping, frequency = (
+            float(signals[f"{name}.{what}"]) for what in ("pole_radius", "damping_ratio", "pole_frequency")
+        )
+        told = f"{name} control, by its own model"
+        made[f"pole_margin_{name}"] = Metric(
+            1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {told}"
+        )
+        slowest = -_PERIOD / math.log(radius) if 0.0 < radius < 1.0 else math.inf
+        made[f"slowest_decay_{name}"] = Metric(
+            slowest, "s", f"time constant of {_SLOWEST.get(name, 'the slowest mode')}: {told}"
+        )
+        made[f"damping_ratio_{name}"] = Metric(damping, "1", f"least damping ratio: {told}")
+        made[f"frequency_{name}"] = Metric(frequency, "rad/s", f"frequency of the least damped poles: {told}")
+    return made

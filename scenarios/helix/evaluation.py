@@ -1,18 +1,120 @@
-"""Judges a Helix handover by ground truth, which the arm's controller does not see."""
+"""Judges a Helix handover by ground truth, which the arm's controller does not see.
 
-from collections.abc import Sequence
+How far the controller's model of the arm is from the arm that the cameras see. [Vervloet2025] sec. 4.2, fig. 9.
+
+What both cameras saw at one moment, with what vision found in it and where the controller took things to be.
+"""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.blocks.geometry import rotation_of
+from handover.controllers.helix.constant_curvature import forward_kinematics
+from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
-from handover.scenarios.experiment.pictures import CameraPicture
-from handover.scenarios.helix_handover.model_mismatch import ModelMismatch, model_mismatch
-from handover.scenarios.helix_handover.parameters import Cover, Parameters
-from handover.scenarios.helix_handover.snapshot import is_covered, take_pictures
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
+from handover.scenarios.helix.cameras import camera_of
+from handover.scenarios.helix.parameters import Cover, Parameters
+
+_W_FROM_B = np.array([1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1)
+
+
+class ModelMismatch(NamedTuple):
+    """Distances of fig. 9, m: of gripper and model from where the gripper hangs after calibration, and between them."""
+
+    arm_travel: float
+    model_travel: float
+    apart: float
+
+
+def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
+    """Compare the gripper of the commanded state, f(q_sys), with the filtered measured one.
+
+    Args:
+        q_sys: commanded state, shape (9,), rad and m.
+        p_WG_est: filtered measured position of the gripper in W, shape (3,), m.
+    """
+    stated = paper_values("helix_handover", "servo")
+    d_gripper = float(stated["d_gripper"])
+    p_WG_sys = _W_FROM_B * forward_kinematics(q_sys, d_gripper)[3:]
+    p_WG_calib = np.array([0.0, 0.0, -sum(stated["l_calib"]) - d_gripper])
+    between = (p_WG_est - p_WG_calib, p_WG_sys - p_WG_calib, p_WG_sys - p_WG_est)
+    return ModelMismatch(*(float(np.linalg.norm(d)) for d in between))
+
+
+MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
+_PERIOD = Fraction(1, 30)
+"""Of camera and vision, s."""
+
+_SHAPE = (720, 1280, 3)
+_SHAPES = {"p_WO": ("ball", "circle"), "p_WR": ("wrist", "cross"), "p_WG": ("gripper", "plus")}
+_SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.seen_R"}
+
+
+def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals) -> list[CameraPicture]:
+    """Return the pictures of both cameras that hold at a time, with marks.
+
+    Vision looks at a picture at the instant at which it is taken, so what it says is of the pictures that hold with it.
+    The controller's estimates are those of its last period.
+    """
+    return [
+        CameraPicture.take(
+            t=t,
+            camera=side.name.lower(),
+            role=role,
+            pixels=signals[f"camera.{side.name.lower()}"].reshape(_SHAPE),
+            marks=[*_estimated(side, signals), *([] if is_covered(t, side, parameters) else _measured(side, signals))],
+        )
+        for side in (Cover.LEFT, Cover.RIGHT)
+    ]
+
+
+def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
+    """Return whether a lens was covered when the picture that holds at time t was taken."""
+    begin, end = parameters.covered(side)
+    taken = float(int(t / float(_PERIOD) + 1e-6) * _PERIOD)
+    return begin <= taken < end
+
+
+def _measured(side: Cover, signals: Signals) -> Iterator[Mark]:
+    for name in _SHAPES:
+        if signals[_SEEN_BY[name]]:
+            yield from _mark(side, name, signals[f"vision.{name}_meas"], "as measured", MEASURED)
+
+
+def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
+    if not np.any(signals["servo.p_WG_est"]):  # the controller has seen nothing yet
+        return
+    for name in _SHAPES:
+        yield from _mark(side, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
+
+
+def _mark(side: Cover, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
+    """Yield the mark of a point, unless it is behind the camera."""
+    from handover.controllers.helix.handover_vision import (
+        Params as Vision,  # long to load for who only lists parameters
+    )
+
+    camera = _camera(side)
+    u, v = camera.project(p_WP).tolist()
+    if np.isfinite(u) and np.isfinite(v):
+        what, shape = _SHAPES[name]
+        ball = float(camera.f[0]) * Vision().ball_radius / float(camera.depth(p_WP))
+        radius = ball if shape == "circle" else 9.0
+        yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)
+
+
+@cache
+def _camera(side: Cover) -> Pinhole:
+    return camera_of(side.name.lower())
+
 
 _SETTLING = 1.0
 """How long the ball must stay in the closed gripper, s (assumed)."""

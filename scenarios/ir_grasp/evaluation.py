@@ -10,8 +10,7 @@ from handover.cosim.system.signals import Signals
 from handover.plants.ir_grasp.objects import SOLIDS
 from handover.plants.ir_grasp.parameters import SEES_NOTHING
 from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
-from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.situation import asked_for
+from handover.scenarios.ir_grasp.parameters import Parameters, asked_for
 
 _SETTLING = 0.3
 """How long the hand rests after the shake, s (assumed)."""

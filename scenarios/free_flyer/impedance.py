@@ -13,10 +13,10 @@ from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimePlot
-from handover.scenarios.free_flyer.impedance_parameters import Parameters, Wrench
-from handover.scenarios.free_flyer.impedance_watch import ImpedanceWatch
+from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceWatch
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.published import published_of_push
-from handover.scenarios.free_flyer.rig import arm, expected_lag, wire_controller, wire_forces
+from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_controller, wire_forces
 
 
 class FlyerImpedance(Experiment[ImpedanceWatch]):
@@ -24,7 +24,7 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
 
     name: ClassVar[str] = "flyer_impedance"
     title: ClassVar[str] = "a free-flyer yields to a push against its gripper and comes back"
-    parameters_type: ClassVar[type[Parameters]] = Parameters
+    parameters_type: ClassVar[type[ImpedanceParameters]] = ImpedanceParameters
     units: ClassVar[Mapping[str, str]] = {
         "impedance": "ImpedanceController",
         "thrusters": "Thrusters",
@@ -44,7 +44,7 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         "cpu_per_cycle",
     )
 
-    def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
+    def build(self, parameters: ImpedanceParameters, seed: int, fmu: FmuOf) -> System:
         """Wire robot, thrusters, impedance controller and push; the gripper starts at its place of rest."""
         p = parameters
         p_WG, p_BG = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), arm()
@@ -75,11 +75,11 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         wire_forces(s, robot, thrusters, push)
         return s
 
-    def stop_time(self, parameters: Parameters) -> Fraction:
+    def stop_time(self, parameters: ImpedanceParameters) -> Fraction:
         """Return the end of the push and the patience for the way back."""
         return parameters.stop
 
-    def watch(self, parameters: Parameters) -> ImpedanceWatch:
+    def watch(self, parameters: ImpedanceParameters) -> ImpedanceWatch:
         """Return the judge of one push."""
         return ImpedanceWatch(parameters)
 
@@ -87,23 +87,25 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         """Return the robot's own computing."""
         return ("impedance",)
 
-    def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
+    def published(self, parameters: ImpedanceParameters) -> Sequence[PublishedValue]:
         """Return how far robot and impedance model differ at most."""
         return published_of_push(parameters)
 
-    def draw(self, parameters: Parameters, watch: ImpedanceWatch, record: Record, folder: Path) -> list[Figure]:
+    def draw(
+        self, parameters: ImpedanceParameters, watch: ImpedanceWatch, record: Record, folder: Path
+    ) -> list[Figure]:
         """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
-        from handover.scenarios.free_flyer.impedance_figures import draw_push  # what draws takes long to load
+        from handover.scenarios.free_flyer.figures import draw_push  # what draws takes long to load
 
         return draw_push(parameters, watch, record, folder)
 
-    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+    def plots(self, parameters: ImpedanceParameters, record: Record) -> Sequence[TimePlot]:
         """Return errors actual and calculated, push and thrust over time."""
-        from handover.scenarios.free_flyer.impedance_plots import plot_push
+        from handover.scenarios.free_flyer.plots import plot_push
 
         return plot_push(parameters, record)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+    def replay(self, parameters: ImpedanceParameters, record: Record) -> Replay:  # noqa: ARG002
         """Return the robot, its gripper's place of rest and the push in space."""
         from handover.scenarios.free_flyer.replay import replay_push
 

@@ -1,4 +1,7 @@
-"""A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1."""
+"""A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1.
+
+What the thesis tells of a handover with given parameters. [Vervloet2025] table 1, sec. 5.2.
+"""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -10,14 +13,42 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.experiment.paper import PublishedValue
+from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimePlot
-from handover.scenarios.helix_handover.parameters import Cover, Parameters
-from handover.scenarios.helix_handover.published import published_of
-from handover.scenarios.helix_handover.rig import calibration
-from handover.scenarios.helix_handover.watch import HandoverWatch
+from handover.scenarios.helix.cameras import calibration
+from handover.scenarios.helix.evaluation import HandoverWatch
+from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
+
+_PAPER = "helix_handover"
+
+
+def published_of(p: Parameters) -> Sequence[PublishedValue]:
+    """Return the times and steps of table 1 for its step sizes, and for the least of them how far its model was off.
+
+    Nothing for other step sizes, where the ball is elsewhere, or where a lens is covered.
+    """
+    told, given = paper_values(_PAPER, "experiment"), Parameters()
+    fits = np.flatnonzero(np.isclose(told["alpha"], p.alpha))
+    if not len(fits) or (p.radius, p.height) != (given.radius, given.height) or p.cover is not Cover.NONE:
+        return ()
+    k = int(fits[0])
+    period = paper_values(_PAPER, "published")["timestep_mean"][k]
+    apart = [] if np.isclose(p.control_period, period) else [f"its control period was {period:g} s"]
+    apart += [] if p.tuning is Tuning.THESIS else ["its settings were those of tuning=thesis"]
+    note = " and ".join(apart)
+    span = ("arm_time_min", "arm_time_max")
+    values = [
+        PublishedValue(metric="arm_time", paper=_PAPER, name="arm_time_median", index=(k,), span=span, note=note),
+        PublishedValue(metric="steps", paper=_PAPER, name="steps_median", index=(k,), note=" and ".join(apart[-1:])),
+    ]
+    if k == 0:
+        values += [
+            PublishedValue(metric=metric, paper=_PAPER, name=metric, note="of one run, whose place is not told")
+            for metric in ("model_mismatch", "arm_travel", "model_travel")
+        ]
+    return values
 
 
 class HelixHandover(Experiment[HandoverWatch]):
@@ -111,18 +142,18 @@ class HelixHandover(Experiment[HandoverWatch]):
 
     def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
-        from handover.scenarios.helix_handover.figures import draw_handover  # what draws takes long to load
+        from handover.scenarios.helix.plots import draw_handover  # what draws takes long to load
 
         return draw_handover(parameters, watch.pictures(), record, folder)
 
     def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
         """Return distance to the goal, positions, tendons and gripper over time."""
-        from handover.scenarios.helix_handover.plots import plot_handover
+        from handover.scenarios.helix.plots import plot_handover
 
         return plot_handover(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return arm, gripper, hand, ball and cameras in space."""
-        from handover.scenarios.helix_handover.replay import replay_handover
+        from handover.scenarios.helix.replay import replay_handover
 
         return replay_handover(record)

@@ -18,7 +18,7 @@ from handover.controllers.vsl.model_text import model_text
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.scenarios.vsl_training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
+from handover.scenarios.vsl.training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
 
 SPLIT = (0.70, 0.15, 0.15)
 """Shares of training, validation and test points. [Gandarias2020] sec. IV-B"""

@@ -1,4 +1,9 @@
-"""What both experiments share: planner, kinematics and arm, wired, and a path to follow. [Gandarias2020] sec. V."""
+"""What both experiments share: planner, kinematics and arm, wired, and a path to follow. [Gandarias2020] sec. V.
+
+The arm follows a path by rigid-link kinematics with learned corrections. [Gandarias2020] sec. V-B, experiment 2.
+
+The arm follows a path by rigid-link kinematics. [Gandarias2020] sec. V-A, experiment 1.
+"""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -13,8 +18,8 @@ from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimePlot
-from handover.scenarios.vsl.parameters import Parameters
-from handover.scenarios.vsl.watch import PathWatch
+from handover.scenarios.vsl.evaluation import PathWatch
+from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
 _MORE = 5
 """Time after which a path that should have been completed is given up, s (assumed)."""
@@ -112,7 +117,7 @@ class PathExperiment(Experiment[PathWatch]):
 
     def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
         """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
-        from handover.scenarios.vsl.figures import draw_path_run  # what draws takes long to load
+        from handover.scenarios.vsl.plots import draw_path_run  # what draws takes long to load
 
         return draw_path_run(parameters, watch, record, folder)
 
@@ -127,3 +132,25 @@ class PathExperiment(Experiment[PathWatch]):
         from handover.scenarios.vsl.replay import replay_path
 
         return replay_path(parameters, record, hybrid=self.hybrid)
+
+
+class VslHybrid(PathExperiment):
+    """The paper's second experiment: pressures and currents tell how far the links bend."""
+
+    name: ClassVar[str] = "vsl_hybrid"
+    title: ClassVar[str] = "an arm of soft links follows a path by kinematics with learned corrections"
+    parameters_type: ClassVar[type[HybridParameters]] = HybridParameters
+    hybrid: ClassVar[bool] = True
+
+    def kinematics(self, parameters: HybridParameters) -> dict[str, Any]:
+        """Return the trained model's file, absolute, since a unit may run in another folder."""
+        return {"model": str(Path(parameters.model).absolute()) if parameters.model else ""}
+
+
+class VslModelBased(PathExperiment):
+    """The paper's first experiment: links bend, and the kinematics do not know."""
+
+    name: ClassVar[str] = "vsl_model_based"
+    title: ClassVar[str] = "an arm of soft links follows a path by rigid-link kinematics"
+    parameters_type: ClassVar[type[Parameters]] = Parameters
+    hybrid: ClassVar[bool] = False

@@ -1,0 +1,252 @@
+"""Judges by ground truth how the robot yields to a push and comes back.
+
+The error that the impedance model calls for, from the motion that took place. [Fernandes2020] eqs. (3.26), (4.4).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.system.signals import Signals
+from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.free_flyer.parameters import Behaviour, ImpedanceParameters
+from handover.scenarios.free_flyer.robot_wiring import stability_metrics
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
+"""Signals of a push that make up a `Motion`, in the order of its fields after time."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What was seen at communication points, one row each, in W and SI units; quaternions scalar first.
+
+    The wrench `f_G`, `tau_G` of a row acted on the gripper from the row before until this one.
+    """
+
+    t: Floats
+    p_WG: Floats
+    v_WG: Floats
+    q_WB: Floats
+    w_WB: Floats
+    f_G: Floats
+    tau_G: Floats
+
+    @classmethod
+    def of(cls, rows: Sequence[Sequence[Any]]) -> "Motion":
+        """Return the motion that rows of the fields' values make up."""
+        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of the gripper's pose, rest minus actual, one row for the beginning of each step.
+
+    Attributes:
+        t: time, s.
+        p, p_model: position error as it was and as the model calls for, shape (rows, 3), in W, m.
+        R, R_model: orientation error likewise, as a rotation vector in W, rad; whole turns more or less do not count.
+    """
+
+    t: Floats
+    p: Floats
+    p_model: Floats
+    R: Floats
+    R_model: Floats
+
+    @property
+    def disagreement(self) -> tuple[float, float]:
+        """Greatest difference along any axis, m and rad; of orientations, the turn from one to the other."""
+        from scipy.spatial.transform import Rotation  # long to load, and used when a run has ended
+
+        apart = Rotation.from_rotvec(-self.R) * Rotation.from_rotvec(self.R_model)
+        turn: Floats = np.array(apart.as_rotvec())
+        return float(np.max(np.abs(self.p - self.p_model))), float(np.max(np.abs(turn)))
+
+    @property
+    def without_jumps(self) -> tuple[Floats, Floats]:
+        """R, and of the rotation vectors that mean R_model the ones nearest to R; not a number where they turn over."""
+        both = np.array(self.R), _nearest(self.R_model, self.R)
+        for turns in both:
+            turns[1:][np.linalg.norm(np.diff(turns, axis=0), axis=1) > np.pi] = np.nan
+        return both
+
+
+def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors:
+    """Return the errors by eq. (4.4), k_D xt' = B_x x'' + (C_x + k_B) x' - f_ext, with rest at no rotation.
+
+    Velocities are twists, so B_x x'' + C_x x' - f_ext is the propulsion's wrench, taken at the gripper: what changes
+    the body's momentum, less the push. It is got as the mean over a step, in which the push counts by its impulse. All
+    else is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
+    the mean is turned back by half the step's turn.
+    """
+    from scipy.spatial.transform import Rotation
+
+    body = paper_values("free_flyer", "robot")
+    gains = paper_values("free_flyer", f"gains_{behaviour.item}")
+    m: float = body["mass"]
+    I_B: Floats = np.array(body["I_B"])
+    R_WB = Rotation.from_quat(motion.q_WB, scalar_first=True)
+    r_W: Floats = R_WB.apply(np.array(body["p_BG"]))
+    force, torque = _propulsion(motion, R_WB, r_W, m, I_B)
+    v, w = motion.v_WG[:-1], motion.w_WB[:-1]
+    torque_G: Floats = torque - np.cross(r_W[:-1], force) + gains["k_B_rotational"] * w
+    softness_R: Floats = np.linalg.inv(I_B) / gains["k_D_rotational"]
+    return Errors(
+        t=motion.t[:-1],
+        p=p_WG_goal - motion.p_WG[:-1],
+        p_model=(force + gains["k_B_linear"] * v) / (gains["k_D_linear"] * m),
+        R=-R_WB[:-1].as_rotvec(),
+        R_model=_times(softness_R, torque_G),
+    )
+
+
+def _propulsion(motion: Motion, R_WB: "Rotation", r_W: Floats, m: float, I_B: Floats) -> tuple[Floats, Floats]:
+    """Return force, and torque about B, of the propulsion in W at the beginning of each step."""
+    from scipy.spatial.transform import Rotation
+
+    dt = np.diff(motion.t)[:, np.newaxis]
+    v_WB = motion.v_WG - np.cross(motion.w_WB, r_W)
+    w_B: Floats = R_WB.apply(motion.w_WB, inverse=True)
+    L_W: Floats = R_WB.apply(_times(I_B, w_B))
+    f_G = motion.f_G[1:]
+    force: Floats = m * np.diff(v_WB, axis=0) / dt - f_G
+    torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - motion.tau_G[1:]
+    half_turn = Rotation.from_rotvec((motion.w_WB[:-1] + motion.w_WB[1:]) * dt / 4)
+    return half_turn.apply(force, inverse=True), half_turn.apply(torque, inverse=True)
+
+
+def _nearest(turns: Floats, to: Floats) -> Floats:
+    """Return vectors of the same rotations, whole turns more or less about their own axes, nearest to others."""
+    angle = np.linalg.norm(turns, axis=1, keepdims=True)
+    axis = turns / np.maximum(angle, 1e-12)
+    whole: Floats = np.rint((np.sum(axis * to, axis=1, keepdims=True) - angle) / (2 * np.pi))
+    return turns + 2 * np.pi * whole * axis
+
+
+def _times(M: Floats, v: Floats) -> Floats:
+    """Return M v for each row of v."""
+    return v @ np.transpose(M)
+
+
+_REST_POSITION, _REST_ANGLE = 0.010, 0.030
+"""Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
+
+_BAND = f"{1000 * _REST_POSITION:.0f} mm and {_REST_ANGLE:g} rad"
+_MODEL = "[Fernandes2020] eq. (4.4)"
+
+_RESTING = 5.0
+"""How long it must stay within them, s (assumed)."""
+
+_SPINNING = 60.0
+"""Rate at which control counts as lost, rad/s: more than the greatest push can bring about (assumed)."""
+
+
+class ImpedanceWatch(Watch):
+    """Follows one push and tells whether the robot came back to rest and moved as the impedance model says.
+
+    Raises:
+        KeyError: `paper.toml` lacks the place of rest.
+    """
+
+    def __init__(self, parameters: ImpedanceParameters) -> None:
+        self.parameters = parameters
+        self.p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
+        x, y, z = self.p_WG_goal.tolist()
+        self._goal = (x, y, z)
+        self._rows: list[list[Any]] = []
+        self._saturated = 0
+        self._t = 0.0
+        self._astray = 0.0
+        self._spins = False
+        self._greatest = [0.0, 0.0]
+        self._last = (0.0, 0.0)
+        self._stability: dict[str, Metric] = {}
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Keep the motion and follow the errors."""
+        if not self._rows:
+            self._stability = stability_metrics(signals, ("impedance",))
+        seen = [signals[name] for name in MOTION_SIGNALS]
+        self._rows.append([t, *seen])
+        self._saturated += bool(signals["thrusters.saturated"])
+        away = math.dist(seen[0].tolist(), self._goal)
+        turned = 2.0 * math.acos(min(1.0, abs(float(seen[2][0]))))
+        self._t, self._last = t, (away, turned)
+        self._spins = math.hypot(*seen[3].tolist()) > _SPINNING
+        self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
+        if away > _REST_POSITION or turned > _REST_ANGLE:
+            self._astray = t
+
+    @property
+    def over(self) -> bool:
+        """Whether the robot has come to rest after the push, or spins out of control."""
+        return self._spins or self._at_rest
+
+    @property
+    def _at_rest(self) -> bool:
+        return self._t - max(self._astray, self.parameters.end) >= _RESTING
+
+    @property
+    def _settled(self) -> float:
+        return max(0.0, self._astray - self.parameters.end)
+
+    def errors(self) -> Errors:
+        """Return the errors as they were and as the model calls for."""
+        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour)
+
+    def outcome(self) -> Outcome:
+        """Return whether the robot rests again and agreed with the model, why, and the figures."""
+        if len(self._rows) < 2:
+            return Outcome(success=False, reason="stopped before the first step")
+        by = self.errors().disagreement
+        published = paper_values("free_flyer", "published")["model_agreement"]
+        agrees = by[0] <= published[0] and by[1] <= published[1]
+        share = self._saturated / len(self._rows)
+        metrics = {
+            "greatest_position_error": Metric(self._greatest[0], "m", "gripper from its place of rest at most"),
+            "greatest_orientation_error": Metric(self._greatest[1], "rad", "gripper from its rest orientation at most"),
+            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error at most, {_MODEL}"),
+            "disagreement_orientation": Metric(
+                by[1], "rad", f"actual against calculated orientation error at most, {_MODEL}"
+            ),
+            "saturated_share": Metric(share, "1", "share of the time for which the thrusters were at their limits"),
+            **self._stability,
+        }
+        if self._at_rest:
+            told = f"from the end of the push until the gripper stays within {_BAND} of its rest"
+            metrics["settling_time"] = Metric(self._settled, "s", told)
+        return Outcome(success=self._at_rest and agrees, reason=self._reason(agrees, by, share), metrics=metrics)
+
+    def _reason(self, agrees: bool, by: tuple[float, float], share: float) -> str:
+        far = f"{1000 * by[0]:.1f} mm" if by[0] < 1.0 else f"{by[0]:.1f} m"
+        apart = f"{far} and {by[1]:.3f} rad"
+        model = (
+            f"agreed with the impedance model within {apart}"
+            if agrees
+            else f"departed from the impedance model by {apart}"
+        )
+        joined = "and" if agrees is self._at_rest else "but"
+        thrust = f"; thrusters at their limits for {100 * share:.0f} % of the time" if share else ""
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}"
+
+    def _back(self) -> str:
+        """Tell whether the gripper came back to rest."""
+        p = self.parameters
+        if self._at_rest:
+            return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after the push"
+        if self._spins:
+            return f"the robot was out of control at {self._t:.1f} s, turning by more than {_SPINNING:.0f} rad/s"
+        if self._t < float(p.stop) - 0.02:
+            return f"stopped at {self._t:.1f} s, before the robot could come to rest"
+        return (
+            f"the gripper did not come back to rest, within {_BAND}, in {p.patience:.0f} s: {self._last[0]:.2f} m and "
+            f"{self._last[1]:.2f} rad away at the end"
+        )

@@ -1,0 +1,1 @@
+"""The Helix takes a ball from a hand."""
