@@ -44,7 +44,7 @@ def told_in_one_line() -> Generator[None, None, None]:
     from handover.fmus.compile import CompilationError, UnknownPlatform
     from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
     from handover.scenarios.experiment.parameters import BadParameter
-    from handover.scenarios.run_folder import BadRunFolder
+    from handover.scenarios.results.run_folder import BadRunFolder
 
     try:
         yield

@@ -17,7 +17,7 @@ from handover.fmus.model_description import AmbiguousName, UnusableText
 from handover.scenarios.bad_call import BadCall, told_in_one_line
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.own_unit import own_unit
-from handover.scenarios.run_folder import BadRunFolder, check_place
+from handover.scenarios.results.run_folder import BadRunFolder, check_place
 
 _HELP = """Build UNITs (all by default) as FMUs for other tools. A unit of your own is named MODULE:CLASS, such as
 spring:Spring for the class Spring in spring.py; modules are looked for in the working directory first.

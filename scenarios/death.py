@@ -13,7 +13,7 @@ from handover.cosim.record.stream import complete_record
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.forked_child import ChildEnd
-from handover.scenarios.run_folder import RunFolder, told_if_not_written
+from handover.scenarios.results.run_folder import RunFolder, told_if_not_written
 from handover.scenarios.run_summary import unit_data
 
 

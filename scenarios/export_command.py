@@ -12,7 +12,7 @@ from handover.scenarios.bad_call import BadCall, told_in_one_line
 from handover.scenarios.chosen import fmus_of, replacements, scenario_named
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.run_folder import check_place
+from handover.scenarios.results.run_folder import check_place
 from handover.scenarios.scenario_arguments import scenario_options
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.

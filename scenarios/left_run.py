@@ -13,8 +13,15 @@ from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.results.run_folder import (
+    BadRunFolder,
+    RunFolder,
+    is_full,
+    sha256_of,
+    version_differences,
+    versions,
+)
 from handover.scenarios.resumption import Resumption, unpack
-from handover.scenarios.run_folder import BadRunFolder, RunFolder, is_full, sha256_of, version_differences, versions
 from handover.scenarios.ssp_run import open_experiment
 from handover.scenarios.task import Task
 

@@ -4,11 +4,9 @@ import shlex
 from collections.abc import Sequence
 
 from handover.scenarios.console import open_console, print_rows
-from handover.scenarios.conversions import told_conversion
 from handover.scenarios.ended import Ended
-from handover.scenarios.master_rows import pace_rows
-from handover.scenarios.reporting.told_metric import told
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.tables import pace_rows, told, told_conversion
 
 _MOST_CONVERSIONS = 8
 """Conversions of units that the end of a run tells on the terminal."""

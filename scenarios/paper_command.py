@@ -18,7 +18,7 @@ from handover.scenarios.campaign_arguments import campaign_options
 from handover.scenarios.campaign_call import call_campaign, workforce_of
 from handover.scenarios.console import open_console
 from handover.scenarios.headed_options import HeadedCommand
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import BadRunFolder
 
 if TYPE_CHECKING:
     from handover.scenarios.campaign.campaign_folder import CampaignFolder
@@ -90,9 +90,9 @@ class _Finish:
         self._experiment, self._report = experiment, report
 
     def __call__(self, folder: CampaignFolder, table: CampaignTable) -> None:
+        from handover.scenarios.campaign_report.campaign_page import write_campaign_report
         from handover.scenarios.published.paper_results import PaperResults
         from handover.scenarios.published.results import draw_figures, write_claims
-        from handover.scenarios.reporting.campaign_page import write_campaign_report
 
         try:
             self.results = PaperResults.of(self._experiment, table)

@@ -6,7 +6,7 @@ import click
 
 from handover.scenarios.bad_call import BadCall, told_in_one_line
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.run_folder import RunFolder, check_place
+from handover.scenarios.results.run_folder import RunFolder, check_place
 
 _HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
 
@@ -45,10 +45,7 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
 
 def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> None:
     from handover.scenarios.campaign.left_table import complete_table
-    from handover.scenarios.reporting.campaign_page import (  # they take long to load
-        write_campaign_page,
-        write_campaign_report,
-    )
+    from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 
     complete_table(campaign)
     (write_campaign_report if figures else write_campaign_page)(campaign, page)
@@ -56,9 +53,9 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> N
 
 def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
     from handover.scenarios.left_run import complete_signals
-    from handover.scenarios.reporting.run_facts import RunFacts
     from handover.scenarios.reporting.run_figures import draw_run
     from handover.scenarios.reporting.run_page import write_run_page
+    from handover.scenarios.results.run_facts import RunFacts
 
     with left.held():
         RunFacts.read(left)  # before anything is completed: it may be no run's folder at all

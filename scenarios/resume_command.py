@@ -13,7 +13,7 @@ from handover.scenarios.interruption import Interruption
 from handover.scenarios.left_run import LeftRun
 from handover.scenarios.limit_arguments import limit_options, limits
 from handover.scenarios.progress import progress_bar
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 
 _HELP = """Go on with a run that was interrupted, killed, or that failed, from its last checkpoint.

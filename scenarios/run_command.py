@@ -24,7 +24,7 @@ from handover.scenarios.interruption import Interruption
 from handover.scenarios.limit_arguments import limit_options, limits
 from handover.scenarios.master_arguments import coupling_of, master_options
 from handover.scenarios.progress import progress_bar
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.scenario_arguments import scenario_options
 from handover.scenarios.seconds import Seconds

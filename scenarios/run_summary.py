@@ -9,13 +9,12 @@ import numpy as np
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.master.master import Master
-from handover.scenarios.conversions import conversions_of
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Metric, Outcome
+from handover.scenarios.results.tables import conversions_of, told_value
 from handover.scenarios.resumption import Spent
 from handover.scenarios.task import Task
 from handover.scenarios.told_system import told_system
-from handover.scenarios.told_value import told_value
 
 UnitRow = tuple[str, str, str, int | None, float | None]
 """Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""

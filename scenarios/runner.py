@@ -13,9 +13,9 @@ from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.scenarios.ended import Ended
 from handover.scenarios.experiment.experiment import Outcome, Watch
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.reporting.kept_pictures import write_pictures
+from handover.scenarios.results.pictures import write_pictures
+from handover.scenarios.results.run_folder import told_if_not_written
 from handover.scenarios.resumption import Resumption, Spent, pack
-from handover.scenarios.run_folder import told_if_not_written
 from handover.scenarios.run_metrics import run_metrics
 from handover.scenarios.run_summary import configuration, files_and_forms, presentation, summary_of, unit_rows
 from handover.scenarios.supervisor import heartbeat_of_run

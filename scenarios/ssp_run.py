@@ -15,7 +15,7 @@ from handover.cosim.system.system import System
 from handover.scenarios import supervisor
 from handover.scenarios.bad_call import BadCall
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf, Outcome, Watch
-from handover.scenarios.run_folder import sha256_of
+from handover.scenarios.results.run_folder import sha256_of
 
 _MOST_SIGNALS = 6
 """Signals in one figure."""

@@ -112,6 +112,6 @@ def sweep(
 def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
     if folder.is_reported:
         return
-    from handover.scenarios.reporting.campaign_page import write_campaign_report  # what draws takes long to load
+    from handover.scenarios.campaign_report.campaign_page import write_campaign_report  # what draws takes long to load
 
     write_campaign_report(folder)

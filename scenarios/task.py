@@ -8,7 +8,7 @@ from typing import Any
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from handover.scenarios.exit_status import UNIT_FAILED
 from handover.scenarios.forked_child import ChildEnd
 from handover.scenarios.listing import print_summary
 from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.run_folder import told_if_not_written
+from handover.scenarios.results.run_folder import told_if_not_written
 
 _BY_SIGNAL = 128  # what shells add to a signal's number
 

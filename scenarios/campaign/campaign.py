@@ -16,7 +16,7 @@ from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 from handover.scenarios.campaign.run_row import RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter
 from handover.scenarios.campaign.tally import OnTally, Tally
-from handover.scenarios.run_folder import told_if_not_written
+from handover.scenarios.results.run_folder import told_if_not_written
 
 
 def carry_out_campaign(

@@ -12,7 +12,7 @@ from typing import Any
 from handover.scenarios.campaign.campaign_identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.run_folder import (
+from handover.scenarios.results.run_folder import (
     BadRunFolder,
     check_place,
     folder_held,

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.run_folder import sha256_of, versions
+from handover.scenarios.results.run_folder import sha256_of, versions
 
 _LONGEST = 60
 """Characters of a value that are told."""

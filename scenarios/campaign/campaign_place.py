@@ -7,7 +7,7 @@ from pathlib import Path
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_identity import identity_of
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import BadRunFolder
 
 PLACE = Path("campaigns")
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest, one_line
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import BadRunFolder
 
 _ANEW = "the call that began the campaign writes it anew"
 

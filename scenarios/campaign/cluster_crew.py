@@ -16,7 +16,7 @@ from handover.scenarios.campaign.asked_aside import asked_aside
 from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
 from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 from handover.scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
-from handover.scenarios.run_folder import told_if_not_written, versions
+from handover.scenarios.results.run_folder import told_if_not_written, versions
 
 _AHEAD = 2
 """Orders that the scheduler holds for each thread: one that is carried out and one that waits.

@@ -12,7 +12,7 @@ from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.run_row import RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter
 from handover.scenarios.experiment.parameters import BadParameter
-from handover.scenarios.run_folder import BadRunFolder, check_place, versions
+from handover.scenarios.results.run_folder import BadRunFolder, check_place, versions
 
 _OF_PLAN = ("scenario", "points", "fixed", "repetitions", "seed", "paired", "scenes", "experiment")
 """What `campaign.json` tells of a plan, as far as the table follows from it."""

@@ -18,8 +18,8 @@ from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 from handover.scenarios.chosen import scenario_named
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.interruption import Interruption
+from handover.scenarios.results.run_folder import RunFolder, is_full
 from handover.scenarios.resumption import Spent
-from handover.scenarios.run_folder import RunFolder, is_full
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task
 

@@ -18,7 +18,7 @@ from handover.scenarios.campaign.run_row import RunRow
 from handover.scenarios.chosen import scenario_named
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.parameters import parse_value
-from handover.scenarios.run_folder import told_if_not_written
+from handover.scenarios.results.run_folder import told_if_not_written
 
 _SHARE = 0.005
 """Part of the time that may go into writing tables before the last one."""

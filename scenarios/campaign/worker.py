@@ -13,7 +13,7 @@ from distributed import get_worker
 
 from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
 from handover.scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
-from handover.scenarios.run_folder import version_differences, versions
+from handover.scenarios.results.run_folder import version_differences, versions
 
 _servers: dict[tuple[str, int], ServerProcess] = {}
 """By batch and thread."""

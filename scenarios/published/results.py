@@ -9,7 +9,7 @@ from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.claim import Claim
 from handover.scenarios.published.published_experiment import PublishedExperiment
-from handover.scenarios.run_folder import told_if_not_written, write_whole
+from handover.scenarios.results.run_folder import told_if_not_written, write_whole
 
 
 def write_claims(claims: Sequence[Claim], folder: CampaignFolder) -> None:

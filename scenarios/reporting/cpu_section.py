@@ -7,9 +7,8 @@ from typing import Any
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from handover.scenarios.reporting.page import template
-from handover.scenarios.reporting.plot_html import plot_html
-from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.html import plot_html
+from handover.scenarios.reporting.page import Section, template
 
 _MOST = 24
 """Units that have a bar of their own; the cheapest of more share one."""

@@ -1,10 +1,16 @@
-"""Writes a page: one HTML file with scripts, style and data inside, that opens offline and asks for nothing."""
+"""Writes a page: one HTML file with scripts, style and data inside, that opens offline and asks for nothing.
+
+A part of a page.
+
+Keeps numbers and their units together where a line breaks.
+"""
 
 import base64
 import functools
 import hashlib
+import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
@@ -12,9 +18,44 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from handover.scenarios.reporting.section import Section
-from handover.scenarios.reporting.tied_text import tied
-from handover.scenarios.run_folder import write_whole
+from handover.scenarios.results.run_folder import write_whole
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A heading and what stands below it.
+
+    Attributes:
+        anchor: its name in links, such as "replay".
+        title: the heading.
+        html: what stands below.
+        scripts: names of files in `scenarios/reporting/page/` that it needs, without `page.js`, which is always there.
+    """
+
+    anchor: str
+    title: str
+    html: Markup
+    scripts: tuple[str, ...] = ()
+
+
+_PARTS = re.compile(r"(<script\b.*?</script>|<style\b.*?</style>|<[^>]+>)", re.DOTALL)
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|°|[kmµ]?m|[mµ]?s|m?N|k?g|m?rad|h|A|bar|k?Pa|[MG]B|N·m|N m|m/s|rad/s)(?![\w/]))")
+_RANGE = re.compile(r"(?<=\d) to (?=-?\d)")
+_EQUAL = re.compile(r"\b(\w) ([=<]) (?=-?\d)")
+_SPACE = "\u00a0"
+
+
+def tied(html: str) -> str:
+    """Return HTML in whose text no line breaks within "5 mm", "3 to 5 %" and "p = 0.03"; scripts stay as they are."""
+    parts = _PARTS.split(html)
+    parts[::2] = [_tied(text) for text in parts[::2]]
+    return "".join(parts)
+
+
+def _tied(text: str) -> str:
+    text = _RANGE.sub(f"{_SPACE}to{_SPACE}", _UNIT.sub(_SPACE, text))
+    return _EQUAL.sub(rf"\1{_SPACE}\2{_SPACE}", text)
+
 
 _SCRIPT = "page.js"
 

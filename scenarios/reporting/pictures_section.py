@@ -9,10 +9,9 @@ import cv2
 from markupsafe import Markup
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.reporting.kept_pictures import read_pictures
-from handover.scenarios.reporting.page import template
-from handover.scenarios.reporting.section import Section
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.reporting.page import Section, template
+from handover.scenarios.results.pictures import read_pictures
+from handover.scenarios.results.run_folder import RunFolder
 
 _WIDTHS = (960, 800, 640, 480, 360)
 """Widths of which the greatest is taken with which all pictures have room, px."""

@@ -8,10 +8,9 @@ from pathlib import Path
 from handover.cosim.record.reader import Record, RecordedSignals
 from handover.scenarios.experiment.experiment import Figure, Watch
 from handover.scenarios.experiment.parameters import BadParameter, parameters_of
-from handover.scenarios.reporting.kept_pictures import read_pictures
-from handover.scenarios.reporting.run_facts import RunFacts
-from handover.scenarios.reporting.run_record import record_of
-from handover.scenarios.run_folder import BadRunFolder, RunFolder, told_if_not_written
+from handover.scenarios.results.pictures import read_pictures
+from handover.scenarios.results.run_facts import RunFacts, record_of
+from handover.scenarios.results.run_folder import BadRunFolder, RunFolder, told_if_not_written
 from handover.scenarios.ssp_run import draw_outputs
 
 

@@ -1,27 +1,174 @@
-"""Writes the page of a run, of what is in its folder."""
+"""Writes the page of a run, of what is in its folder.
 
-from collections.abc import Sequence
+What stands under the heading of a run's page: what ran, and how it ended.
+
+The tables of a run's page: figures of merit, parameters, the master, files.
+
+A run's figures beside what its paper tells of them.
+"""
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import BadParameter, parameters_of
 from handover.scenarios.reporting.cpu_section import cpu_section
-from handover.scenarios.reporting.explorer_section import explorer_section
-from handover.scenarios.reporting.graph_section import graph_section
-from handover.scenarios.reporting.page import write_page
+from handover.scenarios.reporting.graph import graph_section
+from handover.scenarios.reporting.html import rows_table
+from handover.scenarios.reporting.page import Section, template, write_page
 from handover.scenarios.reporting.pictures_section import pictures_section
-from handover.scenarios.reporting.published_section import published_section
 from handover.scenarios.reporting.replay_section import replay_section
-from handover.scenarios.reporting.run_facts import RunFacts
-from handover.scenarios.reporting.run_lead import run_lead
-from handover.scenarios.reporting.run_record import record_of
-from handover.scenarios.reporting.run_tables import files_section, master_section, metrics_section, parameters_section
-from handover.scenarios.reporting.section import Section
-from handover.scenarios.reporting.time_plots_section import time_plots_section
-from handover.scenarios.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.reporting.time_plots import explorer_section, time_plots_section
+from handover.scenarios.results.run_facts import RunFacts, record_of
+from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.tables import master_rows, told, told_conversion
+
+_VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
+
+
+def run_lead(facts: RunFacts) -> Markup:
+    """Return the verdict, what ran with which seed and versions, and what was told of a failure."""
+    summary, versions = facts.summary, facts.run.get("versions", {})
+    told = [facts.title] if facts.title else []
+    if facts.run.get("seed") is not None:
+        told.append(f"seed {facts.run['seed']}")
+    told.append(_how_long(facts))
+    told += [f"{name} {versions[key]}" for key, name in _VERSIONS.items() if key in versions]
+    return Markup(
+        template("run_lead.html").render(
+            told=[t for t in told if t],
+            verdict=_verdict(facts),
+            good=summary["success"],
+            reason=summary["reason"],
+            to_go_on=facts.folder.checkpoint.exists(),
+            failure={"log": (), "instance": None, **(summary.get("failure") or {})},
+        )
+    )
+
+
+def _verdict(facts: RunFacts) -> str:
+    if facts.summary["success"]:
+        return "Succeeded"
+    if not facts.ended:
+        return "Not ended"
+    return "Interrupted" if facts.summary["reason"].startswith("interrupted") else "Failed"
+
+
+def _how_long(facts: RunFacts) -> str:
+    simulated, wall = (facts.summary.get(f"{name}_seconds") for name in ("simulated", "wall"))
+    if simulated is None:
+        return ""
+    return f"{simulated:.1f} s simulated" + ("" if wall is None else f" in {wall:.1f} s")
+
+
+_IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")
+"""Metrics that have a place in other tables."""
+
+_FILES = {
+    "summary.json": "verdict and figures of the run",
+    "signals.parquet": "all signals over time, with units",
+    "run.json": "configuration, versions and hashes",
+    "checkpoint.zip": "where it can go on",
+    "figures": "figures as PNG and SVG",
+    "pictures": "pictures of the cameras",
+}
+
+
+def metrics_section(facts: RunFacts) -> Section | None:
+    """Return the figures of merit, those of the headline first."""
+    metrics: Mapping[str, Any] = facts.summary["metrics"]
+    first = [n for n in facts.headline if n in metrics]
+    others = [n for n in metrics if n not in first and not n.startswith(_IN_TABLES)]
+    rows = [(metrics[n].get("description") or n, told(metrics[n]), n) for n in first + others]
+    return _table("figures", "Figures of the run", rows, first=len(first))
+
+
+def parameters_section(facts: RunFacts) -> Section | None:
+    """Return the parameters, with what they are where the run tells it."""
+    return _table("parameters", "Parameters", [(description, value, n) for n, value, description in facts.parameters])
+
+
+def master_section(facts: RunFacts) -> Section | None:
+    """Return how the units were coupled, and which units of measure were converted.
+
+    Raises:
+        BadRunFolder: what the folder tells of it is damaged.
+    """
+    try:
+        rows = master_rows(facts.summary) if "master" in facts.summary else []
+        conversions = [told_conversion(c) for c in facts.run.get("conversions", [])]
+    except (KeyError, TypeError, ValueError) as e:
+        fault = f"what it tells of its master is damaged: {type(e).__name__} {e}"
+        raise BadRunFolder(facts.folder.path, fault) from e
+    if not rows and not conversions:
+        return None
+    html = template("run_master.html").render(rows=rows, conversions=conversions)
+    return Section(anchor="master", title="Master", html=Markup(html))
+
+
+def files_section(facts: RunFacts) -> Section:
+    """Return what is in the run's folder, and the versions that it ran with."""
+    path = facts.folder.path
+    there = [(name, what) for name, what in _FILES.items() if _is_something(path / name)]
+    versions, units = facts.run.get("versions", {}), facts.run.get("units", {})
+    html = template("run_files.html").render(files=there, units=units, versions=versions)
+    return Section(anchor="files", title="Files", html=Markup(html))
+
+
+def _is_something(path: Any) -> bool:
+    return any(path.iterdir()) if path.is_dir() else path.exists()
+
+
+def _table(anchor: str, title: str, rows: Sequence[tuple[str, str, str]], first: int = 0) -> Section | None:
+    if not rows:
+        return None
+    html = template("run_table.html").render(rows=rows, first=first)
+    return Section(anchor=anchor, title=title, html=Markup(html))
+
+
+def published_section(summary: Mapping[str, Any], run: Mapping[str, Any]) -> Section | None:
+    """Return the run's figures that the paper has too, for parameters near the published ones; None if there are none.
+
+    Args:
+        summary: what is in `summary.json`.
+        run: what is in `run.json`.
+    """
+    values = [v for v in _values(run) if v.metric in summary["metrics"]]
+    if not values:
+        return None
+    rows = [_row(v, summary["metrics"][v.metric]) for v in values]
+    note = "One run is no trial of what was published: it does not tell how its figures vary."
+    html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
+    return Section(
+        anchor="published", title="Published values", html=html + Markup("<p class='soft'>{}</p>").format(note)
+    )
+
+
+def _values(run: Mapping[str, Any]) -> Sequence[PublishedValue]:
+    experiment = SCENARIOS.get(run["scenario"])
+    if experiment is None:
+        return ()
+    try:
+        return experiment().published(parameters_of(experiment, run["parameters"]))
+    except BadParameter:  # of another version: the page tells it where it leaves plots out
+        return ()
+
+
+def _row(value: PublishedValue, metric: Mapping[str, Any]) -> tuple[str | Markup, ...]:
+    unit = {"unit": metric["unit"]}
+    shown = f"{value.relation} {told({**unit, 'value': value.value})}".lstrip()
+    if value.limits is not None:
+        shown += " ({} to {})".format(*(told({**unit, "value": x}) for x in value.limits))
+    status = "" if value.status == "stated" else f" ({value.status})"
+    where = Markup("{}{}").format(value.where, status)
+    if value.note:
+        where += Markup("<br><span class='soft'>{}</span>").format(value.note)
+    return metric["description"] or value.metric, told(metric), shown, where
 
 
 def write_run_page(folder: RunFolder, file: Path | None = None) -> None:

@@ -10,10 +10,10 @@ from click.testing import CliRunner, Result
 
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.command import main
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.ir_table import IrTable
-from handover.scenarios.reporting.campaign_page import write_campaign_page
 
 
 def paper(*arguments: str | Path) -> Result:

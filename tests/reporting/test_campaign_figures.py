@@ -8,7 +8,7 @@ from campaigns import results_of
 from matplotlib.figure import Figure as Canvas
 from matplotlib.transforms import Bbox
 
-from handover.scenarios.campaign.campaign_figures import draw_campaign
+from handover.scenarios.campaign_report.figures import draw_campaign
 
 
 @pytest.mark.parametrize("n", [2, 30])

@@ -11,9 +11,9 @@ import pytest
 from campaigns import folder_of, table_of, told
 
 from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.published.claim import Claim, Verdict
-from handover.scenarios.reporting.campaign_page import write_campaign_page
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import BadRunFolder
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser
 
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.reporting.campaign_page import write_campaign_page, write_campaign_report
+from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"strategy": "reflex"}, {"strategy": "blind"}], repetitions=2, seed=1, paired=True

@@ -8,8 +8,8 @@ from typing import Any
 from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.reporting.plot_html import COLOURS
-from handover.scenarios.reporting.time_plots_section import time_figure
+from handover.scenarios.reporting.html import COLOURS
+from handover.scenarios.reporting.time_plots import time_figure
 
 PAGE = files("handover.scenarios.reporting") / "page"
 

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.scenarios.reporting.graph_layout import bent, places
-from handover.scenarios.reporting.graph_section import graph_section, rate
+from handover.scenarios.reporting.graph import bent, graph_section, places, rate
 from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
 
 LOOP = [("camera", "vision"), ("vision", "servo"), ("servo", "arm"), ("arm", "camera"), ("arm", "hand"),
         ("hand", "arm"), ("hand", "camera")]  # fmt: skip

@@ -7,9 +7,8 @@ import pytest
 from markupsafe import Markup
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.scenarios.reporting.page import write_page
-from handover.scenarios.reporting.plot_html import plot_html
-from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.html import plot_html
+from handover.scenarios.reporting.page import Section, write_page
 
 EVIL = "</script><script>alert(1)</script>"
 

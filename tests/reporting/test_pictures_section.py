@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.reporting.kept_pictures import write_pictures
 from handover.scenarios.reporting.pictures_section import pictures_section
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.pictures import write_pictures
+from handover.scenarios.results.run_folder import RunFolder
 
 BALL = Mark(label="ball, as measured", shape="circle", u=319.5, v=359.5, radius=32.0, colour="#ffd23f")
 GONE = Mark(label="wrist, as measured", shape="cross", u=2000.0, v=10.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from campaigns import results_of
 
-from handover.scenarios.campaign.point_layout import PointLayout, layout_of
+from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of
 
 
 def layout(scenario: str, *points: dict[str, str]) -> PointLayout:

@@ -9,7 +9,7 @@ import pytest
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.reporting.replay_frames import MOST, frame_rows, phase_changes
+from handover.scenarios.reporting.replay_section import MOST, frame_rows, phase_changes
 
 
 def test_moments_lie_evenly_in_time_where_rows_do_not():

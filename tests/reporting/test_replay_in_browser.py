@@ -13,7 +13,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.reporting.replay_frames import frame_rows
+from handover.scenarios.reporting.replay_section import frame_rows
 
 SCENE = "document.querySelector('.replay-scene')"
 POINTS = """name => {

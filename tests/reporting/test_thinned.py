@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handover.scenarios.reporting.thinned import rows_of_curve, rows_of_steps
+from handover.scenarios.reporting.time_plots import rows_of_curve, rows_of_steps
 
 T = np.linspace(0.0, 10.0, 100_000)
 

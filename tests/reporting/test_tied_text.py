@@ -1,4 +1,4 @@
-from handover.scenarios.reporting.tied_text import tied
+from handover.scenarios.reporting.page import tied
 
 
 def test_a_line_does_not_break_within_a_number_with_its_unit():

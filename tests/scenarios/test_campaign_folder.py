@@ -15,7 +15,7 @@ from handover.scenarios.campaign.bad_crew import BadCrew
 from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_place import place_of
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import BadRunFolder
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"thing": "cylinder"}, repetitions=2

@@ -13,7 +13,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.run_row import RunRow
 from handover.scenarios.campaign.table_writer import TableWriter, table_of
 from handover.scenarios.experiment.experiment import Metric
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import BadRunFolder
 
 PLAN = CampaignPlan(
     scenario="vsl_hybrid",

@@ -19,7 +19,7 @@ from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.interruption import Interruption
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation, asked_for
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task
 

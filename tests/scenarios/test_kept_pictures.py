@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.reporting.kept_pictures import read_pictures, write_pictures
-from handover.scenarios.run_folder import BadRunFolder
+from handover.scenarios.results.pictures import read_pictures, write_pictures
+from handover.scenarios.results.run_folder import BadRunFolder
 
 MARK = Mark(label="ball, as measured", shape="circle", u=30.5, v=20.0, radius=6.0, colour="#ffd23f")
 

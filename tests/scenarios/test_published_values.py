@@ -13,7 +13,7 @@ import handover.scenarios
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.reporting.published_section import published_section
+from handover.scenarios.reporting.run_page import published_section
 
 FAST = {
     "ir_grasp": {(): 3},

@@ -18,7 +18,7 @@ from handover.scenarios.ended import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.listing import print_summary
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 
 fcntl = pytest.importorskip("fcntl")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from handover.scenarios.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
 
 
 def test_nothing_is_made_before_it_is_asked_for(tmp_path: Path):

@@ -23,7 +23,7 @@ from handover.scenarios.campaign.run_row import row_of
 from handover.scenarios.campaign.server_process import NotWanted, ServerLost, ServerProcess
 from handover.scenarios.command import main
 from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 
 slow = pytest.mark.slow
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")

@@ -3,7 +3,7 @@ import sys
 import pytest
 
 from handover.scenarios.experiment.experiment import Metric
-from handover.scenarios.reporting.told_metric import told
+from handover.scenarios.results.tables import told
 from handover.scenarios.run_metrics import peak_memory
 from handover.scenarios.run_summary import metric_data
 

@@ -19,7 +19,7 @@ from handover.scenarios.ended import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
 from handover.scenarios.interruption import Interruption
-from handover.scenarios.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.runner import carry_out
 from handover.scenarios.task import Task
 from handover.scenarios.vsl.path_experiments import PathExperiment, VslHybrid, VslModelBased

@@ -13,7 +13,7 @@ from distributed import Client
 
 from handover.scenarios.campaign import worker
 from handover.scenarios.campaign.server_process import ServerProcess
-from handover.scenarios.run_folder import versions
+from handover.scenarios.results.run_folder import versions
 
 
 def test_an_order_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -7,8 +7,8 @@ from markupsafe import Markup
 from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
 from handover.scenarios.published.claim import Claim, Verdict
 from handover.scenarios.published.comparison_table import ComparisonTable
-from handover.scenarios.reporting.rows_table import rows_table
-from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.html import rows_table
+from handover.scenarios.reporting.page import Section
 
 _HEADER = ("claim", "published", "ours", "95 % interval", "verdict")
 _HEADER_BEYOND = tuple(name for name in _HEADER if name != "published")

@@ -10,7 +10,7 @@ from typing import Any
 
 from handover.cosim.exceptions import one_line
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.run_folder import BadRunFolder, told_if_not_written, write_whole
+from handover.scenarios.results.run_folder import BadRunFolder, told_if_not_written, write_whole
 
 _TOLD = ("t", "camera", "role", "width", "height")
 

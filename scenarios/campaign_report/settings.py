@@ -1,15 +1,21 @@
-"""With what a campaign was run: parameters that are the same in all runs, options of the master, versions."""
+"""With what a campaign was run: parameters that are the same in all runs, options of the master, versions.
 
-from collections.abc import Mapping
+Figures of a folder within a page.
+"""
+
+import base64
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, cast
 
 from markupsafe import Markup
 
 from handover.scenarios.campaign.campaign_results import CampaignResults
 from handover.scenarios.experiment.display_unit import shown_unit
-from handover.scenarios.reporting.rows_table import rows_table
-from handover.scenarios.reporting.section import Section
-from handover.scenarios.told_value import told_value
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.reporting.html import rows_table
+from handover.scenarios.reporting.page import Section
+from handover.scenarios.results.tables import told_value
 
 
 def setting_section(results: CampaignResults) -> Section:
@@ -64,3 +70,18 @@ def _flat(options: Mapping[str, Any]) -> dict[str, str]:
         elif value is not None:
             flat[name.replace("_", " ")] = told_value(value)
     return flat
+
+
+def figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:
+    """Return figures with their captions, None if there are none; `folder` has them as PNG."""
+    if not figures:
+        return None
+    html = Markup("\n").join(_html(f, folder / f"{f.name}.png") for f in figures)
+    return Section(anchor="figures", title="Figures", html=html)
+
+
+def _html(figure: Figure, file: Path) -> Markup:
+    data = base64.b64encode(file.read_bytes()).decode()
+    return Markup(
+        "<figure><img class='paper' alt='{}' src='data:image/png;base64,{}'><figcaption>{}</figcaption></figure>"
+    ).format(figure.name.replace("_", " "), data, figure.caption)

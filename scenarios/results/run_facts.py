@@ -1,13 +1,18 @@
-"""What a run's folder says of it, checked as it is read: folders come from other versions, and from broken disks."""
+"""What a run's folder says of it, checked as it is read: folders come from other versions, and from broken disks.
+
+The record in a run's folder, as pages and figures need it.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from handover.cosim.exceptions import one_line
+from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.run_folder import BadRunFolder, RunFolder
-from handover.scenarios.told_value import told_value
+from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.tables import told_value
 
 _NUMBER = (int, float)
 _FORMS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
@@ -103,3 +108,18 @@ def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
             fine = False
         if not fine:
             raise BadRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")
+
+
+def record_of(folder: RunFolder) -> Record | None:
+    """Return a run's record; None where there is none, or one of less than two rows, which shows nothing over time.
+
+    Raises:
+        BadRunFolder: it is damaged.
+    """
+    if not folder.signals.exists():
+        return None
+    try:
+        record = Record(folder.signals)
+        return record if len(record.time) > 1 else None
+    except (OSError, ValueError, KeyError) as e:  # Arrow's faults are among them
+        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e

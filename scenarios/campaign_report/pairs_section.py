@@ -7,8 +7,8 @@ from markupsafe import Markup
 
 from handover.scenarios.campaign.campaign_results import CampaignResults, PointResults
 from handover.scenarios.campaign.statistics import paired_test
-from handover.scenarios.reporting.rows_table import Cell, rows_table
-from handover.scenarios.reporting.section import Section
+from handover.scenarios.reporting.html import Cell, rows_table
+from handover.scenarios.reporting.page import Section
 
 _MOST_PAIRS = 60
 

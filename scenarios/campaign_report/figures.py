@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
-from handover.scenarios.campaign.point_layout import PointLayout, layout_of
 from handover.scenarios.campaign.statistics import Interval
+from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of
 from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure

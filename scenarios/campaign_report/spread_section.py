@@ -9,11 +9,11 @@ from markupsafe import Markup
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.campaign_results import CampaignResults
-from handover.scenarios.campaign.point_layout import PointLayout
+from handover.scenarios.campaign_report.point_layout import PointLayout
+from handover.scenarios.campaign_report.points import place_axis, plot_height
 from handover.scenarios.experiment.display_unit import shown_unit
-from handover.scenarios.reporting.plot_html import json_html, plot_html
-from handover.scenarios.reporting.section import Section
-from handover.scenarios.reporting.success_section import place_axis, plot_height
+from handover.scenarios.reporting.html import json_html, plot_html
+from handover.scenarios.reporting.page import Section
 
 _SUCCESS, _OTHER = "circle", "x-thin"
 _ENDED = {True: "succeeded", False: "failed", None: "not done"}

@@ -1,0 +1,230 @@
+"""Writes the page of a campaign, of what is in its folder.
+
+What stands under the heading of a campaign's page: what was run, how it went, what it took.
+
+What a campaign's folder says of it, checked as it is read: it may be another version's, or damaged.
+"""
+
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from markupsafe import Markup
+
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign_report.claims_section import claims_section, comparison_section, verdict_html
+from handover.scenarios.campaign_report.figures import draw_campaign
+from handover.scenarios.campaign_report.pairs_section import pairs_section
+from handover.scenarios.campaign_report.point_layout import layout_of
+from handover.scenarios.campaign_report.points import points_section, success_section
+from handover.scenarios.campaign_report.runs import failures_section, runs_section
+from handover.scenarios.campaign_report.settings import figures_section, setting_section
+from handover.scenarios.campaign_report.spread_section import spread_section
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.published.catalog import EXPERIMENTS
+from handover.scenarios.published.claim import Claim, verdict_counts
+from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.paper_results import PaperResults
+from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.results import draw_figures
+from handover.scenarios.reporting.page import Section, write_page
+from handover.scenarios.results.run_folder import BadRunFolder, told_if_not_written
+
+_MOST_VALUES = 10
+
+
+def campaign_lead(results: CampaignResults, claims: Sequence[Claim]) -> Markup:
+    """Return what was run, verdict, claims by verdict, and the plan in sentences."""
+    lines = [Markup("<p class='soft'>{}</p>").format(_scenario(results)), _verdict(results)]
+    for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
+        counts = verdict_counts(claims, beyond)
+        if counts:
+            told = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
+            lines.append(Markup("<p>{}: {}.</p>").format(heading, told))
+    lines.append(Markup("<p class='soft'>{}</p>").format(f"{_plan(results)} {_cost(results)}".strip()))
+    return Markup("\n").join(lines)
+
+
+def _scenario(results: CampaignResults) -> str:
+    """Tell of the scenario what the page's title does not: its name below a paper's, else what it does."""
+    if results.told.get("experiment"):
+        return f"Runs of the scenario {results.scenario}."
+    scenario = SCENARIOS.get(results.scenario)
+    return str(results.told.get("title", "" if scenario is None else scenario.title))
+
+
+def _verdict(results: CampaignResults) -> Markup:
+    ended, planned, status = len(results.table), results.planned, results.table.column("status")
+    done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
+    succeeded = sum(p.successes for p in results.points)
+    told = [f"in {succeeded} of {done} runs done the task succeeded"]
+    told += [f"{failed} failed to run"] if failed else []
+    told += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
+    sentence = "; ".join(told) + "."
+    if ended < planned:
+        begun = Markup("<b>{} of {} runs so far</b>; the same call goes on.").format(ended, planned)
+        return Markup("<p class='verdict'>{} {}</p>").format(begun, sentence[0].upper() + sentence[1:])
+    kind = " bad" if failed or lost else ""
+    number = "1 run" if planned == 1 else f"{planned} runs"
+    return Markup("<p class='verdict{}'><b>{}</b>: {}</p>").format(kind, number, sentence)
+
+
+def _plan(results: CampaignResults) -> str:
+    """Tell what was varied and how often each point was run."""
+    told = results.told
+    varied = [f"{name.replace('_', ' ')} ({_values(results, name)})" for name in results.varied]
+    points, repetitions = len(told["points"]), int(told["repetitions"])
+    parts = [f"Varied: {'; '.join(varied)}" if varied else "Nothing is varied"]
+    number = f"{points} points" if points != 1 else "One point"
+    parts.append(
+        f"{number}, {repetitions} {'run' if repetitions == 1 else 'runs'} each; campaign's seed {told['seed']}"
+    )
+    if told.get("paired"):
+        parts.append("Runs of a repetition share a seed, so that points can be compared run by run")
+    return ". ".join(parts) + "."
+
+
+def _cost(results: CampaignResults) -> str:
+    """Tell what the runs took, one added to another."""
+    if not len(results.table):
+        return ""
+    cpu, wall = (float(np.nansum(results.table.column(n).astype(np.float64))) for n in ("cpu_seconds", "wall_seconds"))
+    took = [shown_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
+    return f"The runs took {took[0]} of CPU time, and {took[1]} from begin to end, added up."
+
+
+def _values(results: CampaignResults, name: str) -> str:
+    texts = list(dict.fromkeys(values[name] for values in results.told["points"] if name in values))
+    if results.is_number(name):
+        unit = shown_unit(results.unit(name), [float(t) for t in texts])
+        shown = [f"{float(t) * unit.factor:.4g}" for t in texts]
+        symbol = f" {unit.symbol}" if unit.symbol else ""
+    else:
+        shown, symbol = [t.replace("_", " ") for t in texts], ""
+    if len(shown) > _MOST_VALUES:
+        shown = [*shown[:4], "…", shown[-1]]
+    return ", ".join(shown) + symbol
+
+
+_FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}
+_COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")
+
+
+def read_results(folder: CampaignFolder) -> CampaignResults:
+    """Read a campaign's plan and its table.
+
+    Raises:
+        BadRunFolder: it is not the folder of a campaign, or one of the files is damaged.
+    """
+    told = folder.read()
+    faults = [f"{n!r} is {told.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(told.get(n), form)]
+    if not faults and not all(isinstance(p, dict) for p in told["points"]):
+        faults = ["its points are not mappings of parameters to values"]
+    if faults:
+        raise BadRunFolder(folder.path, f"its campaign.json is damaged: {'; '.join(faults)}")
+    table = CampaignTable.read(folder.table)
+    missing = [name for name in _COLUMNS if name not in table.table.column_names]
+    if missing:
+        raise BadRunFolder(folder.path, f"its {folder.table.name} is damaged: it has no column {', '.join(missing)}")
+    return CampaignResults(told, table)
+
+
+def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
+    """Read what became of a paper's claims; none if the campaign is of none, or not that far.
+
+    Raises:
+        BadRunFolder: the file is damaged.
+    """
+    file = folder.path / "claims.json"
+    if not file.exists():
+        return ()
+    try:
+        return [Claim.from_data(entry) for entry in cast(list[Mapping[str, Any]], json.loads(file.read_bytes()))]
+    except (KeyError, TypeError, ValueError) as e:
+        fault = f"its {file.name} is damaged: {one_line(e)}; the same `handover paper` call writes it anew"
+        raise BadRunFolder(folder.path, fault) from e
+
+
+def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:
+    """Write a campaign's, or a paper's, page; the campaign need not be complete, and nothing else is written.
+
+    Args:
+        folder: the campaign's.
+        file: where the page goes; by default `report.html` in the folder, beside which the runs' pages are linked.
+
+    Raises:
+        BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
+        RecordNotWritten: there is no room.
+    """
+    with tempfile.TemporaryDirectory(prefix="handover-") as figures:
+        _write(folder, read_results(folder), read_claims(folder), None, Path(figures), file)
+
+
+def write_campaign_report(folder: CampaignFolder, file: Path | None = None, paper: PaperResults | None = None) -> None:
+    """Write the page, and the figures of the campaign and of its paper into `figures/`.
+
+    Args:
+        folder: the campaign's.
+        file: where the page goes, as of `write_campaign_page`.
+        paper: what the runs say of the paper, if that is known already.
+
+    Raises:
+        BadRunFolder, RecordNotWritten: as `write_campaign_page`.
+    """
+    results = read_results(folder)
+    claims, tables = (read_claims(folder), None) if paper is None else (paper.claims, paper.tables)
+    with told_if_not_written(folder.figures):
+        draw_campaign(results, folder.figures)
+    _write(folder, results, claims, tables, folder.figures, file)
+
+
+def _write(
+    folder: CampaignFolder,
+    results: CampaignResults,
+    claims: Sequence[Claim],
+    tables: Sequence[ComparisonTable] | None,
+    figures: Path,
+    file: Path | None,
+) -> None:
+    """Write the page; a paper's figures are drawn into a folder on the way, and its tables made if they are not."""
+    named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
+    experiment = None if named is None else named()
+    sections: list[Section | None] = [claims_section(claims)]
+    if experiment is not None and results.points:
+        sections += _published(experiment, tables, results, folder.runs, figures)
+    if results.points:
+        layout = layout_of(results)
+        sections += [success_section(results, layout), spread_section(results, layout)]
+    sections += [
+        points_section(results),
+        pairs_section(results),
+        failures_section(results, folder.path),
+        runs_section(results, folder.path),
+        setting_section(results),
+    ]
+    title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
+    write_page(file or folder.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
+
+
+def _published(
+    experiment: PublishedExperiment,
+    tables: Sequence[ComparisonTable] | None,
+    results: CampaignResults,
+    runs: Path,
+    figures: Path,
+) -> Sequence[Section | None]:
+    """Return published values beside ours, and the experiment's figures; a section that says why where it cannot."""
+    try:
+        tables = experiment.tables(results.table) if tables is None else tables
+        drawn = draw_figures(experiment, results.table, runs, figures)
+    except KeyError as e:
+        html = Markup("<p>The campaign is of another version of {}, so this is left out: its runs have no {}.</p>")
+        return [Section(anchor="comparison", title="Published and ours", html=html.format(experiment.name, e.args[0]))]
+    return [comparison_section(tables), figures_section(drawn, figures)]

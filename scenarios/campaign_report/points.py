@@ -1,0 +1,171 @@
+"""A campaign's points in numbers: successes, and the median of the metrics that matter, with intervals.
+
+How often a campaign's runs succeeded, point by point.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import Markup
+
+from handover.scenarios.campaign.campaign_results import CampaignResults, PointResults
+from handover.scenarios.campaign_report.point_layout import PointLayout
+from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
+from handover.scenarios.reporting.html import Cell, plot_html, rows_table
+from handover.scenarios.reporting.page import Section
+
+
+def points_section(results: CampaignResults) -> Section | None:
+    """Return the table of points; None if no run has ended."""
+    points = results.points
+    if not points:
+        return None
+    metrics = results.told_first
+    units = {m: shown_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
+    written = _written(results)
+    rows = [
+        (
+            *_values(results, point, written),
+            str(len(point.rows)),
+            *_success(point),
+            *(_median(results, point, m, units[m]) for m in metrics),
+        )
+        for point in points
+    ]
+    header = (
+        *(name.replace("_", " ") for name in results.varied or ("point",)),
+        "runs",
+        "successes",
+        "rate, 95 % interval",
+        *(units[m].axis(f"median {m.replace('_', ' ')}") for m in metrics),
+    )
+    first = len(header) - 3 - len(metrics)
+    told = "Of the runs done. Intervals of success rates: Clopper and Pearson"
+    told += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
+    table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
+    note = Markup("<p class='soft'>{}</p>").format(told)
+    return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
+
+
+def _written(results: CampaignResults) -> Mapping[str, ShownUnit]:
+    """Return in which unit the values of each varied number are written."""
+    texts = {n: {p.values[n] for p in results.points if n in p.values} for n in results.varied if results.is_number(n)}
+    return {name: shown_unit(results.unit(name), list(map(float, values))) for name, values in texts.items()}
+
+
+def _values(results: CampaignResults, point: PointResults, written: Mapping[str, ShownUnit]) -> list[Cell]:
+    cells: list[Cell] = []
+    for name in results.varied:
+        text = point.values.get(name)
+        if text is None:
+            cells.append(Cell("–"))
+        elif name in written:
+            cells.append(Cell(written[name].text(float(text)), float(text)))
+        else:
+            cells.append(Cell(text.replace("_", " ")))
+    return cells or [Cell("all runs")]
+
+
+def _success(point: PointResults) -> tuple[Cell, Cell]:
+    span = point.interval
+    if span is None:
+        return Cell("–", math.nan), Cell("–", math.nan)
+    told = f"{100 * point.rate:.0f} % ({100 * span.low:.0f} to {100 * span.high:.0f})"
+    return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(told, point.rate)
+
+
+def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit) -> Cell:
+    median, span = results.median(point, metric), results.median_interval(point, metric)
+    if math.isnan(median):
+        return Cell("–", math.nan)
+    told = f"{median * unit.factor:.4g}"
+    if span is not None:
+        told += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
+    return Cell(told, median)
+
+
+def _short(x: float) -> str:
+    """Write a number to three digits, as long as they show all that stands before its point."""
+    return f"{x:.3g}" if abs(x) < 999.5 else f"{x:.4g}"
+
+
+_A_SCREEN = 15
+"""Points of a list; the values of a longer one stand at its top."""
+
+
+def success_section(results: CampaignResults, layout: PointLayout) -> Section | None:
+    """Return the plot of success rates with their intervals; None if no run is done."""
+    if not any(len(p.done) for p in results.points):
+        return None
+    figure = go.Figure()
+    for group, name in enumerate(layout.group_names):
+        figure.add_trace(_rates(results, layout, group, name))
+    place_axis(figure, layout)
+    value = "xaxis" if layout.listed else "yaxis"
+    figure.update_layout({value: {"title": {"text": "success rate (%)"}, "range": [-4, 104], "dtick": 25}})
+    told = Markup("<p class='soft'>Of the runs done; bars: 95 % intervals of Clopper and Pearson.</p>")
+    return Section(
+        anchor="success",
+        title="Success",
+        html=plot_html(figure, plot_height(layout), "success rate by point, with intervals") + told,
+    )
+
+
+def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str) -> Any:
+    chosen = [k for k, p in enumerate(results.points) if layout.groups[k] == group and len(p.done)]
+    points = [results.points[k] for k in chosen]
+    rates = np.array([p.rate for p in points]) * 100.0
+    spans = [p.interval for p in points]
+    low = np.array([s.low for s in spans if s]) * 100.0
+    high = np.array([s.high for s in spans if s]) * 100.0
+    told = [
+        [results.label(p), f"{p.successes} of {len(p.done)}", f"{a:.0f} to {b:.0f} %"]
+        for p, a, b in zip(points, low, high, strict=True)
+    ]
+    bar = {"type": "data", "array": high - rates, "arrayminus": rates - low, "thickness": 1.6, "width": 4}
+    along, across = ("y", "x") if layout.listed else ("x", "y")
+    return go.Scatter(
+        {along: layout.places[chosen], across: rates, f"error_{across}": bar},
+        mode="markers",
+        marker={"size": 10, "color": f"var(--c{group})"},
+        name=name,
+        showlegend=len(layout.group_names) > 1,
+        customdata=told,
+        hovertemplate="%{customdata[0]}<br>%{customdata[1]} succeeded<br>95 %: %{customdata[2]}<extra></extra>",
+    )
+
+
+def place_axis(figure: Any, layout: PointLayout) -> None:
+    """Give a figure the axis along which points stand."""
+    axis: dict[str, Any] = {"title": {"text": layout.title}, "range": list(layout.limits)}
+    if layout.ticks is not None:
+        names = [name for _, name in layout.ticks]
+        if layout.listed:
+            names = [_broken(name) for name in names]
+        axis |= {"tickmode": "array", "tickvals": [place for place, _ in layout.ticks], "ticktext": names}
+    figure.update_layout({"yaxis" if layout.listed else "xaxis": axis})
+    if layout.listed and len(layout.places) > _A_SCREEN:
+        figure.update_layout({"xaxis": {"side": "top"}})
+
+
+def plot_height(layout: PointLayout) -> int:
+    """Return the height of a plot, in pixels, in which each point of a list has room for its name."""
+    if not layout.listed:
+        return 340
+    lines = [1 + _broken(name).count("<br>") for _, name in layout.ticks or ()]
+    return 110 + max(30, 17 * max(lines, default=1)) * len(layout.places)
+
+
+def _broken(name: str) -> str:
+    """Break a long name into lines at commas."""
+    lines = [""]
+    for part in name.split(", "):
+        if lines[-1] and len(lines[-1]) + len(part) > 24:
+            lines[-1] += ","
+            lines.append(part)
+        else:
+            lines[-1] += f", {part}" if lines[-1] else part
+    return "<br>".join(lines)

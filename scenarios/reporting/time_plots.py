@@ -1,0 +1,214 @@
+"""Draws what a scenario gives to be drawn over time.
+
+All recorded signals, to be chosen from and drawn.
+
+Few rows of a signal that look like all of them.
+"""
+
+import base64
+from collections.abc import Mapping, Sequence
+from itertools import cycle, pairwise, product
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from markupsafe import Markup
+from numpy.typing import NDArray
+from tsdownsample import MinMaxLTTBDownsampler
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.display_unit import unit_symbol
+from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
+from handover.scenarios.reporting.html import COLOURS, json_html, plot_html
+from handover.scenarios.reporting.page import Section, template
+
+Rows = NDArray[np.int64]
+
+
+def rows_of_curve(values: Floats, most: int) -> Rows:
+    """Return rows of a curve, shape (rows,), between which straight lines look like it; about `most` at the most.
+
+    Gaps (NaN) stay gaps. Rows are chosen by extremes and by the largest triangles.
+    """
+    if len(values) <= most:
+        return np.arange(len(values))
+    finite = np.isfinite(values)
+    there = np.flatnonzero(finite)
+    if len(there) > most:
+        chosen = MinMaxLTTBDownsampler().downsample(np.ascontiguousarray(values[there]), n_out=most)
+        there = there[chosen.astype(np.int64)]
+    gaps = np.flatnonzero(~finite & np.concatenate(([True], finite[:-1])))  # the first row of each
+    return np.union1d(there, gaps[:most])
+
+
+def rows_of_steps(values: Floats, most: int) -> Rows:
+    """Return the rows where a value that is held changes, the first and the last; a curve's if they are too many."""
+    if len(values) == 0:
+        return np.zeros(0, np.int64)
+    changes = changes_of(values)
+    if len(changes) > most:
+        return rows_of_curve(values, most)
+    return np.union1d(np.append(changes, 0), [len(values) - 1])
+
+
+def changes_of(values: Floats) -> Rows:
+    """Return the rows whose value is another than that before; from gap to gap (NaN) is no change."""
+    before, after = values[:-1], values[1:]
+    return np.flatnonzero((before != after) & ~(np.isnan(before) & np.isnan(after))) + 1
+
+
+TIME_AXIS = "time (s)"
+_MOST = 900
+"""Points of a curve: more than a plot has pixels for."""
+_MOST_PHASES = 200
+_DASHES = ("dash", "longdashdot")
+"""Of a plot's levels."""
+
+
+def time_plots_section(plots: Sequence[TimePlot], record: Record) -> Section | None:
+    """Return the plots below each other; None where there are none.
+
+    Raises:
+        KeyError: the record has no signal that a plot names.
+    """
+    if not plots:
+        return None
+    html = Markup("").join(
+        Markup("<h3>{}</h3>").format(p.title) + plot_html(time_figure(p, record), height=280, label=p.title)
+        for p in plots
+    )
+    return Section(anchor="time", title="Over time", html=html, scripts=("phases.js",))
+
+
+def time_figure(plot: TimePlot, record: Record) -> go.Figure:
+    """Return a plot as a figure, with its unit at the axis and at each value told; the page draws the phases."""
+    colours = _colours(plot.curves)
+    meta: dict[str, Any] = {"time": True}
+    if plot.phases:
+        meta["phases"] = _phases(record, plot.phases)
+    return go.Figure(
+        [
+            *(_trace(c, record.time, plot.unit, colour) for c, colour in zip(plot.curves, colours, strict=True)),
+            *(_level(level, record.time, plot.unit, dash) for level, dash in zip(plot.levels, cycle(_DASHES))),
+        ],
+        {
+            "meta": meta,
+            "hovermode": "x unified",
+            "showlegend": len(plot.curves) + len(plot.levels) > 1
+            or bool(plot.curves[:1] and plot.curves[0].label != plot.quantity),
+            "xaxis": {"title": {"text": TIME_AXIS}, "unifiedhovertitle": {"text": "%{x:.4~f} s"}},
+            "yaxis": {"title": {"text": _with_unit(plot)}, "exponentformat": "power",
+                      **({"type": "log", "dtick": 1} if plot.logarithmic else {"type": "linear"})},
+        },
+    )  # fmt: skip
+
+
+def _with_unit(plot: TimePlot) -> str:
+    return f"{plot.quantity} ({plot.unit})" if plot.unit else plot.quantity
+
+
+def _colours(curves: Sequence[Curve]) -> list[str]:
+    groups = list(dict.fromkeys(c.group or c.label for c in curves))
+    return [f"var(--c{groups.index(c.group or c.label) % COLOURS})" for c in curves]
+
+
+def _trace(curve: Curve, time: Floats, unit: str, colour: str) -> Any:
+    values = np.asarray(curve.values, dtype=np.float64)
+    rows = rows_of_steps(values, _MOST) if curve.held else rows_of_curve(values, _MOST)
+    drawn: dict[str, Any] = {"width": 1.2, "dash": "dot"} if curve.faint else {"width": 1.8}
+    return go.Scatter(
+        x=time[rows].astype(np.float32),
+        y=values[rows].astype(np.float32),
+        name=curve.label,
+        mode="lines",
+        line={**drawn, "color": colour, "shape": "hv" if curve.held else "linear"},
+        hovertemplate="%{y:.4~g}" + (f" {unit}" if unit else ""),
+        connectgaps=False,
+    )
+
+
+def _level(level: Level, time: Floats, unit: str, dash: str) -> Any:
+    return go.Scatter(
+        x=[float(time[0]), float(time[-1])],
+        y=[level.value, level.value],
+        name=f"{level.label}: {level.value:.4g} {unit}".rstrip(),
+        mode="lines",
+        line={"color": "var(--soft)", "width": 1.2, "dash": dash},
+        hoverinfo="skip",
+    )
+
+
+def _phases(record: Record, signal: str) -> list[dict[str, Any]]:
+    """Return when each phase began and ended, s, and its name; the longest ones where there are too many to be seen."""
+    values, names, time = record[signal], record.items(signal), record.time
+    edges = [0, *changes_of(values.astype(np.float64)).tolist(), len(time) - 1]
+    longest = sorted(pairwise(edges), key=lambda span: float(time[span[0]] - time[span[1]]))[:_MOST_PHASES]
+    return [
+        {"from": float(time[a]), "to": float(time[b]), "name": _told(names, int(values[a]))} for a, b in sorted(longest)
+    ]
+
+
+def _told(names: dict[int, str], value: int) -> str:
+    return names.get(value, str(value)).replace("_", " ").lower()
+
+
+_BUDGET = 1_400_000
+"""Bytes in the page for all signals, about."""
+_FEWEST, _MAX_EXPLORED = 60, 800
+"""Points of a scalar signal."""
+_A_POINT = 8 * 4 / 3
+"""Bytes that a point takes: time and value as float32, in base64."""
+
+
+def explorer_section(record: Record) -> Section | None:
+    """Return what draws any signal of a record; None where nothing was recorded.
+
+    A value that is held is kept exactly, as long as it does not change too often; curves by points between which
+    straight lines look like them.
+    """
+    if len(record.time) < 2 or not record.signals:
+        return None
+    columns = sum(int(np.prod(record[name].shape[1:])) for name in record.signals)
+    most = int(np.clip(_BUDGET / (_A_POINT * columns), _FEWEST, _MAX_EXPLORED))
+    time = record.time.astype(np.float32)
+    data = {
+        "span": [float(time[0]), float(time[-1])],
+        "signals": [_signal(record, name, time, most) for name in record.signals],
+    }
+    html = template("explorer.html").render(data=json_html(data), scalars=columns, rows=len(time), most=most)
+    return Section(anchor="signals", title="All signals", html=Markup(html), scripts=("explorer.js",))
+
+
+def _signal(record: Record, name: str, time: NDArray[np.float32], most: int) -> dict[str, Any]:
+    values = record[name]
+    flat = values.reshape(len(values), -1).astype(np.float64)
+    return {
+        "name": name,
+        "unit": unit_symbol(record.unit(name)),
+        "about": record.description(name),
+        "items": record.items(name) or ({0: "false", 1: "true"} if values.dtype == np.bool_ else {}),
+        "columns": [
+            {"of": of, **_column(flat[:, k], time, most)} for k, of in enumerate(_subscripts(values.shape[1:]))
+        ],
+    }
+
+
+def _subscripts(shape: tuple[int, ...]) -> list[str]:
+    """Return the subscripts of an array's elements, counted from 1 as in a record; [""] for a scalar."""
+    return [",".join(str(i + 1) for i in index) for index in product(*map(range, shape))]
+
+
+def _column(values: Floats, time: NDArray[np.float32], most: int) -> Mapping[str, Any]:
+    """Return a scalar signal as the page draws it: one value, steps, or a curve."""
+    changes = changes_of(values)
+    if len(changes) == 0:
+        return {"value": float(values[0]) if np.isfinite(values[0]) else None}
+    held = len(changes) < 0.7 * len(values)
+    few = held and len(changes) < most
+    rows = np.union1d(changes, [0, len(values) - 1]) if few else rows_of_curve(values, most)
+    return {"t": _packed(time[rows]), "y": _packed(values[rows].astype(np.float32)), "held": held}
+
+
+def _packed(values: NDArray[np.float32]) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode()

@@ -1,0 +1,1 @@
+"""A run's folder, written and read; its summary is made here, in one place."""
