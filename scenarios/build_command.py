@@ -14,8 +14,8 @@ from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_cur
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, UnusableText
-from handover.scenarios.bad_call import BadCall, told_in_one_line
-from handover.scenarios.interruption import Interruption
+from handover.scenarios.execution.errors import BadCall, told_in_one_line
+from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.own_unit import own_unit
 from handover.scenarios.results.run_folder import BadRunFolder, check_place
 

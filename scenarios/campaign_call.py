@@ -11,21 +11,17 @@ from typing import NoReturn
 import click
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.scenarios.bad_call import BadCall, RunNotWritten, WorkersLost, told_in_one_line
-from handover.scenarios.campaign.bad_crew import CrewLost
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
-from handover.scenarios.campaign.campaign_place import place_of
 from handover.scenarios.campaign.campaign_progress import CampaignProgress, told_done
-from handover.scenarios.campaign.campaign_table import CampaignTable
-from handover.scenarios.campaign.crew import Crew
-from handover.scenarios.campaign.late_crew import LateCrew
+from handover.scenarios.campaign.folder import CampaignFolder, place_of
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import PreparedPlan, prepared
-from handover.scenarios.campaign.tally import Tally
-from handover.scenarios.campaign.workforce import Workforce
-from handover.scenarios.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
+from handover.scenarios.campaign.pool_config import LateCrew, Workforce
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.worker_pool import Crew, Tally
+from handover.scenarios.execution.errors import BadCall, CrewLost, RunNotWritten, WorkersLost, told_in_one_line
+from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
 
 Finish = Callable[[CampaignFolder, CampaignTable], None]
 """Writes what is made of a campaign that has come to its end."""

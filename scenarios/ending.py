@@ -5,10 +5,9 @@ from typing import NoReturn
 
 import click
 
-from handover.scenarios.ended import Ended
-from handover.scenarios.exit_status import TASK_FAILED, UNIT_FAILED
+from handover.scenarios.execution.exit_status import TASK_FAILED, UNIT_FAILED
+from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.listing import print_summary
-from handover.scenarios.task import Task
 
 
 def end_with(ended: Ended, task: Task) -> NoReturn:

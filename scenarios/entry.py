@@ -3,12 +3,12 @@
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-from handover.scenarios.exit_status import ABORTED
+from handover.scenarios.execution.exit_status import ABORTED
 from handover.scenarios.standard_streams import open_standard_streams
 
 if TYPE_CHECKING:
     from handover.cosim.fmu.heartbeat import Heartbeat
-    from handover.scenarios.forked_child import ChildEnd
+    from handover.scenarios.execution.child_process import ChildEnd
 
 _SUPERVISED = ("run", "resume")
 """Commands that load units, which may end the process that they are in."""
@@ -19,7 +19,7 @@ def main() -> None:
     open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
-            from handover.scenarios.supervisor import can_supervise, run_to_end, supervise
+            from handover.scenarios.execution.supervisor import can_supervise, run_to_end, supervise
 
             if can_supervise():
                 supervise(_command, _report_crash)

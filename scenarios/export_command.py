@@ -8,10 +8,10 @@ import click
 from handover.cosim.ssp.writing import write_ssp
 from handover.fmus.build import cached
 from handover.fmus.fmi2_description import NoFmi2Form
-from handover.scenarios.bad_call import BadCall, told_in_one_line
-from handover.scenarios.chosen import fmus_of, replacements, scenario_named
+from handover.scenarios.execution.errors import BadCall, told_in_one_line
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.interruption import Interruption
 from handover.scenarios.results.run_folder import check_place
 from handover.scenarios.scenario_arguments import scenario_options
 

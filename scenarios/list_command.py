@@ -10,9 +10,9 @@ from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS, Entry, import_block
-from handover.scenarios.bad_call import BadCall
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.console import open_console, print_rows
+from handover.scenarios.execution.errors import BadCall
 from handover.scenarios.experiment.experiment import Experiment
 
 

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Sequence
 
 from handover.scenarios.console import open_console, print_rows
-from handover.scenarios.ended import Ended
+from handover.scenarios.execution.task import Ended
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tables import pace_rows, told, told_conversion
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.scenarios.bad_call import BadCall
+from handover.scenarios.execution.errors import BadCall
 from handover.scenarios.headed_options import HeadedOption
 from handover.scenarios.seconds import Seconds
 

@@ -9,7 +9,7 @@ from handover.cosim.blocks.description import describe
 from handover.cosim.exceptions import one_line
 from handover.fmus.catalog import Entry, UnknownBlock, import_block
 from handover.fmus.sources import closure
-from handover.scenarios.bad_call import BadCall
+from handover.scenarios.execution.errors import BadCall
 
 _STEP = Fraction(1, 100)  # s, of a block that is not sampled
 

@@ -13,18 +13,17 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.exceptions import nearest
-from handover.scenarios.bad_call import BadCall
 from handover.scenarios.campaign_arguments import campaign_options
 from handover.scenarios.campaign_call import call_campaign, workforce_of
 from handover.scenarios.console import open_console
+from handover.scenarios.execution.errors import BadCall
 from handover.scenarios.headed_options import HeadedCommand
 from handover.scenarios.results.run_folder import BadRunFolder
 
 if TYPE_CHECKING:
-    from handover.scenarios.campaign.campaign_folder import CampaignFolder
-    from handover.scenarios.campaign.campaign_table import CampaignTable
-    from handover.scenarios.published.paper_results import PaperResults
-    from handover.scenarios.published.published_experiment import PublishedExperiment
+    from handover.scenarios.campaign.folder import CampaignFolder
+    from handover.scenarios.campaign.table import CampaignTable
+    from handover.scenarios.published.published_experiment import PaperResults, PublishedExperiment
 
 _HELP = """Carry out a paper's EXPERIMENT, and put what comes out beside what was published.
 
@@ -91,8 +90,7 @@ class _Finish:
 
     def __call__(self, folder: CampaignFolder, table: CampaignTable) -> None:
         from handover.scenarios.campaign_report.campaign_page import write_campaign_report
-        from handover.scenarios.published.paper_results import PaperResults
-        from handover.scenarios.published.results import draw_figures, write_claims
+        from handover.scenarios.published.published_experiment import PaperResults, draw_figures, write_claims
 
         try:
             self.results = PaperResults.of(self._experiment, table)

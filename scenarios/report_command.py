@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.bad_call import BadCall, told_in_one_line
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.execution.errors import BadCall, told_in_one_line
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 _HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
@@ -44,7 +44,7 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
 
 
 def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> None:
-    from handover.scenarios.campaign.left_table import complete_table
+    from handover.scenarios.campaign.table_writer import complete_table
     from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 
     complete_table(campaign)
@@ -52,7 +52,7 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> N
 
 
 def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
-    from handover.scenarios.left_run import complete_signals
+    from handover.scenarios.execution.resume import complete_signals
     from handover.scenarios.reporting.run_figures import draw_run
     from handover.scenarios.reporting.run_page import write_run_page
     from handover.scenarios.results.run_facts import RunFacts

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from handover.scenarios.bad_call import BadCall
+from handover.scenarios.execution.errors import BadCall
 from handover.scenarios.headed_options import HeadedOption
 from handover.scenarios.seconds import Seconds
 

@@ -7,15 +7,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_table import CampaignTable
-from handover.scenarios.campaign.crew import Crew
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
 from handover.scenarios.campaign.plan_check import PreparedPlan
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
-from handover.scenarios.campaign.run_row import RunRow, row_of
+from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter
-from handover.scenarios.campaign.tally import OnTally, Tally
+from handover.scenarios.campaign.worker_pool import Crew, OnTally, RunAnswer, RunOrder, Tally
 from handover.scenarios.results.run_folder import told_if_not_written
 
 

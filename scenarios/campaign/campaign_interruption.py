@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator
 from functools import partial
 from types import FrameType, TracebackType
 
-from handover.scenarios.exit_status import ABORTED
-from handover.scenarios.supervisor import leave
+from handover.scenarios.execution.exit_status import ABORTED
+from handover.scenarios.execution.supervisor import leave
 
 _SIGNALS = [n for n in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
 

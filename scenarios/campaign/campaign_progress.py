@@ -9,7 +9,7 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.campaign.worker_pool import Tally
 
 _PAUSE = 30.0
 """Seconds from line to line where there is no terminal."""

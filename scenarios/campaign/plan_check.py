@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 from handover.cosim.master.master import Master
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
-from handover.scenarios.chosen import fmus_of, replacements, scenario_named
+from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import BadParameter, parse_parameters, text_of
 

@@ -23,8 +23,7 @@ from typing import BinaryIO, NoReturn
 
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.fmus.catalog import UNITS, import_block
-from handover.scenarios import supervisor
-from handover.scenarios.campaign.ordered_run import (
+from handover.scenarios.campaign.run_job import (
     answer_of,
     carry_out_order,
     finish,
@@ -32,11 +31,12 @@ from handover.scenarios.campaign.ordered_run import (
     printing_to,
     refuse_order,
 )
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.death import Death
-from handover.scenarios.forked_child import ChildEnd, ForkedChild
-from handover.scenarios.resumption import Spent
+from handover.scenarios.execution import supervisor
+from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
+from handover.scenarios.execution.crash import Death
+from handover.scenarios.execution.resumption import Spent
 
 IDLE = 60.0
 """Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""

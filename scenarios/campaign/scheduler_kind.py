@@ -7,7 +7,7 @@ from distributed.comm.registry import backends
 from distributed.core import rpc
 from distributed.security import Security
 
-from handover.scenarios.campaign.asked_aside import asked_aside
+from handover.scenarios.campaign.cluster import asked_aside
 
 PROTOCOLS = tuple(p for p in backends if p != "inproc")
 """Those that Dask has here."""

@@ -15,9 +15,9 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_results import CampaignResults
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.results import CampaignResults
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.claims_section import claims_section, comparison_section, verdict_html
 from handover.scenarios.campaign_report.figures import draw_campaign
 from handover.scenarios.campaign_report.pairs_section import pairs_section
@@ -29,11 +29,14 @@ from handover.scenarios.campaign_report.spread_section import spread_section
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.display_unit import shown_unit
 from handover.scenarios.published.catalog import EXPERIMENTS
-from handover.scenarios.published.claim import Claim, verdict_counts
-from handover.scenarios.published.comparison_table import ComparisonTable
-from handover.scenarios.published.paper_results import PaperResults
-from handover.scenarios.published.published_experiment import PublishedExperiment
-from handover.scenarios.published.results import draw_figures
+from handover.scenarios.published.published_experiment import (
+    Claim,
+    ComparisonTable,
+    PaperResults,
+    PublishedExperiment,
+    draw_figures,
+    verdict_counts,
+)
 from handover.scenarios.reporting.page import Section, write_page
 from handover.scenarios.results.run_folder import BadRunFolder, told_if_not_written
 

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
-from handover.scenarios.published.claim import Claim, Verdict
-from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, Verdict
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section
 

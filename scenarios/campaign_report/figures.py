@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.statistics import Interval
 from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of
 from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.experiment.display_unit import shown_unit
 
 _MOST_COLOURS = 6

@@ -11,7 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from handover.scenarios.campaign.campaign_results import CampaignResults, PointResults
+from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign_report.point_layout import PointLayout
 from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
 from handover.scenarios.reporting.html import Cell, plot_html, rows_table

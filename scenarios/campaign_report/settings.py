@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from markupsafe import Markup
 
-from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.experiment.display_unit import shown_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.reporting.html import rows_table

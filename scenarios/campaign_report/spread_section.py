@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign_report.point_layout import PointLayout
 from handover.scenarios.campaign_report.points import place_axis, plot_height
 from handover.scenarios.experiment.display_unit import shown_unit

@@ -4,18 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.parameters import Place, Tuning
-from handover.scenarios.published.claim import Claim
-from handover.scenarios.published.comparison_table import ComparisonTable
-from handover.scenarios.published.helix_1_arm import Helix1Arm
 from handover.scenarios.published.helix_1_claims import own_claims, thesis_claims
 from handover.scenarios.published.helix_1_figures import draw_errors, draw_times
+from handover.scenarios.published.helix_1_runs import Helix1Arm
 from handover.scenarios.published.helix_1_tables import by_place, fig_9, steps, table_1
-from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 
 _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s: as long as the scenario allows; the longest published is 214.9."""

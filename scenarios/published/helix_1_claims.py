@@ -1,16 +1,141 @@
-"""What `helix-1` says of the claims about table 1 and fig. 9 of [Vervloet2025]; each rule was laid down before runs."""
+"""What `helix-1` says of the claims about table 1 and fig. 9 of [Vervloet2025]; each rule was laid down before runs.
 
+What `helix-1` says of the claims about the arm's time, table 1 of [Vervloet2025].
+"""
+
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.stats import page_trend_test, ttest_ind_from_stats
 
-from handover.scenarios.campaign.statistics import FEWEST, success_interval, time_interval, two_proportions
-from handover.scenarios.published.claim import Claim, Verdict
-from handover.scenarios.published.helix_1_arm import Helix1Arm
-from handover.scenarios.published.helix_1_telling import published, too_few
-from handover.scenarios.published.helix_1_time_claims import time_claims
-from handover.scenarios.published.ratio_interval import ratio_interval
-from handover.scenarios.published.telling import told_p
+from handover.scenarios.campaign.statistics import FEWEST, LEVEL, success_interval, time_interval, two_proportions
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.published.helix_1_runs import Helix1Arm, missing, published, too_few
+from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.published.verdicts import ratio_interval, told_p
+
+
+def time_claims(arm: Helix1Arm) -> list[Claim]:
+    """Judge order, ratios, means and spreads of the times until the gripper begins to close."""
+    halved = [_halves(arm, small, large) for small, large in pairwise(arm.alphas)]
+    return [_falls(arm), *halved, *(_takes(arm, alpha) for alpha in arm.alphas), _narrows(arm)]
+
+
+def _falls(arm: Helix1Arm) -> Claim:
+    medians = published()["arm_time_median"]
+    told: dict[str, Any] = {
+        "claim": "The arm's time falls with the step size",
+        "published": " > ".join(f"{m:.1f}" for m in medians) + " s (medians)",
+        "where": "table 1, sec. 5.1",
+    }
+    blocks = arm.blocks()
+    if len(blocks) < 2:
+        return too_few(told, f"{len(blocks)} places with runs at every step size")
+    p = float(page_trend_test(blocks[:, ::-1], method="exact").pvalue)
+    ours = np.median(blocks, axis=0)
+    falls = bool(np.all(ours[:-1] > ours[1:])) and p < LEVEL
+    return Claim(
+        **told,
+        measured=", ".join(f"{m:.1f}" if np.isfinite(m) else "never" for m in ours) + " s (medians)",
+        verdict=Verdict.REPRODUCED if falls else Verdict.NOT_REPRODUCED,
+        reason=f"Reproduced if the medians fall, and Page's exact test of a trend within places rejects: p = "
+        f"{told_p(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as longer "
+        "than any.",
+    )
+
+
+def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
+    medians, half = published()["arm_time_median"], published()["halving"]
+    i, j = arm.alphas.index(small), arm.alphas.index(large)
+    told: dict[str, Any] = {
+        "claim": f"Doubling the step size from {small} to {large} about halves the arm's time",
+        "published": f"{medians[i] / medians[j]:.2f} times (medians)",
+        "where": "sec. 5.1",
+    }
+    x, y = arm.times(small), arm.times(large)
+    if min(len(x), len(y)) < FEWEST:
+        return too_few(told, f"{len(x)} and {len(y)} runs")
+    interval = ratio_interval(x, y, np.median)
+    if interval is None:
+        return too_few(told, "no times to divide by")
+    low, high = interval
+    halves, stays = low <= half <= high, low <= 1.0 <= high
+    verdict = Verdict.REPRODUCED if halves else Verdict.NOT_REPRODUCED
+    return Claim(
+        **told,
+        measured=f"{np.median(x) / np.median(y):.2f} times (medians)",
+        interval=interval,
+        verdict=Verdict.NOT_COMPARABLE if halves and stays else verdict,
+        reason=f"Reproduced if the bootstrap's interval of the ratio of medians holds {half:g} and not 1; not "
+        f"comparable if it holds both, as the runs are then too few to tell.{missing(arm, small, large)}",
+    )
+
+
+def _takes(arm: Helix1Arm, alpha: float) -> Claim:
+    told_there, i = published(), arm.alphas.index(alpha)
+    mean, std, median = (told_there[f"arm_time_{name}"][i] for name in ("mean", "std", "median"))
+    told: dict[str, Any] = {
+        "claim": f"At step size {alpha} the arm takes {mean} s on average",
+        "published": f"{mean} ± {std} s (median {median} s)",
+        "where": "table 1",
+    }
+    x = arm.times(alpha)
+    interval = time_interval(x, np.mean)
+    if interval is None:
+        return too_few(told, f"{len(x)} runs")
+    ours = float(np.mean(x)), float(np.std(x, ddof=1))
+    p = float(ttest_ind_from_stats(*ours, len(x), mean, std, told_there["runs"], equal_var=False).pvalue)
+    return Claim(
+        **told,
+        measured=f"{ours[0]:.1f} ± {ours[1]:.1f} s (median {np.median(x):.1f} s)",
+        interval=(interval.low, interval.high),
+        unit="s",
+        verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
+        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {told_p(p)}, {len(x)} runs against "
+        f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
+        f"{_stall(arm, alpha)}",
+    )
+
+
+def _stall(arm: Helix1Arm, alpha: float) -> str:
+    """Tell of a step size at which the error can stall above the threshold."""
+    settings = paper_values("helix_handover", arm.tuning.name.lower())
+    stall = round(settings["epsilon_pose_bound"] / alpha, 6)
+    if settings["epsilon_control"] > settings["epsilon_pose_bound"] or stall < settings["threshold_grasp"]:
+        return ""
+    return (
+        f" At this step size the error can stall near ε_pose,bound / α = {1000 * stall:.0f} mm, the threshold, and the "
+        "last digits of two equal bounds decide whether it does: see the note on control steps."
+    )
+
+
+def _narrows(arm: Helix1Arm) -> Claim:
+    std = published()["arm_time_std"]
+    told: dict[str, Any] = {
+        "claim": "The spread of the arm's time falls with the step size",
+        "published": " > ".join(f"{s:.1f}" for s in std) + " s (standard deviations)",
+        "where": "table 1",
+    }
+    times = [arm.times(alpha) for alpha in arm.alphas]
+    if min(map(len, times)) < FEWEST:
+        return too_few(told, f"{min(map(len, times))} runs at a step size")
+    interval = ratio_interval(times[-1], times[0], _spread)
+    ours = [float(np.std(x, ddof=1)) for x in times]
+    narrows = all(a > b for a, b in pairwise(ours)) and interval is not None and interval[1] < 1.0
+    return Claim(
+        **told,
+        measured=", ".join(f"{s:.1f}" for s in ours) + " s (standard deviations)",
+        interval=interval,
+        verdict=Verdict.REPRODUCED if narrows else Verdict.NOT_REPRODUCED,
+        reason="Reproduced if the standard deviations fall and the bootstrap's interval of the ratio of the last to "
+        f"the first lies below 1.{missing(arm, *arm.alphas)}",
+    )
+
+
+def _spread(values: Any, axis: int = -1) -> Any:
+    return np.std(values, axis=axis, ddof=1)
+
 
 _READING = 0.01
 """What the lengths of fig. 9 are told to, m."""

@@ -14,8 +14,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.published.helix_1_arm import Helix1Arm
-from handover.scenarios.published.helix_1_telling import published
+from handover.scenarios.published.helix_1_runs import Helix1Arm, published
 
 _TICKS = (10, 20, 50, 100, 200, 500)
 _PUBLISHED = COLOURS[5]

@@ -7,10 +7,9 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import Statistic
 from handover.scenarios.helix.parameters import Place, Tuning
-from handover.scenarios.published.comparison_table import ComparisonTable
-from handover.scenarios.published.helix_1_arm import Helix1Arm
-from handover.scenarios.published.helix_1_telling import published
-from handover.scenarios.published.telling import told_median
+from handover.scenarios.published.helix_1_runs import Helix1Arm, published
+from handover.scenarios.published.published_experiment import ComparisonTable
+from handover.scenarios.published.verdicts import told_median
 
 _ON_EQUAL_BOUNDS = (
     " The thesis's ε_pose,bound and ε_control are both 5 mm. One iteration of the Jacobian loop leaves about "

@@ -5,18 +5,21 @@ from pathlib import Path
 from typing import ClassVar
 
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.published.claim import Claim
-from handover.scenarios.published.comparison_table import ComparisonTable
-from handover.scenarios.published.ir_table_claims import closing_claims, further_claims, order_claims, rate_claims
-from handover.scenarios.published.ir_table_distances import distance_claims
+from handover.scenarios.published.ir_table_claims import (
+    closing_claims,
+    distance_claims,
+    further_claims,
+    order_claims,
+    rate_claims,
+)
 from handover.scenarios.published.ir_table_figures import draw_table
 from handover.scenarios.published.ir_table_runs import ARMS, IrTableRuns
 from handover.scenarios.published.ir_table_tables import tables_of
-from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 
 _REPETITIONS, _QUICK = 16, 3
 """Runs of a cell: with 80 of a pose and an arm an interval is at most 23 points wide; the paper has three."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 

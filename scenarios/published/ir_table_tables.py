@@ -8,7 +8,6 @@ from handover.controllers.ir_grasp.ir_reflex import Stop
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.statistics import LEVEL, paired_test, success_interval, two_proportions
 from handover.scenarios.ir_grasp.plots import FINGER_NAMES
-from handover.scenarios.published.comparison_table import ComparisonTable
 from handover.scenarios.published.ir_table_runs import (
     ARMS,
     BLIND,
@@ -20,7 +19,8 @@ from handover.scenarios.published.ir_table_runs import (
     Count,
     IrTableRuns,
 )
-from handover.scenarios.published.telling import told_interval, told_median, told_p, told_share
+from handover.scenarios.published.published_experiment import ComparisonTable
+from handover.scenarios.published.verdicts import told_interval, told_median, told_p, told_share
 
 _TITLES = {
     Thing.CYLINDER: "cylinder",

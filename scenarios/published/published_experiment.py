@@ -1,15 +1,132 @@
-"""An experiment of a paper: the campaign that it needs, and what its runs say of the paper's claims."""
+"""An experiment of a paper: the campaign that it needs, and what its runs say of the paper's claims.
+
+What a paper claims, and how the campaign's runs bear on it.
+
+A table of published values beside the campaign's.
+
+What a campaign's runs say of the paper that it is of.
+
+What a published experiment leaves in its campaign's folder.
+"""
 
 import abc
-from collections.abc import Sequence
+import enum
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.published.claim import Claim
-from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.results.run_folder import told_if_not_written, write_whole
+
+
+class Verdict(str, enum.Enum):
+    """What became of a claim."""
+
+    REPRODUCED = "reproduced"
+    NOT_REPRODUCED = "not reproduced"
+    NOT_COMPARABLE = "not comparable"
+
+
+_BEYOND = {
+    Verdict.REPRODUCED: "holds",
+    Verdict.NOT_REPRODUCED: "does not hold",
+    Verdict.NOT_COMPARABLE: "too few runs",
+}
+"""Verdicts in words on claims that nobody has published."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """A claim with its verdict, which follows from a rule that was laid down before the runs.
+
+    Attributes:
+        claim: what is claimed, in a sentence.
+        published: the figure as printed, with its unit.
+        measured: the campaign's figure, with its unit.
+        verdict: what became of it.
+        reason: by which rule the verdict, in sentences.
+        interval: confidence interval of what was measured, in `unit`; None if there is none.
+        unit: of the interval.
+        where: place in the paper.
+        beyond: whether the claim is this project's own and no paper's.
+    """
+
+    claim: str
+    published: str
+    measured: str
+    verdict: Verdict
+    reason: str
+    interval: tuple[float, float] | None = None
+    unit: str = "1"
+    where: str = ""
+    beyond: bool = False
+
+    @property
+    def told_verdict(self) -> str:
+        """The verdict in words: that of a claim which nobody has published says whether it holds."""
+        return _BEYOND[self.verdict] if self.beyond else self.verdict.value
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as JSON can hold it."""
+        return {
+            "claim": self.claim,
+            "published": self.published,
+            "measured": self.measured,
+            "interval": None if self.interval is None else list(self.interval),
+            "unit": self.unit,
+            "verdict": self.verdict.value,
+            "reason": self.reason,
+            "where": self.where,
+            "beyond": self.beyond,
+        }
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> "Claim":
+        """Return the claim that `as_data` told.
+
+        Raises:
+            KeyError, TypeError, ValueError: it is of another form.
+        """
+        interval = data["interval"]
+        rest: dict[str, Any] = {k: v for k, v in data.items() if k not in ("interval", "verdict")}
+        low_high = None if interval is None else (float(interval[0]), float(interval[1]))
+        return cls(interval=low_high, verdict=Verdict(data["verdict"]), **rest)
+
+
+def verdict_counts(claims: Sequence[Claim], beyond: bool) -> Sequence[tuple[int, Verdict, str]]:
+    """Return how many of a paper's claims, or of those beyond it, have each verdict that occurs, with its words."""
+    told = [(c.verdict, c.told_verdict) for c in claims if c.beyond is beyond]
+    return [(told.count(t), *t) for t in sorted(set(told), key=lambda t: list(Verdict).index(t[0]))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparisonTable:
+    """Rows of texts below a header of as many.
+
+    Attributes:
+        title: what it compares.
+        header: names of the columns; the first column names what a row is of.
+        rows: texts; "" where there is nothing to tell.
+        note: how its figures were made, in sentences.
+
+    Raises:
+        ValueError: a row is longer or shorter than the header.
+    """
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.header):
+                raise ValueError(f"{self.title}: row {list(row)} has {len(row)} cells, the header {len(self.header)}")
 
 
 class PublishedExperiment(abc.ABC):
@@ -41,3 +158,41 @@ class PublishedExperiment(abc.ABC):
             runs: where the folders of its runs are.
             folder: where the figures go.
         """
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperResults:
+    """The claims with their verdicts, and published values beside the campaign's."""
+
+    claims: Sequence[Claim]
+    tables: Sequence[ComparisonTable]
+
+    @classmethod
+    def of(cls, experiment: PublishedExperiment, table: CampaignTable) -> "PaperResults":
+        """Judge the claims and fill in the tables.
+
+        Raises:
+            KeyError: the table is of another version of the experiment, and lacks a column.
+        """
+        return cls(claims=experiment.claims(table), tables=experiment.tables(table))
+
+
+def write_claims(claims: Sequence[Claim], folder: CampaignFolder) -> None:
+    """Write `claims.json`, a list of claims.
+
+    Raises:
+        RecordNotWritten: it cannot be written.
+    """
+    told = [claim.as_data() for claim in claims]
+    write_whole(folder.path / "claims.json", json.dumps(told, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+def draw_figures(experiment: PublishedExperiment, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
+    """Draw the figures into a folder, of runs whose folders are in `runs`; return them in the order of a page.
+
+    Raises:
+        RecordNotWritten: there is no room.
+    """
+    with told_if_not_written(folder):
+        folder.mkdir(exist_ok=True)
+        return experiment.draw(table, runs, folder)

@@ -5,12 +5,16 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.console import open_console
-from handover.scenarios.published.claim import Claim, Verdict, verdict_counts
-from handover.scenarios.published.comparison_table import ComparisonTable
-from handover.scenarios.published.paper_results import PaperResults
-from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.published_experiment import (
+    Claim,
+    ComparisonTable,
+    PaperResults,
+    PublishedExperiment,
+    Verdict,
+    verdict_counts,
+)
 
 _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red", Verdict.NOT_COMPARABLE: "bold"}
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from handover.cosim.record.reader import Record, RecordedSignals
+from handover.scenarios.execution.ssp_run import draw_outputs
 from handover.scenarios.experiment.experiment import Figure, Watch
 from handover.scenarios.experiment.parameters import BadParameter, parameters_of
 from handover.scenarios.results.pictures import read_pictures
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import BadRunFolder, RunFolder, told_if_not_written
-from handover.scenarios.ssp_run import draw_outputs
 
 
 def draw_run(folder: RunFolder) -> Sequence[Figure]:

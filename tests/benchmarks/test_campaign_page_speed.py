@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.run_row import RunRow
+from handover.scenarios.campaign.table import RunRow
 from handover.scenarios.campaign.table_writer import table_of
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.experiment.experiment import Metric

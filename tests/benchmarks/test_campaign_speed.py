@@ -20,9 +20,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
-from handover.scenarios.campaign.crew import Crew
-from handover.scenarios.campaign.dask_crew import embedded_crew
-from handover.scenarios.campaign.run_order import RunOrder
+from handover.scenarios.campaign.local_cluster import embedded_crew
+from handover.scenarios.campaign.worker_pool import Crew, RunOrder
 from handover.scenarios.catalog import SCENARIOS
 
 pytestmark = pytest.mark.slow

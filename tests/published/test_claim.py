@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from handover.scenarios.published.claim import Claim, Verdict, verdict_counts
-from handover.scenarios.published.comparison_table import ComparisonTable
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, Verdict, verdict_counts
 
 CLAIM = Claim(
     claim="It holds.",

@@ -10,13 +10,12 @@ import tomli
 from grasp_table import grasp_table
 
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import PlannedRun
-from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.ir_table import IrTable
-from handover.scenarios.published.ir_table_claims import closing_claims, rate_claims
-from handover.scenarios.published.ir_table_distances import distance_claims
+from handover.scenarios.published.ir_table_claims import closing_claims, distance_claims, rate_claims
 from handover.scenarios.published.ir_table_runs import BLIND, FORWARD_35, REFLEX, IrTableRuns
+from handover.scenarios.published.published_experiment import Claim, Verdict
 
 TUNED = range(1000, 1008)
 """Seeds with which the scenario was tuned."""

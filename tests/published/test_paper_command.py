@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.command import main

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from handover.scenarios.published.ratio_interval import ratio_interval
+from handover.scenarios.published.verdicts import ratio_interval
 
 
 def test_the_interval_holds_the_ratio_and_narrows_with_more_values():

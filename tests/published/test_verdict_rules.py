@@ -3,8 +3,8 @@
 import pytest
 
 from handover.scenarios.campaign.statistics import success_interval
-from handover.scenarios.published.claim import Verdict
-from handover.scenarios.published.verdict_rules import (
+from handover.scenarios.published.published_experiment import Verdict
+from handover.scenarios.published.verdicts import (
     FEW,
     fewest_for,
     majority_claim,

@@ -10,13 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_results import CampaignResults
-from handover.scenarios.campaign.campaign_table import CampaignTable
-from handover.scenarios.campaign.ordered_run import carry_out_order
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.results import CampaignResults
+from handover.scenarios.campaign.run_job import carry_out_order
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
 
 
 @dataclass

@@ -10,9 +10,9 @@ import pyarrow as pa
 import pytest
 from campaigns import folder_of, table_of, told
 
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
-from handover.scenarios.published.claim import Claim, Verdict
+from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.results.run_folder import BadRunFolder
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]

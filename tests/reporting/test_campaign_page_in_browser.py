@@ -7,7 +7,7 @@ from campaigns import carried_out
 from opened_page import opened, overflow, wait_until
 from playwright.sync_api import Browser
 
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 

@@ -7,7 +7,7 @@ import pytest
 from campaigns import folder_of, table_of, told
 from click.testing import CliRunner
 
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.command import main
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]

@@ -5,7 +5,7 @@ import math
 import pytest
 from campaigns import results_of
 
-from handover.scenarios.campaign.campaign_results import CampaignResults
+from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.statistics import time_interval
 
 

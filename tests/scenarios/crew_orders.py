@@ -6,7 +6,7 @@ from pathlib import Path
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import build_block, cached
-from handover.scenarios.campaign.run_order import RunOrder
+from handover.scenarios.campaign.worker_pool import RunOrder
 from handover.scenarios.catalog import SCENARIOS
 
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 if __name__ == "__main__":
-    from handover.scenarios.campaign.dask_crew import crew_at, embedded_crew
+    from handover.scenarios.campaign.local_cluster import crew_at, embedded_crew
 
     orders = pickle.loads(Path(sys.argv[1]).read_bytes())
     try:

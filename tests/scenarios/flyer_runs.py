@@ -4,13 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from handover.fmus.build import cached
-from handover.scenarios.ended import Ended
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.interruption import Interruption
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.runner import carry_out
-from handover.scenarios.task import Task
 
 
 def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:

@@ -5,8 +5,8 @@ import shutil
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from handover.scenarios.campaign.ordered_run import carry_out_order
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.run_job import carry_out_order
+from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
 
 
 class OwnCrew:

@@ -10,7 +10,7 @@ from typing import Any
 
 import psutil
 
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.table import CampaignTable
 
 _ENTRY = [sys.executable, "-c", "from handover.scenarios.entry import main; main()"]
 Going = subprocess.Popen[str]

@@ -5,7 +5,7 @@ from collections.abc import Generator
 
 import pytest
 
-from handover.scenarios.campaign.asked_aside import asked_aside
+from handover.scenarios.campaign.cluster import asked_aside
 
 
 @pytest.fixture

@@ -11,12 +11,11 @@ import pytest
 from own_crew import OwnCrew
 
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
-from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder, Tally
 
 PLAN = CampaignPlan(
     scenario="ir_grasp",

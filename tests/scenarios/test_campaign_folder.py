@@ -11,10 +11,9 @@ import pytest
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.record.file_lock import folder_locked
 from handover.cosim.stepping.options import Algorithm, MasterOptions
-from handover.scenarios.campaign.bad_crew import BadCrew
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_place import place_of
+from handover.scenarios.campaign.folder import CampaignFolder, place_of
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.execution.errors import BadCrew
 from handover.scenarios.results.run_folder import BadRunFolder
 
 PLAN = CampaignPlan(

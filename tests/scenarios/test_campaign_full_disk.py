@@ -15,14 +15,13 @@ from click.testing import CliRunner, Result
 from own_crew import OwnCrew
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios import supervisor
-from handover.scenarios.campaign import dask_crew
-from handover.scenarios.campaign.campaign_table import CampaignTable
-from handover.scenarios.campaign.cluster_crew import ClusterCrew
-from handover.scenarios.campaign.crew import Crew
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign import local_cluster
+from handover.scenarios.campaign.cluster import ClusterCrew
 from handover.scenarios.campaign.run_server import RunServer
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.worker_pool import Crew, RunAnswer, RunOrder
 from handover.scenarios.command import main
+from handover.scenarios.execution import supervisor
 
 CALL = ["sweep", "ir_grasp", "-p", "strategy=forward", "--repeat", "3", "--out", "c", "--no-report", "--workers", "2"]
 BEGINNING = "3 runs of ir_grasp on 2 workers into c\n"
@@ -42,7 +41,7 @@ def sweep(monkeypatch: pytest.MonkeyPatch, crew: Crew) -> Result:
     def given(_workers: int | None) -> Generator[Crew, None, None]:
         yield crew
 
-    monkeypatch.setattr(dask_crew, "embedded_crew", given)
+    monkeypatch.setattr(local_cluster, "embedded_crew", given)
     return CliRunner().invoke(main, CALL)
 
 

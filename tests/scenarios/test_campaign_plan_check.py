@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from handover.scenarios.bad_call import BadCall
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import checked_plan, unit_fmus
+from handover.scenarios.execution.errors import BadCall
 from handover.scenarios.experiment.parameters import BadParameter
 
 

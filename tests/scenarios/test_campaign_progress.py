@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from handover.scenarios.campaign.campaign_progress import CampaignProgress, told_done, told_left
-from handover.scenarios.campaign.tally import Tally
+from handover.scenarios.campaign.worker_pool import Tally
 
 
 @pytest.mark.parametrize(

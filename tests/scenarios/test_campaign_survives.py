@@ -7,7 +7,7 @@ import pytest
 from clusters import scheduler, worker
 from sweeping import ended, runs_in, sweeping, wait_for, without_times, workers_of
 
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.table import CampaignTable
 
 pytestmark = pytest.mark.slow
 

@@ -8,9 +8,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from handover.scenarios.campaign.campaign_table import CampaignTable
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.run_row import RunRow
+from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import TableWriter, table_of
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.results.run_folder import BadRunFolder

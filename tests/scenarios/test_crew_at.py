@@ -16,9 +16,9 @@ from clusters import scheduler, worker
 from crew_orders import bad_order, order
 from living import lives, parent, servers, until
 
-from handover.scenarios.campaign.bad_crew import BadCrew
-from handover.scenarios.campaign.dask_crew import crew_at
-from handover.scenarios.campaign.scheduler_address import scheduler_address
+from handover.scenarios.campaign.local_cluster import crew_at
+from handover.scenarios.campaign.scheduler import scheduler_address
+from handover.scenarios.execution.errors import BadCrew
 
 pytestmark = [
     pytest.mark.slow,

@@ -16,9 +16,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from crew_orders import bad_order, order
 from living import family, lives, parent, servers, until
 
-from handover.scenarios.campaign.crew import Crew, cores
-from handover.scenarios.campaign.dask_crew import embedded_crew
-from handover.scenarios.campaign.run_order import RunAnswer, RunOrder
+from handover.scenarios.campaign.local_cluster import embedded_crew
+from handover.scenarios.campaign.worker_pool import Crew, RunAnswer, RunOrder, cores
 
 pytestmark = [
     pytest.mark.slow,

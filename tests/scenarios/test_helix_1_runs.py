@@ -10,13 +10,12 @@ import pytest
 from own_crew import OwnCrew
 
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
 from handover.scenarios.campaign.campaign_progress import CampaignProgress
-from handover.scenarios.campaign.dask_crew import embedded_crew
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.local_cluster import embedded_crew
 from handover.scenarios.campaign.plan_check import prepared
-from handover.scenarios.published.claim import Verdict
 from handover.scenarios.published.helix_1 import Helix1
-from handover.scenarios.published.results import draw_figures, write_claims
+from handover.scenarios.published.published_experiment import Verdict, draw_figures, write_claims
 
 FAST = {"alpha": "0.4", "control_period": "1.45", "place": "front", "tuning": "thesis"}
 

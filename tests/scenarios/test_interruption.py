@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from handover.fmus.build import build_block
-from handover.scenarios.interruption import Interruption
+from handover.scenarios.execution.interruption import Interruption
 
 BLOCKS = ["HangingArm", "NativelyHangingArm"][: 2 if sys.platform.startswith("linux") else 1]
 

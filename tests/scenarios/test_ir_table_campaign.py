@@ -8,12 +8,12 @@ from own_crew import OwnCrew
 
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.ir_table import IrTable
 from handover.scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
-from handover.scenarios.published.results import draw_figures, write_claims
+from handover.scenarios.published.published_experiment import draw_figures, write_claims
 
 
 @pytest.fixture(scope="module")

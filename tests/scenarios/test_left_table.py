@@ -10,11 +10,11 @@ from click.testing import CliRunner
 from own_crew import OwnCrew
 
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_folder import CampaignFolder
-from handover.scenarios.campaign.campaign_table import CampaignTable
-from handover.scenarios.campaign.left_table import complete_table
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.table_writer import complete_table
 from handover.scenarios.command import main
 
 PLAN = CampaignPlan(

@@ -14,7 +14,7 @@ from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.command import main
-from handover.scenarios.ended import Ended
+from handover.scenarios.execution.task import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.listing import print_summary

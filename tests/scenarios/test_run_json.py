@@ -14,11 +14,10 @@ from flyer_runs import run
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.command import main
+from handover.scenarios.execution.summary import parameter_rows, told_system
+from handover.scenarios.execution.task import Task
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.run_summary import parameter_rows
-from handover.scenarios.task import Task
-from handover.scenarios.told_system import told_system
 
 
 def read(out: Path, name: str) -> dict[str, Any]:

@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from clusters import closed_port, scheduler
 
-from handover.scenarios.campaign.bad_crew import BadCrew
-from handover.scenarios.campaign.scheduler_address import scheduler_address
+from handover.scenarios.campaign.scheduler import scheduler_address
+from handover.scenarios.execution.errors import BadCrew
 
 
 def refused(address: str) -> str:

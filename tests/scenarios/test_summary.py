@@ -2,10 +2,9 @@ import sys
 
 import pytest
 
+from handover.scenarios.execution.summary import metric_data, peak_memory
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.results.tables import told
-from handover.scenarios.run_metrics import peak_memory
-from handover.scenarios.run_summary import metric_data
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

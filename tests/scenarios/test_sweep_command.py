@@ -11,12 +11,12 @@ from own_crew import OwnCrew
 
 from handover.cosim.record.file_lock import folder_locked
 from handover.fmus.build import cached
-from handover.scenarios.campaign import dask_crew, plan_check
-from handover.scenarios.campaign.bad_crew import BadCrew, CrewLost
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign import local_cluster, plan_check
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.run_order import RunOrder
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.worker_pool import RunOrder
 from handover.scenarios.command import main
+from handover.scenarios.execution.errors import BadCrew, CrewLost
 
 CALL = [
     "sweep",
@@ -52,7 +52,7 @@ def sweep(
     def own_crew(_workers: int | None) -> Generator[OwnCrew, None, None]:
         yield crew
 
-    monkeypatch.setattr(dask_crew, "embedded_crew", own_crew)
+    monkeypatch.setattr(local_cluster, "embedded_crew", own_crew)
     return CliRunner().invoke(main, call), crew.begun
 
 
@@ -64,7 +64,7 @@ def refuse_workers(monkeypatch: pytest.MonkeyPatch) -> None:
         raise BadCrew("there are none")
         yield OwnCrew()
 
-    monkeypatch.setattr(dask_crew, "embedded_crew", refuse)
+    monkeypatch.setattr(local_cluster, "embedded_crew", refuse)
 
 
 def raising(error: BaseException, at: int) -> Callable[[RunOrder], str]:

@@ -10,7 +10,7 @@ import pytest
 from sweeping import Going, ended, runs_in, sweeping, wait_for
 
 from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
-from handover.scenarios.campaign.campaign_table import CampaignTable
+from handover.scenarios.campaign.table import CampaignTable
 
 pytestmark = pytest.mark.slow
 

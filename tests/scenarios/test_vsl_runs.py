@@ -15,13 +15,12 @@ from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Observer
 from handover.fmus.build import cached
-from handover.scenarios.ended import Ended
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
-from handover.scenarios.interruption import Interruption
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.runner import carry_out
-from handover.scenarios.task import Task
 from handover.scenarios.vsl.path_experiments import PathExperiment, VslHybrid, VslModelBased
 
 BOTH = [VslModelBased, VslHybrid]

@@ -12,7 +12,7 @@ from crew_orders import order
 from distributed import Client
 
 from handover.scenarios.campaign import worker
-from handover.scenarios.campaign.server_process import ServerProcess
+from handover.scenarios.campaign.worker import ServerProcess
 from handover.scenarios.results.run_folder import versions
 
 

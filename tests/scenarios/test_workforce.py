@@ -6,8 +6,9 @@ from collections.abc import Generator
 import pytest
 from own_crew import OwnCrew
 
-from handover.scenarios.campaign import dask_crew, scheduler_address
-from handover.scenarios.campaign.workforce import Workforce
+from handover.scenarios.campaign import local_cluster
+from handover.scenarios.campaign import scheduler as scheduler_address
+from handover.scenarios.campaign.pool_config import Workforce
 
 
 @pytest.mark.parametrize("checked", [True, False], ids=["checked", "unchecked"])
@@ -24,7 +25,7 @@ def test_workers_are_those_of_the_scheduler_that_has_answered(checked: bool, mon
         yield OwnCrew()
 
     monkeypatch.setattr(scheduler_address, "scheduler_address", answer)
-    monkeypatch.setattr(dask_crew, "crew_at", crew_at)
+    monkeypatch.setattr(local_cluster, "crew_at", crew_at)
     workforce = Workforce(scheduler="h:1")
     if checked:
         workforce.check()

@@ -1,0 +1,267 @@
+"""The folder of a campaign: what it is, the FMUs that it uses, the folders of its runs, and their table.
+
+Where a campaign's folder is if the call does not say.
+"""
+
+import contextlib
+import json
+import os
+import platform
+import shutil
+import time
+from collections.abc import Callable, Generator, Mapping
+from pathlib import Path
+from typing import Any
+
+from handover.scenarios.campaign.identity import differences, identity_of
+from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.results.run_folder import (
+    BadRunFolder,
+    check_place,
+    folder_held,
+    read_object,
+    sha256_of,
+    told_if_not_written,
+    write_whole,
+)
+
+_FILE = "campaign.json"
+
+
+class CampaignFolder:
+    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`.
+
+    A paper's experiment leaves `claims.json` and `figures/` besides.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def runs(self) -> Path:
+        """The folder of the runs' folders."""
+        return self.path / "runs"
+
+    @property
+    def fmus(self) -> Path:
+        """The folder of the FMUs that the runs use."""
+        return self.path / "fmus"
+
+    @property
+    def table(self) -> Path:
+        """The table of the runs."""
+        return self.path / "runs.parquet"
+
+    @property
+    def report(self) -> Path:
+        """The report page."""
+        return self.path / "report.html"
+
+    @property
+    def figures(self) -> Path:
+        """The folder of figures."""
+        return self.path / "figures"
+
+    @property
+    def is_there(self) -> bool:
+        """Whether a campaign has begun in it."""
+        return (self.path / _FILE).is_file()
+
+    def read(self) -> dict[str, Any]:
+        """Return what `campaign.json` says.
+
+        Raises:
+            BadRunFolder: it is not the folder of a campaign, or damaged.
+        """
+        return read_object(self.path / _FILE, f"it is not the folder of a campaign: it has no {_FILE}")
+
+    def check(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
+        """Check that a campaign can begin or go on here; nothing is written.
+
+        Raises:
+            BadRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
+        """
+        self._check_place()
+        if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
+            return
+        if not (self.path / _FILE).exists():
+            raise BadRunFolder(self.path, f"it is not empty and has no {_FILE}; name a new folder, or a campaign's")
+        differ = differences(self.read(), identity_of(plan, fmus))
+        if differ:
+            raise BadRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
+        self._check_names(plan)
+
+    def check_free(self) -> None:
+        """Check that no other command is at work on it, if it is there.
+
+        Raises:
+            BadRunFolder: one is.
+        """
+        if self.path.is_dir():
+            with self.held():
+                pass
+
+    @contextlib.contextmanager
+    def opened(
+        self, plan: CampaignPlan, fmus: Mapping[str, Path], check: Callable[[Path], None]
+    ) -> Generator[dict[str, Path], None, None]:
+        """Make the folder, or go on with it, and keep others from it; give the copies of the FMUs in it.
+
+        `check` is called with the folder when it holds no more than `campaign.json`, by which another call finds it;
+        if it raises, all is as it was.
+
+        Left-overs of runs that were killed are removed. A file's copy has its name, or, where two units have different
+        files of one name, that of the unit before it.
+
+        Raises:
+            BadRunFolder: as by `check`; or another command holds it, or it cannot be made.
+            RecordNotWritten: it cannot be written to.
+        """
+        with contextlib.ExitStack() as held:
+            with self._made():
+                held.enter_context(self.held())
+                self.check(plan, fmus)
+                with self._written(plan, fmus):
+                    check(self.path)
+            with told_if_not_written(self.path):
+                self.runs.mkdir(exist_ok=True)
+                self.fmus.mkdir(exist_ok=True)
+                self._remove_unfinished()
+                copies = {unit: self._copy(unit, path, fmus) for unit, path in fmus.items()}
+            yield copies
+
+    def is_done(self, run: PlannedRun) -> bool:
+        """Return whether a run has left its folder, which has its name only when it is complete, with its summary."""
+        return (self.runs / run.name / "summary.json").is_file()
+
+    def has_all(self, plan: CampaignPlan) -> bool:
+        """Return whether all runs of a campaign are done."""
+        return all(self.is_done(run) for run in plan.runs())
+
+    @property
+    def is_reported(self) -> bool:
+        """Whether the report page is there, and of the table as it is."""
+        try:
+            return self.report.stat().st_mtime_ns >= self.table.stat().st_mtime_ns
+        except OSError:
+            return False
+
+    def _check_place(self) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
+        check_place(self.path)
+
+    def _check_names(self, plan: CampaignPlan) -> None:
+        """Check that no folder stands where a file is to be, and no file where a folder."""
+        folders = [p for p in (self.table, self.report) if p.is_dir()]
+        files = [p for p in (self.runs, *(self.runs / run.name for run in plan.runs())) if p.is_file()]
+        if folders or files:
+            place, form, right = (folders[0], "folder", "file") if folders else (files[0], "file", "folder")
+            raise BadRunFolder(self.path, f"{place.relative_to(self.path)} is a {form}, not a {right}; remove it")
+
+    @contextlib.contextmanager
+    def _made(self) -> Generator[None, None, None]:
+        """Make the folder; if what follows fails, remove what was made and is empty."""
+        self._check_place()
+        absent = [p for p in (self.path, *self.path.parents) if not p.exists()]
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+        try:
+            yield
+        except BaseException:
+            with contextlib.suppress(OSError):
+                for folder in absent:
+                    folder.rmdir()
+            raise
+
+    def held(self) -> contextlib.AbstractContextManager[None]:
+        """Keep other commands from it in a block.
+
+        Raises:
+            BadRunFolder: one is at work on it.
+        """
+        return folder_held(self.path, "another command carries this campaign out")
+
+    def _counts(self, entry: Path) -> bool:
+        """Return whether something is more than what a call leaves that was killed before it wrote `campaign.json`."""
+        return entry.name != f"{_FILE}.part" and not entry.name.startswith(".")
+
+    @contextlib.contextmanager
+    def _written(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> Generator[None, None, None]:
+        """Write `campaign.json`; where one is there, after what follows, and else remove it if that fails."""
+        was_there = self.is_there
+        if not was_there:
+            self._write(plan, fmus)
+        try:
+            yield
+        except BaseException:
+            if not was_there:
+                (self.path / _FILE).unlink(missing_ok=True)
+            raise
+        if was_there:
+            self._write(plan, fmus)
+
+    def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
+        """Write `campaign.json`, before anything else is there: without it, nobody could go on."""
+        experiment = SCENARIOS[plan.scenario]
+        told = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
+        content = {**identity_of(plan, fmus), **told}
+        if not (self.path / _FILE).exists() or self.read() != content:
+            write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+    def _copy(self, unit: str, file: Path, fmus: Mapping[str, Path]) -> Path:
+        alike = [other for other in fmus.values() if other.name == file.name]
+        ambiguous = len({sha256_of(other) for other in alike}) > 1
+        copy = self.fmus.absolute() / (f"{unit}_{file.name}" if ambiguous else file.name)
+        if not copy.is_file() or sha256_of(copy) != sha256_of(file):
+            unfinished = copy.with_name(copy.name + ".part")
+            try:
+                shutil.copyfile(file, unfinished)
+                os.replace(unfinished, copy)
+            except OSError:
+                unfinished.unlink(missing_ok=True)
+                raise
+        return copy
+
+    def _remove_unfinished(self) -> None:
+        """Remove what killed runs have left: folders beside those of runs, whose names begin with a dot."""
+        for left in self.runs.iterdir():
+            if left.name.startswith("."):
+                shutil.rmtree(left, ignore_errors=True)
+
+
+PLACE = Path("campaigns")
+
+
+def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
+    """Return the newest folder of this very campaign in `campaigns/` that lacks runs, else a new one.
+
+    So a call that was interrupted goes on where it stopped, and one that came to its end begins anew. The plan is a
+    checked one.
+    """
+    wanted = identity_of(plan, fmus)
+    for path in sorted(PLACE.glob(f"*_{_stem(plan)}*/"), reverse=True):
+        folder = CampaignFolder(path)
+        try:
+            there = folder.read()
+        except BadRunFolder:
+            continue
+        if all(there.get(key) == value for key, value in wanted.items()):
+            return _new(plan) if folder.has_all(plan) else folder
+    return _new(plan)
+
+
+def _stem(plan: CampaignPlan) -> str:
+    return plan.experiment or plan.scenario
+
+
+def _new(plan: CampaignPlan) -> CampaignFolder:
+    name = time.strftime(f"%Y-%m-%d_%H%M%S_{_stem(plan)}")
+    path, number = PLACE / name, 1
+    while path.exists():
+        number += 1
+        path = PLACE / f"{name}_{number}"
+    return CampaignFolder(path)

@@ -1,0 +1,138 @@
+"""Crews on Dask: workers on this machine's cores, or a cluster that the user runs."""
+
+import contextlib
+import logging
+import os
+import signal
+import sys
+import warnings
+from collections.abc import Generator
+from multiprocessing import resource_tracker
+
+from dask import config
+from distributed import Client, LocalCluster
+
+from handover.cosim.exceptions import one_line
+from handover.scenarios.campaign.cluster import ClusterCrew
+from handover.scenarios.campaign.worker_pool import cores
+from handover.scenarios.execution.errors import BadCrew
+
+_SILENT = logging.CRITICAL + 1
+_LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
+_WORKERS = 3.0
+"""How long a cluster's first worker is waited for, s."""
+
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 3,
+    "distributed.comm.timeouts.connect": "5s",
+    "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": str(_SILENT),
+}
+
+_STILL = {
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.system-monitor.disk": False,
+    "distributed.admin.system-monitor.gil.enabled": False,
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.active-memory-manager.start": False,
+    "distributed.client.scheduler-info-interval": "10s",
+}
+"""Keeps workers from watching themselves many times a second, for a dashboard that is not there."""
+
+
+@contextlib.contextmanager
+def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
+    """Start workers on this machine, a process each; by default one for each core that this process may use.
+
+    They hear of no Ctrl-C, end with this process, however it ends, and listen on the loopback interface alone.
+
+    Raises:
+        BadCrew: they cannot be started.
+    """
+    with _quiet(), config.set({**_SETTINGS, **_STILL}), contextlib.ExitStack() as opened:
+        try:
+            with (
+                _told_nothing_of_semaphores(),
+                _deaf_to_ctrl_c(),
+            ):  # so are the threads that are started here, and what these start
+                cluster = LocalCluster(
+                    n_workers=workers or cores(),
+                    threads_per_worker=1,
+                    host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0",  # by default it answers to the whole network
+                    memory_limit=0,
+                    silence_logs=_SILENT,
+                )
+                opened.callback(cluster.close)
+                client = opened.enter_context(Client(cluster, set_as_default=False))
+        except (OSError, RuntimeError) as e:
+            raise BadCrew(f"no workers can be started on this machine: {one_line(e)}") from e
+        crew = ClusterCrew(client, "the cluster on this machine")
+        opened.callback(crew.end)
+        yield crew
+
+
+@contextlib.contextmanager
+def crew_at(address: str) -> Generator[ClusterCrew, None, None]:
+    """Use the workers of a cluster that the user runs; the address is one that `scheduler_address` has returned.
+
+    Raises:
+        BadCrew: no scheduler answers there any more, or it has no workers.
+    """
+    with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
+        try:
+            client = opened.enter_context(Client(address, timeout=5, set_as_default=False))
+        except (OSError, ValueError) as e:
+            raise BadCrew(f"the scheduler at {address} cannot be used: {one_line(e)}") from e
+        try:
+            client.wait_for_workers(1, timeout=_WORKERS)
+        except TimeoutError as e:
+            raise BadCrew(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
+        crew = ClusterCrew(client, f"the cluster at {address}")
+        opened.callback(crew.end)
+        yield crew
+
+
+@contextlib.contextmanager
+def _quiet() -> Generator[None, None, None]:
+    """Keep what Dask tells of itself from the terminal: what matters is told by `BadCrew` and in answers."""
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    before = [logger.level for logger in loggers]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # other versions of Dask's own packages among them
+        for logger in loggers:
+            logger.setLevel(_SILENT)
+        try:
+            yield
+        finally:
+            for logger, level in zip(loggers, before, strict=True):
+                logger.setLevel(level)
+
+
+@contextlib.contextmanager
+def _told_nothing_of_semaphores() -> Generator[None, None, None]:
+    """Let Python's process that cleans up after a killed command do so without telling."""
+    name = "PYTHONWARNINGS"
+    before = os.environ.get(name)
+    os.environ[name] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+@contextlib.contextmanager
+def _deaf_to_ctrl_c() -> Generator[None, None, None]:
+    """Let threads and processes that are started meanwhile hear of no Ctrl-C, which is for this thread to act on."""
+    if sys.platform == "win32":
+        yield
+        return
+    resource_tracker.ensure_running()  # the thread that starts it hears of Ctrl-C from then on
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

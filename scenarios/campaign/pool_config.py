@@ -1,0 +1,95 @@
+"""Who is to carry out a campaign's runs, as the call says: workers of this machine, or those of a scheduler.
+
+Workers of a campaign that are started when its folder is held, so that no other command can take it meanwhile.
+"""
+
+import contextlib
+import functools
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from handover.scenarios.campaign.worker_pool import Crew, RunAnswer, RunOrder, cores
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """Workers that a call asks for; Dask, which takes a while to load, is loaded when they are needed.
+
+    Attributes:
+        workers: how many of this machine; None for one a core.
+        scheduler: the address of those of a cluster; None for those of this machine.
+    """
+
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __str__(self) -> str:
+        """Return such as "2 workers"."""
+        if self.scheduler is not None:
+            return f"the workers of {self.scheduler}"
+        workers = self.workers or cores()
+        return f"{workers} worker{'s' if workers > 1 else ''}"
+
+    def check(self) -> None:
+        """Find out whether a scheduler is where the call says.
+
+        Raises:
+            BadCrew: the address is malformed, or no scheduler answers there.
+        """
+        if self.scheduler is not None:
+            _ = self._address
+
+    def start(self) -> contextlib.AbstractContextManager[Crew]:
+        """Return the workers; entering starts them.
+
+        Raises:
+            BadCrew: here or on entering, if they cannot be started or used.
+        """
+        from handover.scenarios.campaign.local_cluster import crew_at, embedded_crew
+
+        return embedded_crew(self.workers) if self.scheduler is None else crew_at(self._address)
+
+    @functools.cached_property
+    def _address(self) -> str:
+        """The whole address of the scheduler, found out once."""
+        from handover.scenarios.campaign.scheduler import scheduler_address
+
+        return scheduler_address(self.scheduler or "")
+
+
+class LateCrew:
+    """Starts a crew when it is checked, or with its first order if it was not: a campaign may seem to need none.
+
+    Args:
+        start: gives the crew.
+        opened: ends it.
+    """
+
+    def __init__(
+        self, start: Callable[[], contextlib.AbstractContextManager[Crew]], opened: contextlib.ExitStack
+    ) -> None:
+        self._start, self._opened = start, opened
+        self._crew: Crew | None = None
+
+    def check(self, folder: Path) -> None:
+        """Start the crew and check it.
+
+        Raises:
+            BadCrew: it cannot be started or used. RecordNotWritten: as `Crew.check`.
+        """
+        self._crew = self._checked(folder)
+
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+        """Let the crew carry out orders.
+
+        Raises:
+            BadCrew, RecordNotWritten: as `check`, if that was not called. CrewLost: it has gone.
+        """
+        crew = self._crew or self._checked(Path(orders[0].runs))
+        return crew.carry_out(orders)
+
+    def _checked(self, folder: Path) -> Crew:
+        crew = self._opened.enter_context(self._start())
+        crew.check(folder)
+        return crew

@@ -1,0 +1,191 @@
+"""What came out at each point of a campaign."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Kind, Variable
+from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment.display_unit import shown_unit
+
+_MOST_METRICS = 4
+_MOST_INTERVALS = 150
+"""Medians of a campaign above which they have no intervals: each takes some 20 ms."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointResults:
+    """The runs of a point.
+
+    Attributes:
+        number: the point's, from 0.
+        values: of the parameters that are varied, as texts.
+        rows: of its runs in the campaign's table.
+        done: of `rows`, those whose task was carried out to its end.
+        successes: how many of these succeeded.
+    """
+
+    number: int
+    values: Mapping[str, str]
+    rows: NDArray[np.int64]
+    done: NDArray[np.int64]
+    successes: int
+
+    @property
+    def rate(self) -> float:
+        """Share of the runs done that succeeded; NaN if none is done."""
+        return self.successes / len(self.done) if len(self.done) else np.nan
+
+    @cached_property
+    def interval(self) -> Interval | None:
+        """Interval of the rate; None if no run is done."""
+        return success_interval(self.successes, len(self.done)) if len(self.done) else None
+
+
+class CampaignResults:
+    """A campaign's table, point by point.
+
+    Args:
+        told: what is in `campaign.json`.
+        table: the runs that have ended.
+    """
+
+    def __init__(self, told: Mapping[str, Any], table: CampaignTable) -> None:
+        self.told, self.table = told, table
+        self._values: list[Mapping[str, str]] = list(told["points"])
+        self._intervals: dict[tuple[int, str], Interval | None] = {}
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return str(self.told["scenario"])
+
+    @property
+    def planned(self) -> int:
+        """Runs that the campaign is to have."""
+        return len(self._values) * int(self.told["repetitions"])
+
+    @cached_property
+    def varied(self) -> tuple[str, ...]:
+        """Parameters that differ between points, in the order of the plan."""
+        names = dict.fromkeys(name for values in self._values for name in values)
+        return tuple(n for n in names if len({values.get(n) for values in self._values}) > 1)
+
+    @cached_property
+    def independent(self) -> tuple[str, ...]:
+        """Those of `varied` that do not follow from one before them, as a period that goes with a step size."""
+        kept: list[str] = []
+        for name in self.varied:
+            if not any(self._follows(name, other) for other in kept):
+                kept.append(name)
+        return tuple(kept)
+
+    def _follows(self, name: str, other: str) -> bool:
+        pairs = {(values.get(other), values.get(name)) for values in self._values}
+        return len(pairs) == len({first for first, _ in pairs})
+
+    @cached_property
+    def declared(self) -> Mapping[str, Variable]:
+        """The scenario's parameters by name; none if this version does not know the scenario."""
+        experiment = SCENARIOS.get(self.scenario)
+        return {} if experiment is None else {v.name: v for v in experiment.parameters()}
+
+    def is_number(self, parameter: str) -> bool:
+        """Whether a parameter is a number, neither an array nor a name."""
+        variable = self.declared.get(parameter)
+        return variable is not None and variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
+
+    def is_boolean(self, parameter: str) -> bool:
+        """Whether a parameter is true or false."""
+        variable = self.declared.get(parameter)
+        return variable is not None and variable.kind is Kind.BOOLEAN
+
+    def unit(self, parameter: str) -> str:
+        """Return a parameter's unit, "1" if it has none."""
+        variable = self.declared.get(parameter)
+        return "1" if variable is None else variable.unit.symbol
+
+    @cached_property
+    def headline(self) -> tuple[str, ...]:
+        """Columns of the metrics that are told first, in their order: those that any run has, but CPU time."""
+        experiment = SCENARIOS.get(self.scenario)
+        first = () if experiment is None else experiment.headline
+        columns = [n if n in self.table.metrics else f"{n}_metric" for n in first]
+        return tuple(n for n in columns if n in self.measured and not n.startswith(("cpu_", "pace_")))
+
+    @property
+    def told_first(self) -> tuple[str, ...]:
+        """Those of `headline` that tables and figures of points have room for."""
+        return self.headline[:_MOST_METRICS]
+
+    @cached_property
+    def measured(self) -> tuple[str, ...]:
+        """Columns of the metrics that any run has a value of, the headline's first and those of the cost last."""
+        experiment = SCENARIOS.get(self.scenario)
+        first = [] if experiment is None else list(experiment.headline)
+
+        def place(name: str) -> tuple[int, int]:
+            if name.startswith(("cpu_", "pace_", "peak_memory")):
+                return 2, 0
+            bare = name.removesuffix("_metric")
+            return (0, first.index(bare)) if bare in first else (1, 0)
+
+        some = [n for n in self.table.metrics if np.isfinite(self.table.column(n)).any()]
+        return tuple(sorted(some, key=place))
+
+    @cached_property
+    def points(self) -> Sequence[PointResults]:
+        """The points of which a run has ended."""
+        number, status = self.table.column("point"), self.table.column("status")
+        success = self.table.column("success")
+        found: list[PointResults] = []
+        for k, values in enumerate(self._values):
+            rows = np.flatnonzero(number == k)
+            if len(rows):
+                done = rows[status[rows] == "done"]
+                successes = int(np.count_nonzero(success[done] == np.True_))
+                found.append(PointResults(number=k, values=values, rows=rows, done=done, successes=successes))
+        return found
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether medians have intervals, which would take too long for very many points."""
+        return len(self.points) * len(self.told_first) <= _MOST_INTERVALS
+
+    def median(self, point: PointResults, metric: str) -> float:
+        """Return a metric's median over the runs done; NaN if none has it."""
+        values = self._measured_at(point, metric)
+        return float(np.median(values)) if len(values) else np.nan
+
+    def median_interval(self, point: PointResults, metric: str) -> Interval | None:
+        """Return the interval of a median by bootstrap; None where the values are fewer than three, or all the same."""
+        key = (point.number, metric)
+        if key not in self._intervals:
+            values = self._measured_at(point, metric)
+            varies = self.has_intervals and len(values) > 0 and np.ptp(values) > 0.0
+            self._intervals[key] = time_interval(values) if varies else None
+        return self._intervals[key]
+
+    def _measured_at(self, point: PointResults, metric: str) -> Floats:
+        values = self.table.column(metric)[point.done]
+        return values[np.isfinite(values)]
+
+    def value_text(self, parameter: str, text: str) -> str:
+        """Return a parameter's value as one reads it in a label."""
+        if self.is_boolean(parameter):
+            return parameter.replace("_", " ") if text.lower() == "true" else f"not {parameter.replace('_', ' ')}"
+        if self.is_number(parameter):
+            return shown_unit(self.unit(parameter), float(text)).text(float(text))
+        return text.replace("_", " ")
+
+    def label(self, point: PointResults) -> str:
+        """Return what tells a point from the others."""
+        texts = [self.value_text(name, point.values[name]) for name in self.independent if name in point.values]
+        return ", ".join(texts) or "all runs"

@@ -1,0 +1,162 @@
+"""Carries out an order in this process, and gives its folder the name that says it is complete.
+
+The folder of a run that ended before it had one, as when a unit does not start: it would end so each time.
+"""
+
+import contextlib
+import os
+import shutil
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import click
+
+from handover.cosim.exceptions import ScheduleError, UnitFailure, UnitRefused, WiringError, one_line
+from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
+from handover.scenarios.execution.errors import told_in_one_line
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.resumption import Spent
+from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.selection import scenario_named
+from handover.scenarios.execution.summary import configuration, files_and_forms, told_task
+from handover.scenarios.execution.task import Task
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.results.run_folder import RunFolder, is_full
+
+Refusal = UnitRefused | UnitFailure | WiringError | ScheduleError
+"""Why a run cannot begin, where that follows from what it is and not from where it is carried out."""
+
+REFUSALS = (UnitRefused, UnitFailure, WiringError, ScheduleError)
+
+
+def write_refused_run(task: Task, refusal: Refusal, spent: Spent) -> None:
+    """Write `run.json` and `summary.json` into the run's folder, as of a run in which a unit fails later.
+
+    Raises:
+        BadRunFolder: the folder cannot be made. RecordNotWritten: the disk is full.
+    """
+    failure = _failure(refusal)
+    task.folder.make()
+    task.folder.write_run(
+        {**configuration(task), **files_and_forms(task), **told_task(task), "failure": failure}, task.fmus
+    )
+    task.folder.write_summary(
+        {
+            **configuration(task),
+            "complete": False,
+            "success": False,
+            "reason": _reason(refusal),
+            "metrics": {},
+            "simulated_seconds": 0.0,
+            "wall_seconds": spent.wall,
+            "cpu_seconds": spent.cpu,
+            "units": [],
+            "failure": failure,
+        }
+    )
+
+
+def _failure(refusal: Refusal) -> dict[str, Any]:
+    if isinstance(refusal, UnitRefused):
+        return refusal.failure.as_data()
+    if isinstance(refusal, UnitFailure):
+        return refusal.as_data()
+    nothing = {"instance": None, "call": None, "time": 0.0, "log": list[str]()}
+    return {"kind": "refused", "status": one_line(refusal), **nothing}
+
+
+def _reason(refusal: Refusal) -> str:
+    return f"{refusal.verdict}: {refusal.cause}" if isinstance(refusal, UnitFailure) else one_line(refusal)
+
+
+def carry_out_order(order: RunOrder, folder: Path) -> None:
+    """Run an order into a folder, without figures or a report; if it cannot begin, the folder says why.
+
+    Raises:
+        As `carry_out` and `parse_parameters`, but for `REFUSALS`. BadCall: there is no such scenario.
+    """
+    task, clock = _task(order, folder), Spent().clock()
+    try:
+        carry_out(task, lambda _t, _end: None, Interruption())
+    except REFUSALS as e:
+        write_refused_run(task, e, clock())
+
+
+def refuse_order(order: RunOrder, folder: Path, failure: UnitFailure, spent: Spent) -> None:
+    """Write the folder of a run whose process ended as a unit was loaded or initialised."""
+    write_refused_run(_task(order, folder), failure, spent)
+
+
+def _task(order: RunOrder, folder: Path) -> Task:
+    experiment = scenario_named(order.scenario)
+    return Task(
+        experiment=experiment(),
+        parameters=parse_parameters(experiment, order.parameters),
+        seed=order.seed,
+        fmus={name: Path(path) for name, path in order.fmus.items()},
+        folder=RunFolder(folder),
+        options=order.options,
+        presented=False,
+    )
+
+
+def answer_of(order: RunOrder, work: Callable[[], object]) -> RunAnswer:
+    """Do something for an order; answer why it could not be done, if it could not."""
+    try:
+        with told_in_one_line():
+            work()
+    except click.ClickException as e:
+        return lost_by(e, order, e.message)
+    except BaseException as e:  # a run may raise what it likes: the campaign goes on
+        traceback.print_exc()
+        return lost_by(e, order, f"{type(e).__name__}: {one_line(e)}")
+    return RunAnswer(name=order.name)
+
+
+def lost_by(error: BaseException, order: RunOrder, told: str) -> RunAnswer:
+    """Answer that a run is lost by an exception, with what is told of it."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and is_full(cause):
+            return RunAnswer(name=order.name, lost=told, no_room=cause.strerror or one_line(cause))
+        cause = cause.__cause__
+    return RunAnswer(name=order.name, lost=told)
+
+
+@contextlib.contextmanager
+def printing_to(log: BinaryIO):
+    """Let what this process prints, in Python or in native code, go to a file meanwhile."""
+    before = [os.dup(number) for number in (1, 2)]
+    try:
+        for number in (1, 2):
+            os.dup2(log.fileno(), number)
+        yield
+    finally:
+        for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+            stream.flush()
+            os.dup2(before[number - 1], number)
+            os.close(before[number - 1])
+
+
+def finish(order: RunOrder, folder: Path, log: BinaryIO) -> RunAnswer:
+    """Name the folder of a run that has ended as the order says; answer why it cannot be, if it cannot.
+
+    What the run printed goes into its `log.txt`. A folder without a summary is left as it is.
+    """
+    named = Path(order.runs, order.name)
+    if not (folder / "summary.json").exists():
+        return RunAnswer(name=order.name, lost="it ended without a summary")
+    with contextlib.suppress(OSError):  # a full disk: the run itself is complete
+        log.seek(0)
+        if printed := log.read():
+            (folder / "log.txt").write_bytes(printed)
+    try:
+        os.rename(folder, named)
+    except OSError as e:
+        if not (named / "summary.json").exists():  # else it was carried out twice, as when a worker was taken for lost
+            return lost_by(e, order, f"its folder cannot be named {named}: {e.strerror}")
+        shutil.rmtree(folder, ignore_errors=True)
+    return RunAnswer(name=order.name)

@@ -1,0 +1,92 @@
+"""Where a Dask scheduler is, and whether it is one: found out before anything is sent to it.
+
+Whether something answers at a port as Dask's schedulers do: found out in seconds, without loading Dask.
+"""
+
+import asyncio
+import socket
+from urllib.parse import urlsplit
+
+from handover.cosim.exceptions import one_line
+from handover.scenarios.execution.errors import BadCrew
+
+_CONNECT_TIMEOUT, _GREETING = 3.0, 3.0
+"""How long a server gets to be connected, and to say something, s."""
+
+RIGHT = "tcp://HOST:PORT, as `dask scheduler` prints it, is right"
+
+
+def probe_port(address: str, host: str, port: int) -> None:
+    """Wait for the greeting that a scheduler sends, over plain TCP, to whoever connects.
+
+    Most other servers wait to be spoken to.
+
+    Args:
+        address: what is told.
+        host: where it is.
+        port: its number there.
+
+    Raises:
+        BadCrew: nothing is there, or it says nothing.
+    """
+    try:
+        with socket.create_connection((host, port), timeout=_CONNECT_TIMEOUT) as connection:
+            connection.settimeout(_GREETING)
+            greeted = bool(connection.recv(1))
+    except TimeoutError as e:
+        raise BadCrew(f"{address} does not answer as a Dask scheduler within {_GREETING:g} s; {RIGHT}") from e
+    except OSError as e:
+        raise BadCrew(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
+    if not greeted:
+        raise BadCrew(f"{address} is no Dask scheduler: it hangs up; {RIGHT}")
+
+
+_CONNECT, _ANSWER = 4.0, 5.0
+"""How long a scheduler gets to be connected, and until it has answered, s."""
+
+
+def scheduler_address(told: str) -> str:
+    """Return the whole address of a scheduler that has answered.
+
+    Raises:
+        BadCrew: the address is malformed, nothing is there, or no scheduler is.
+    """
+    address, host, port = _parts(told)
+    if address.startswith("tcp:"):
+        probe_port(address, host, port)
+    from handover.scenarios.campaign.scheduler_kind import kind_at  # loads Dask
+
+    try:
+        kind = kind_at(address, _CONNECT, _ANSWER)
+    except (asyncio.TimeoutError, TimeoutError) as e:
+        raise BadCrew(f"{address} does not answer as a Dask scheduler within {_ANSWER:g} s; {RIGHT}") from e
+    except OSError as e:
+        raise BadCrew(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
+    except Exception as e:  # what another protocol's bytes lead to
+        raise BadCrew(f"{address} is no Dask scheduler: {one_line(e)}; {RIGHT}") from e
+    if kind != "Scheduler":
+        raise BadCrew(f"{address} is a {kind}, not a scheduler; {RIGHT}")
+    return address
+
+
+def _parts(told: str) -> tuple[str, str, int]:
+    """Return an address with its protocol, its host and its port."""
+    address = told if "://" in told else f"tcp://{told}"
+    try:
+        parts = urlsplit(address)
+        port = parts.port
+    except ValueError as e:
+        raise BadCrew(f"scheduler {told!r}: {one_line(e)}; {RIGHT}") from e
+    if parts.scheme != "tcp":
+        _check_protocol(told, address)
+    if not parts.hostname or not port:
+        raise BadCrew(f"scheduler {told!r} has no {'port' if parts.hostname else 'host'}; {RIGHT}")
+    return address, parts.hostname, port
+
+
+def _check_protocol(told: str, address: str) -> None:
+    from handover.scenarios.campaign.scheduler_kind import PROTOCOLS  # loads Dask
+
+    protocol = address.partition("://")[0].lower()
+    if protocol not in PROTOCOLS:
+        raise BadCrew(f"scheduler {told!r}: there is no protocol {protocol!r}, only {', '.join(PROTOCOLS)}")

@@ -1,0 +1,171 @@
+"""The table of a campaign: a row for each run that has ended.
+
+A row of a campaign's table: how one run went.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from handover.cosim.exceptions import nearest, one_line
+from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.results.run_folder import BadRunFolder
+
+_ANEW = "the call that began the campaign writes it anew"
+
+
+class CampaignTable:
+    """Reads `runs.parquet`.
+
+    Its columns are `run`, `point`, `repetition`, `seed`, `status` ("done"; "failed": a unit failed or the run crashed;
+    "lost": no worker came back with it), `success` (null where the run is not done), `reason`, the parameters that are
+    varied or set, `simulated_seconds`, `wall_seconds`, `cpu_seconds` and the metrics. A column's metadata hold its
+    `role` (run, parameter or metric), `unit` and `description`.
+    """
+
+    def __init__(self, table: pa.Table) -> None:
+        self.table = table
+
+    @classmethod
+    def read(cls, path: Path) -> "CampaignTable":
+        """Read a campaign's table, given by its file or by the campaign's folder.
+
+        Raises:
+            BadRunFolder: there is none, or it is damaged.
+        """
+        file = path / "runs.parquet" if path.is_dir() else path
+        try:
+            return cls(pq.read_table(file))
+        except FileNotFoundError as e:
+            raise BadRunFolder(file.parent, f"it has no {file.name}; {_ANEW}") from e
+        except (OSError, pa.ArrowException) as e:
+            raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_ANEW}") from e
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return self.table.num_rows
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows, each a mapping of columns to values; None is null."""
+        return self.table.to_pylist()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that were varied or set."""
+        return self._of_role("parameter")
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """Names of the metrics' columns."""
+        return self._of_role("metric")
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a column: numbers as floats, NaN where null, or as integers; all else as objects, None where null.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        column, kind = self.table.column(self._known(name)), self._kind(name)
+        if pa.types.is_floating(kind):
+            return np.asarray(column.to_numpy(), dtype=np.float64)
+        if pa.types.is_integer(kind) and column.null_count == 0:
+            return np.asarray(column.to_numpy(), dtype=np.int64)
+        values = np.empty(len(column), dtype=object)
+        values[:] = column.to_pylist()
+        return values
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a column, "1" where it has none.
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        return self._told(name, "unit") or "1"
+
+    def description(self, name: str) -> str:
+        """Return what a column is, in words; "" where nothing is said.
+
+        Raises:
+            KeyError: there is no such column.
+        """
+        return self._told(name, "description")
+
+    def _kind(self, name: str) -> pa.DataType:
+        return cast(Any, self.table.schema.field(self._known(name))).type
+
+    def _of_role(self, role: str) -> tuple[str, ...]:
+        return tuple(name for name in self.table.column_names if self._told(name, "role") == role)
+
+    def _told(self, name: str, fact: str) -> str:
+        metadata: Mapping[bytes, bytes] = self.table.schema.field(self._known(name)).metadata or {}
+        return metadata.get(fact.encode(), b"").decode()
+
+    def _known(self, name: str) -> str:
+        if name not in self.table.column_names:
+            raise KeyError(f"no column {name!r}: {nearest(name, self.table.column_names)}")
+        return name
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRow:
+    """How one run ended.
+
+    Attributes:
+        run: the run.
+        status: "done", "failed" (a unit failed, or the run crashed) or "lost" (there is no folder of it).
+        success: whether its task succeeded; None if it is not done.
+        reason: why, in a sentence.
+        simulated, wall, cpu: seconds that it took; None where that is not known.
+        metrics: its figures; a value of NaN is none.
+    """
+
+    run: PlannedRun
+    status: str
+    success: bool | None
+    reason: str
+    simulated: float | None = None
+    wall: float | None = None
+    cpu: float | None = None
+    metrics: Mapping[str, Metric] = field(default_factory=dict[str, Metric])
+
+
+def row_of(run: PlannedRun, folder: Path) -> RunRow | None:
+    """Return the row of a run that has left a folder; None if the folder does not say how the run ended."""
+    try:
+        summary: Any = json.loads((folder / "summary.json").read_bytes())
+        if summary["seed"] != run.seed or (summary["failure"] is None and not summary["complete"]):
+            return None
+        return _row(run, summary)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def _row(run: PlannedRun, summary: Mapping[str, Any]) -> RunRow:
+    done = summary["failure"] is None
+    metrics = cast(Mapping[str, Mapping[str, Any]], summary["metrics"])
+    return RunRow(
+        run=run,
+        status="done" if done else "failed",
+        success=bool(summary["success"]) if done else None,
+        reason=str(summary["reason"]),
+        simulated=float(summary["simulated_seconds"]),
+        wall=float(summary["wall_seconds"]),
+        cpu=float(summary["cpu_seconds"]),
+        metrics={
+            name: Metric(
+                value=float("nan") if m["value"] is None else float(m["value"]),
+                unit=str(m["unit"]),
+                description=str(m["description"]),
+            )
+            for name, m in metrics.items()
+        },
+    )

@@ -1,0 +1,110 @@
+"""Who carries out the runs of a campaign.
+
+One run of a campaign as a worker gets it, and what it answers.
+
+How far a campaign has come.
+"""
+
+import os
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from handover.cosim.stepping.options import MasterOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOrder:
+    """What a worker needs to carry out a run. It can be pickled; paths are absolute and seen by all workers alike.
+
+    Attributes:
+        name: of the run's folder in `runs`. While it runs, its files are in a folder of another name beside it, which
+            is given this name when the run has ended, so that what bears the name is complete.
+        scenario, parameters, seed: what to run; parameters are texts `name=value`.
+        fmus: the FMU of each unit.
+        runs: the campaign's folder of runs.
+        options: how units are run.
+    """
+
+    name: str
+    scenario: str
+    parameters: tuple[str, ...]
+    seed: int
+    fmus: Mapping[str, str]
+    runs: str
+    options: MasterOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunAnswer:
+    """How a worker did with an order.
+
+    Attributes:
+        name: the order's.
+        lost: why there is no folder of the run, in a sentence; "" if there is one, whose `summary.json` tells the rest.
+        no_room: what the system says if a full disk is why it is lost, as "No space left on device"; else "".
+    """
+
+    name: str
+    lost: str = ""
+    no_room: str = ""
+
+
+class Crew(Protocol):
+    """Workers that carry out orders side by side."""
+
+    def check(self, folder: Path) -> None:
+        """Check that all workers give the same numbers as this process would, and write to the same folder.
+
+        Args:
+            folder: an existing one, into which runs are to be written.
+
+        Raises:
+            BadCrew: some do not. RecordNotWritten: nothing can be written there, as on a full disk.
+        """
+        ...
+
+    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+        """Give each order to a worker; yield the answers as they come.
+
+        A worker that is lost is replaced where that is possible, and its run begun anew. If the iteration is left
+        before its end, runs under way are ended and leave nothing.
+
+        Raises:
+            CrewLost: all of them have gone for good.
+        """
+        ...
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tally:
+    """Numbers of a campaign's runs.
+
+    Attributes:
+        total: all that are planned.
+        kept: those that earlier calls have carried out.
+        ended: those that have left a folder, with those kept.
+        failed: those of `ended` in which a unit failed.
+        lost: those that no worker came back with in this call.
+    """
+
+    total: int
+    kept: int = 0
+    ended: int = 0
+    failed: int = 0
+    lost: int = 0
+
+    @property
+    def left(self) -> int:
+        """Runs that are yet to come in this call."""
+        return self.total - self.ended - self.lost
+
+
+OnTally = Callable[[Tally], None]
+"""Told how far a campaign has come, at its start and after each run."""

@@ -1,0 +1,118 @@
+"""How the process of a run died, and what it left, which is completed."""
+
+import shutil
+import signal
+from pathlib import Path
+from typing import Any
+
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.fmu.failures import UnitCrashed, UnitHung
+from handover.cosim.fmu.heartbeat import Call, Heartbeat
+from handover.cosim.record.reader import Record
+from handover.cosim.record.stream import complete_record
+from handover.scenarios.execution.child_process import ChildEnd
+from handover.scenarios.execution.summary import unit_data
+from handover.scenarios.execution.task import Ended
+from handover.scenarios.experiment.experiment import Outcome
+from handover.scenarios.results.run_folder import RunFolder, told_if_not_written
+
+
+class Death:
+    """The death of a run's process. What the run had for its time alone is removed.
+
+    Args:
+        heartbeat: what the run told while it lived.
+        end: how its process ended.
+        wall: seconds that it lived.
+
+    Attributes:
+        failure: how the unit failed in whose call the process ended; None where it was not a unit.
+        told: what happened, in a line.
+        facts: what the run told for this case.
+        folder: of the run, None if there was none yet.
+    """
+
+    def __init__(self, heartbeat: Heartbeat, end: ChildEnd, wall: float) -> None:
+        self.facts = heartbeat.facts
+        for folder in self.facts.get("scratch", []):
+            shutil.rmtree(folder, ignore_errors=True)
+        self._end, self._wall, self._time, self._call = end, wall, heartbeat.time, heartbeat.under_way
+        self.failure = _failure(heartbeat, self._call, end)
+        self.told = _how_it_ended(self._call, self._time, end) if self.failure is None else str(self.failure)
+        self.folder = RunFolder.left_at(Path(self.facts["folder"])) if "folder" in self.facts else None
+
+    @property
+    def was_killed(self) -> bool:
+        """Whether it was killed from outside, and not because it hung."""
+        return self._end.signal == signal.SIGKILL and not self._end.hung
+
+    def complete(self, folder: RunFolder) -> Ended:
+        """Complete the record in the run's folder as far as it goes, and write the summary.
+
+        Raises:
+            RecordNotWritten: there is no room for it.
+        """
+        failure = self.failure
+        data = _data(self._call, self._time, self._end) if failure is None else failure.as_data()
+        reason = self.told if failure is None else f"{failure.verdict}: {failure.cause}"
+        with told_if_not_written(folder.path):
+            summary: dict[str, Any] = {
+                **self.facts["configuration"],
+                "complete": False,
+                "success": False,
+                "metrics": dict[str, Any](),
+                "simulated_seconds": _simulated(folder),
+                "cpu_seconds": self._end.cpu,
+                "units": unit_data(self.facts["units"]),
+                "reason": reason,
+                "wall_seconds": self._wall,
+                "failure": data,
+            }
+            folder.write_summary(summary)
+            folder.add_to_run(failure=data)
+        return Ended(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
+
+
+def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFailure | None:
+    if call is None:
+        return None
+    log = heartbeat.log_of(call.unit)
+    if end.hung:
+        return UnitHung(*call, heartbeat.limit, log)
+    if end.signal == signal.SIGKILL:
+        return None
+    how = f"it ended the process with status {end.status}" if end.signal is None else _meaning(end.signal)
+    return UnitCrashed(*call, how, log)
+
+
+def _meaning(number: int) -> str:
+    return (signal.strsignal(number) or f"signal {number}").lower()
+
+
+def _how_it_ended(call: Call | None, t: float, end: ChildEnd) -> str:
+    within = f", in {call.call} of {call.unit}" if call is not None else ", outside of its units"
+    if end.signal == signal.SIGKILL:
+        return f"the run was killed at t = {t:.6g} s{within}: by someone, or by the system for want of memory"
+    how = f"ended with status {end.status}" if end.signal is None else _meaning(end.signal)
+    return f"the run crashed at t = {t:.6g} s{within}: {how}"
+
+
+def _data(call: Call | None, t: float, end: ChildEnd) -> dict[str, Any]:
+    return {
+        "kind": "killed" if end.signal == signal.SIGKILL else "crash",
+        "instance": call.unit if call is not None else None,
+        "call": call.call if call is not None else None,
+        "time": t,
+        "status": f"status {end.status}" if end.signal is None else _meaning(end.signal),
+        "log": [],
+    }
+
+
+def _simulated(folder: RunFolder) -> float:
+    """Complete a record and return the time at which it ends, s."""
+    try:
+        complete_record(folder.signals)
+    except FileNotFoundError:  # it died before it recorded
+        return 0.0
+    time = Record(folder.signals).time
+    return float(time[-1]) if len(time) else 0.0

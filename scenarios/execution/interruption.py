@@ -1,0 +1,126 @@
+"""Ctrl-C: before a run it aborts at once; during a run it first asks the run to end, then aborts it."""
+
+import functools
+import os
+import signal
+import socket
+import threading
+from collections.abc import Callable
+from types import FrameType, TracebackType
+from typing import Any
+
+from handover.scenarios.execution.exit_status import ABORTED
+from handover.scenarios.execution.supervisor import leave
+
+_ENDING = [n for n in (signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
+"""Signals that end a run after its step, as of a batch system or of a terminal that is closed."""
+
+_GRACE = 2.0
+"""How long Python gets to act on an interrupt before the process is ended, s; a unit's native code may never return."""
+
+
+class Interruption:
+    """Takes SIGINT, SIGTERM and SIGHUP over. Use it as a context manager in the main thread.
+
+    If aborted it exits with 130. Of the other two, one that is ignored, as under nohup, stays so.
+
+    Until `begin` the first signal raises KeyboardInterrupt. After it the first only sets `asked`, so that the step
+    under way is finished and the record stays whole; the second puts the former handler back and raises
+    KeyboardInterrupt.
+
+    Python handles signals between its own instructions. A thread that hears of them at once therefore ends the process
+    if an abort is not handled in time, as when a unit's native code hangs. What was recorded stays beside
+    the record, which `complete_record` makes of it, as when the run is resumed.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        """Whether the run should end."""
+        self._aborted = False
+        self._running = False
+        self._handled = threading.Event()
+        self._heard = 0
+        self._before: Any = None
+        self._undo: list[Callable[[], Any]] = []
+
+    def begin(self) -> None:
+        """Tell that there is something to keep from now on.
+
+        Raises:
+            KeyboardInterrupt: as by `check`.
+        """
+        self.check()
+        self._running = True
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt again where a unit took the first one for a failure of its own."""
+        if self._aborted:
+            raise KeyboardInterrupt
+
+    def __enter__(self) -> "Interruption":
+        ours, pythons = socket.socketpair()
+        pythons.setblocking(False)
+        self._before = signal.signal(signal.SIGINT, self._take)
+        ending = {n: signal.getsignal(n) for n in _ENDING}
+        ending = {n: handler for n, handler in ending.items() if handler is not signal.SIG_IGN}
+        for number in ending:
+            signal.signal(number, self._end)
+        wakeup_before = signal.set_wakeup_fd(pythons.fileno(), warn_on_full_buffer=False)
+        listener = threading.Thread(target=self._listen, args=(ours,), daemon=True)
+        listener.start()
+        self._undo = [
+            lambda: signal.signal(signal.SIGINT, self._before),
+            *(functools.partial(signal.signal, number, handler) for number, handler in ending.items()),
+            lambda: signal.set_wakeup_fd(wakeup_before),
+            pythons.close,  # which ends the listener
+            listener.join,
+            ours.close,
+        ]
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._handled.set()
+        for undo in self._undo:
+            undo()
+        if self._aborted:
+            _say("Aborted!")
+            raise SystemExit(ABORTED) from None
+
+    def _take(self, _number: int, _frame: FrameType | None) -> None:
+        if self._running and not self.asked and self._heard < 2:  # Python takes two that come at once for one
+            self.asked = True
+            return
+        self._aborted = True
+        self._handled.set()
+        signal.signal(signal.SIGINT, self._before)
+        raise KeyboardInterrupt
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        """Let one of `_ENDING` end a run that has begun as one Ctrl-C does."""
+        if self._running:
+            self.asked = True
+        else:
+            self._take(number, frame)
+
+    def _listen(self, ours: socket.socket) -> None:
+        while numbers := ours.recv(1):
+            if numbers[0] != signal.SIGINT:
+                continue
+            self._heard += 1
+            aborts = not self._running or self._heard > 1
+            if not aborts:
+                _say("ending after this step; Ctrl-C again to abort")
+            elif not self._handled.wait(_GRACE):
+                _say("Aborted! A unit did not return.")
+                leave(ABORTED)
+
+
+def _say(line: str) -> None:
+    """Write to standard error past its buffer, which the signal may have interrupted.
+
+    On a terminal it begins a line, as ^C or a progress bar is on the one before.
+    """
+    begin = "\n" if os.isatty(2) else ""
+    os.write(2, f"{begin}{line}\n".encode())

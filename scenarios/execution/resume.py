@@ -1,0 +1,132 @@
+"""A run that a process has left: whether it can go on, and how."""
+
+import contextlib
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, cast
+
+from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
+from handover.cosim.master.checkpoint import BadCheckpoint
+from handover.cosim.record.file_lock import FileLocked
+from handover.cosim.record.stream import complete_record
+from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.execution.resumption import Resumption, unpack
+from handover.scenarios.execution.ssp_run import open_experiment
+from handover.scenarios.execution.task import Task
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.results.run_folder import (
+    BadRunFolder,
+    RunFolder,
+    is_full,
+    sha256_of,
+    version_differences,
+    versions,
+)
+
+
+def complete_signals(folder: RunFolder) -> int:
+    """Complete the record of a run that a process has left, as far as it goes; return its rows, 0 if there is none.
+
+    Raises:
+        BadRunFolder: the run still goes on, or the record cannot be completed. RecordNotWritten: the disk is full.
+    """
+    try:
+        return complete_record(folder.signals)
+    except FileLocked as e:
+        raise BadRunFolder(folder.path, "the run still goes on") from e
+    except FileNotFoundError:  # it ended before it recorded
+        return 0
+    except ValueError as e:  # Arrow's
+        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
+    except OSError as e:
+        if is_full(e):
+            raise RecordNotWritten(folder.signals, str(e.strerror)) from e
+        raise BadRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
+
+
+class LeftRun:
+    """A run's folder, whose record is completed as far as it goes; nothing else is changed.
+
+    Raises:
+        BadRunFolder: it is not the folder of a run, or of one that goes on, or has ended, or is of other versions than
+            are installed. BadCheckpoint: it has no checkpoint that can be used.
+    """
+
+    def __init__(self, folder: RunFolder) -> None:
+        self.folder = folder
+        self._told = folder.read_run()
+        if folder.read_summary().get("complete"):
+            raise BadRunFolder(folder.path, "the run is complete; there is nothing to go on with")
+        rows = complete_signals(folder)
+        self._check_versions(self._object("versions"))
+        self.resumption: Resumption = unpack(folder.checkpoint)
+        if rows < self.resumption.checkpoint.rows:
+            counted = self.resumption.checkpoint.rows
+            raise BadCheckpoint(folder.checkpoint, f"it counts {counted} rows, the record beside it has {rows}")
+
+    def task(self, opened: contextlib.ExitStack) -> Task:
+        """Return what the run was to do; `opened` closes what that opens.
+
+        Raises:
+            BadRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
+        """
+        told = self._told
+        try:
+            experiment = self._experiment(opened)
+            fmus = {name: self._fmu(name, unit) for name, unit in experiment.units.items()}
+            every = told["checkpoint"]
+            task = Task(
+                experiment=experiment,
+                parameters=self.resumption.parameters,
+                seed=int(told["seed"] or 0),
+                fmus=fmus,
+                folder=self.folder,
+                formats=tuple(told["formats"]),
+                every=None if every is None else Fraction(every),
+                source=told["source"],
+                options=self.resumption.options,
+            )
+        except BadRunFolder:
+            raise
+        except (KeyError, TypeError, ValueError) as e:
+            raise BadRunFolder(self.folder.path, f"its run.json is damaged: {type(e).__name__} {e}") from e
+        self._check_fmus(task)
+        return task
+
+    def _object(self, name: str) -> Mapping[str, Any]:
+        found = self._told.get(name, {})
+        if not isinstance(found, dict):
+            raise BadRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
+        return cast(Mapping[str, Any], found)
+
+    def _check_versions(self, before: Mapping[str, str]) -> None:
+        if other := version_differences(versions(), before):
+            raise BadRunFolder(self.folder.path, f"the run began with other versions: {other}")
+
+    def _experiment(self, opened: contextlib.ExitStack) -> Experiment[Any]:
+        source, name = self._told["source"], self._told["scenario"]
+        if not source:
+            if name not in SCENARIOS:
+                raise BadRunFolder(self.folder.path, f"its scenario {name!r} is not here; {nearest(name, SCENARIOS)}")
+            return SCENARIOS[name]()
+        file, step = Path(source["ssp"]), source["step"]
+        if not file.is_file() or sha256_of(file) != source["sha256"]:
+            raise BadRunFolder(self.folder.path, f"{file} is not the file that the run began with")
+        return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
+
+    def _fmu(self, name: str, unit: str) -> Path:
+        """Return a unit's file, or the same unit built anew where the folder of built units was cleared."""
+        path = Path(self._told["files"][name])
+        return path if path.is_file() else cached(unit, 3)
+
+    def _check_fmus(self, task: Task) -> None:
+        system = task.experiment.build(task.parameters, task.seed, lambda unit: task.fmus[unit])
+        here = {name: unit.description.path for name, unit in system.units.items()}
+        before = {name: unit.get("sha256") for name, unit in self._object("units").items()}
+        other = [f"{name} ({here[name]})" for name in here if before.get(name) != sha256_of(here[name])]
+        if other:
+            raise BadRunFolder(
+                self.folder.path, f"these FMUs are not those that the run began with: {', '.join(other)}"
+            )

@@ -1,0 +1,127 @@
+"""An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
+
+import contextlib
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+from handover.cosim.record.reader import Record
+from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+from handover.scenarios.execution import supervisor
+from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf, Outcome, Watch
+from handover.scenarios.results.run_folder import sha256_of
+
+_MOST_SIGNALS = 6
+"""Signals in one figure."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoParameters:
+    """An SSP's parameters are bound in it."""
+
+
+class UntilStop(Watch):
+    """Lets a run go on to its stop time; reaching that is its success."""
+
+    def __init__(self, stop: Fraction) -> None:
+        self._stop, self._t = float(stop), 0.0
+
+    def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
+        """Note the time."""
+        self._t = t
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended: never before its stop time."""
+        return False
+
+    def outcome(self) -> Outcome:
+        """Return whether the stop time was reached."""
+        reached = self._t >= self._stop
+        return Outcome(success=reached, reason=f"ran to {self._t:g} s" + ("" if reached else f" of {self._stop:g} s"))
+
+
+def is_ssp(name: str) -> bool:
+    """Tell an SSP's file from a scenario's name."""
+    return Path(name).suffix.lower() == ".ssp"
+
+
+def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
+    """Return an SSP as an experiment that ends at a time, s."""
+
+    class SspExperiment(Experiment[UntilStop]):
+        """Runs the system as it is."""
+
+        name: ClassVar[str] = ssp.path.name
+        title: ClassVar[str] = f"{ssp.name}, a system from {ssp.path.name}"
+        parameters_type: ClassVar[type[Any]] = NoParameters
+        units: ClassVar[Mapping[str, str]] = {}
+        headline: ClassVar[tuple[str, ...]] = ()
+        is_seeded: ClassVar[bool] = False
+
+        def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:  # noqa: ARG002
+            return ssp.system
+
+        def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
+            return stop
+
+        def watch(self, parameters: Any) -> UntilStop:  # noqa: ARG002
+            return UntilStop(stop)
+
+        def cycle(self) -> tuple[str, ...]:
+            return ()
+
+        def draw(self, parameters: Any, watch: UntilStop, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
+            return draw_outputs(ssp.system.units, record, folder)
+
+    return SspExperiment()
+
+
+def draw_outputs(units: Iterable[str], record: Record, folder: Path) -> list[Figure]:
+    """Draw the first real outputs of each unit over time, an axis for each."""
+    from handover.scenarios.experiment.plotting import COLOURS, figure  # what draws takes long to load
+
+    figures: list[Figure] = []
+    for name in units:
+        ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MOST_SIGNALS]
+        if not ports:
+            continue
+        file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
+        with figure(folder / file, len(ports), size=(8.0, 1.6 * len(ports) + 0.4)) as axes:
+            for ax, port in zip(axes, ports, strict=True):
+                values = record[port].reshape(len(record.time), -1)
+                for k, colour in enumerate(COLOURS[: values.shape[1]]):
+                    ax.plot(record.time, values[:, k], color=colour, lw=1.0)
+                unit = "" if record.unit(port) in ("", "1") else f"\n({record.unit(port)})"
+                ax.set_ylabel(port.removeprefix(f"{name}.") + unit)
+            axes[-1].set_xlabel("time (s)")
+        figures.append(Figure(file, f"Outputs of {name} over time."))
+    return figures
+
+
+def open_experiment(
+    path: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
+) -> Experiment[UntilStop]:
+    """Open an SSP as an experiment; `opened` closes it.
+
+    Raises:
+        InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
+    """
+    ssp = opened.enter_context(SspFile(path, step))
+    supervisor.heartbeat.tell_scratch(str(ssp.folder))
+    until = stop or ssp.stop
+    if until is None:
+        raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
+    return experiment_of(ssp, until)
+
+
+def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
+    """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
+    told = {"stop": str(stop), "step": None if step is None else str(step)}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **told}

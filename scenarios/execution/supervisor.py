@@ -1,0 +1,132 @@
+"""Runs a command in a child process, so that a unit which ends its process does not end what tells of it.
+
+Only where processes can be forked, thus not on Windows. What is imported here is loaded before every run.
+"""
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
+
+ORDERS = (
+    () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
+)
+"""Signals that ask a process to end: no crash."""
+
+heartbeat = Heartbeat()
+"""Of the run in this process; a parent and its child share it."""
+
+_in_child = False
+
+
+def heartbeat_of_run() -> Heartbeat:
+    """Return the heartbeat that a run in this process has to use: the one that the parent reads, if there is one."""
+    global heartbeat
+    if not _in_child:
+        heartbeat = Heartbeat()
+    return heartbeat
+
+
+def begin_child() -> None:
+    """Tell that this process is a child, whose parent reads `heartbeat`."""
+    global _in_child
+    _in_child = True
+
+
+def renew_heartbeat() -> Heartbeat:
+    """Return the heartbeat of the next run in a child of this process."""
+    global heartbeat
+    heartbeat = Heartbeat()
+    return heartbeat
+
+
+def can_supervise() -> bool:
+    """Return whether this process can be forked: the system does it, and no thread would be lost."""
+    return hasattr(os, "fork") and threading.active_count() == 1
+
+
+def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
+    """Run a command in a child process and end with its status.
+
+    If it dies, `report_crash` gets the heartbeat, how the child ended and the seconds that it lived; it completes what
+    the run left, says what happened and returns the exit status.
+
+    The child is a process group of its own: the parent alone hears of Ctrl-C and passes on what it hears, so that the
+    child hears of each once. If the parent dies, so does the child.
+    """
+    began = time.monotonic()
+    heard = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGCONT]
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
+
+    def begin() -> NoReturn:
+        begin_child()
+        signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # a group in the background may write to the terminal
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        run_to_end(command)
+
+    child = ForkedChild(begin, heartbeat)
+    _pass_on(child.pid)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    end = child.wait()
+    assert end is not None  # it watched nothing else
+    _end_as(end, time.monotonic() - began, report_crash)
+
+
+def run_to_end(command: Callable[[], Any]) -> NoReturn:
+    """Run a command and end this process with its status."""
+    status = 1
+    try:
+        command()
+        status = 0
+    except SystemExit as e:
+        status = e.code if isinstance(e.code, int) else int(e.code is not None)
+    finally:
+        heartbeat.status = status
+    if heartbeat.abandoned:  # a thread is still in a unit's call: the interpreter could not end
+        leave(status)
+    sys.exit(status)
+
+
+def leave(status: int) -> NoReturn:
+    """End this process at once, in order."""
+    heartbeat.status = status
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(status)
+
+
+def _pass_on(child: int) -> None:
+    def tell(number: int, _frame: Any) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child, number)
+
+    def stop(_number: int, _frame: Any) -> None:
+        tell(signal.SIGSTOP, None)
+        os.kill(os.getpid(), signal.SIGSTOP)
+        tell(signal.SIGCONT, None)
+
+    signal.signal(signal.SIGINT, tell)
+    signal.signal(signal.SIGTERM, tell)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+        signal.signal(signal.SIGHUP, tell)
+    if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL:
+        signal.signal(signal.SIGTSTP, stop)
+
+
+def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
+    """End as the child did; where it was not done, tell what it died of."""
+    if end.signal is not None and end.signal in ORDERS:
+        signal.signal(end.signal, signal.SIG_DFL)
+        os.kill(os.getpid(), end.signal)
+    if heartbeat.status is not None:
+        sys.exit(heartbeat.status if end.signal is not None else end.status)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    sys.exit(report_crash(heartbeat, end, wall))

@@ -1,0 +1,252 @@
+"""Rules by which claims get their verdicts. They were laid down before the runs; every reason tells its rule.
+
+A verdict is given only if the runs could have led to either: where so few can never meet a rule, or never break it, the
+claim is not comparable.
+
+Writes rates, intervals, medians and p-values for claims and tables.
+
+The bootstrap's interval of a ratio of two groups.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.statistics import (
+    LEVEL,
+    RESAMPLES,
+    Interval,
+    Statistic,
+    compatible_counts,
+    paired_test,
+    success_interval,
+    time_interval,
+    two_proportions,
+)
+from handover.scenarios.published.published_experiment import Claim, Verdict
+
+
+def told_rate(successes: int, n: int) -> str:
+    """Return such as `11/15 (73 %)`."""
+    return f"{successes}/{n} ({told_share(successes / n)})"
+
+
+def told_share(share: float) -> str:
+    """Return such as `73 %`."""
+    return f"{100 * share:.0f} %"
+
+
+def told_interval(low: float, high: float) -> str:
+    """Return the interval of a rate such as `45 to 92 %`."""
+    return f"{100 * low:.0f} to {told_share(high)}"
+
+
+def told_p(p: float) -> str:
+    """Return a p-value, such as `0.031` or `2e-12`."""
+    return f"{p:.2g}"
+
+
+def told_median(values: Floats, digits: int) -> str:
+    """Return a median with its interval by bootstrap, such as `5.2 (4.8 to 6.1)`; "" of no values."""
+    if not len(values):
+        return ""
+    interval, told = time_interval(values), f"{np.median(values):.{digits}f}"
+    return told if interval is None else f"{told} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
+
+
+FEW = 0.10
+"""Share of runs below which something counts as not happening."""
+
+_FEWEST_DIFFERING = next(k for k in range(1, 64) if 2.0 ** (1 - k) < LEVEL)
+"""Pairs that must differ, all in one direction, for McNemar's exact test to reject."""
+
+
+def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tuple[int, int]) -> Claim:
+    """Judge a rate of success, each given as successes and trials.
+
+    It is reproduced if Fisher's exact test of both counts, two-sided, does not reject at 5 % that the rates are equal.
+    The reason tells which counts the test would have let pass; not comparable if these are all.
+    """
+    if not measured[1]:
+        return nothing_measured(claim, where, told_rate(*published))
+    ours, theirs = success_interval(*measured), success_interval(*published)
+    p, n = two_proportions(*measured, *published), measured[1]
+    low, high = compatible_counts(*published, n)
+    power = f"any count of ours from {low} to {high} of {n} would have passed"
+    if (low, high) == (0, n):
+        power = f"with so few trials no count of ours out of {n} could have been told from theirs"
+    reason = (
+        f"Reproduced if Fisher's exact test of both counts does not reject at {told_share(LEVEL)} that the rates are "
+        f"equal: p = {told_p(p)}. Their own interval is {told_interval(theirs.low, theirs.high)}; {power}."
+    )
+    return Claim(
+        claim=claim,
+        published=told_rate(*published),
+        measured=told_rate(*measured),
+        interval=(ours.low, ours.high),
+        verdict=_verdict(p >= LEVEL, could_be_either=(low, high) != (0, n)),
+        reason=reason,
+        where=where,
+    )
+
+
+def order_claim(
+    claim: str,
+    where: str,
+    published: str,
+    first: Sequence[bool],
+    second: Sequence[bool],
+    note: str = "",
+    beyond: bool = False,
+) -> Claim:
+    """Judge that a first way succeeds more often than a second, each tried in the same scenes, in the same order.
+
+    It is reproduced if McNemar's exact test of the pairs, two-sided, rejects at 5 % that neither does better, and the
+    first does better.
+    """
+    if not first:
+        return nothing_measured(claim, where, published, beyond)
+    test, n = paired_test(first, second), len(first)
+    reason = (
+        f"{'Holds' if beyond else 'Reproduced'} if McNemar's exact test of runs in the same scenes rejects at "
+        f"{told_share(LEVEL)}, in this direction: of {n} pairs only the first succeeded in {test.only_first}, only the "
+        f"second in {test.only_second}; p = {told_p(test.p)}. {note}"
+    )
+    return Claim(
+        claim=claim,
+        published=published,
+        measured=f"{told_rate(sum(first), n)} against {told_rate(sum(second), n)}",
+        verdict=_verdict(test.first_is_better, could_be_either=n >= _FEWEST_DIFFERING),
+        reason=_with_want(reason, n, _FEWEST_DIFFERING),
+        where=where,
+        beyond=beyond,
+    )
+
+
+def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) -> Claim:
+    """Judge, beyond the paper, that a first way does no worse than a second, each tried in the same scenes.
+
+    It holds if the share of scenes in which only the second succeeds has an interval below 10 %. That a test of
+    difference does not reject would not do: with few pairs it never does.
+    """
+    if not first:
+        return nothing_measured(claim, "", "", beyond=True)
+    test, n = paired_test(first, second), len(first)
+    interval = success_interval(test.only_second, n)
+    reason = (
+        "Holds if the share of scenes in which only the second succeeds has an interval (Clopper-Pearson) below "
+        f"{told_share(FEW)}: of {n} pairs that is so in {test.only_second}, "
+        f"{told_interval(interval.low, interval.high)}; the reverse in {test.only_first}; McNemar's p = "
+        f"{told_p(test.p)}."
+    )
+    return Claim(
+        claim=claim,
+        published="",
+        measured=f"{told_rate(sum(first), n)} against {told_rate(sum(second), n)}",
+        interval=(interval.low, interval.high),
+        verdict=_verdict(interval.high < FEW, could_be_either=n >= fewest_for(FEW)),
+        reason=_with_want(reason, n, fewest_for(FEW)),
+        beyond=True,
+    )
+
+
+def majority_claim(claim: str, where: str, published: str, measured: tuple[int, int], note: str = "") -> Claim:
+    """Judge that most trials succeed: it is reproduced if the rate's interval lies above one half."""
+    if not measured[1]:
+        return nothing_measured(claim, where, published)
+    interval, fewest = success_interval(*measured), fewest_for(0.5)
+    rule = f"Reproduced if the rate's interval (Clopper-Pearson) lies above one half. {note}"
+    met = interval.low > 0.5
+    return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
+
+
+def rare_claim(claim: str, where: str, published: str, measured: tuple[int, int], note: str = "") -> Claim:
+    """Judge that something does not happen, given how often it did: it is reproduced if its interval is below 10 %."""
+    if not measured[1]:
+        return nothing_measured(claim, where, published)
+    interval, fewest = success_interval(*measured), fewest_for(FEW)
+    rule = f"Reproduced if the interval of how often it happens (Clopper-Pearson) lies below {told_share(FEW)}. {note}"
+    met = interval.high < FEW
+    return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
+
+
+def nothing_measured(
+    claim: str, where: str, published: str, beyond: bool = False, reason: str = "None of its runs came to its end."
+) -> Claim:
+    """Return a claim on which there is no run, or there are too few."""
+    return Claim(
+        claim=claim,
+        published=published,
+        measured="",
+        verdict=Verdict.NOT_COMPARABLE,
+        reason=reason,
+        where=where,
+        beyond=beyond,
+    )
+
+
+def without_verdict(claim: Claim, reason: str) -> Claim:
+    """Return a claim that a rule has judged, without its verdict, for a reason that stands before the rule's."""
+    told = f"{reason} For what it is worth: {claim.reason}"
+    return replace(claim, verdict=Verdict.NOT_COMPARABLE, reason=told)
+
+
+def _of_rate(
+    claim: str,
+    where: str,
+    published: str,
+    measured: tuple[int, int],
+    interval: Interval,
+    rule: str,
+    met: bool,
+    fewest: int,
+) -> Claim:
+    return Claim(
+        claim=claim,
+        published=published,
+        measured=told_rate(*measured),
+        interval=(interval.low, interval.high),
+        verdict=_verdict(met, could_be_either=measured[1] >= fewest),
+        reason=_with_want(rule, measured[1], fewest),
+        where=where,
+    )
+
+
+def _verdict(met: bool, could_be_either: bool) -> Verdict:
+    if not could_be_either:
+        return Verdict.NOT_COMPARABLE
+    return Verdict.REPRODUCED if met else Verdict.NOT_REPRODUCED
+
+
+def fewest_for(share: float) -> int:
+    """Return how many trials it takes until none that fails leaves an interval below a share.
+
+    The interval of Clopper and Pearson then ends at 1 - (LEVEL / 2)^(1 / n).
+    """
+    return math.floor(math.log(LEVEL / 2) / math.log1p(-share)) + 1
+
+
+def _with_want(reason: str, n: int, fewest: int) -> str:
+    """Add to a reason that the trials are too few for its rule to be met, if they are."""
+    want = f"With {n} runs nothing could have met this rule: it takes at least {fewest}." if n < fewest else ""
+    return f"{reason.strip()} {want}".strip()
+
+
+def ratio_interval(x: Floats, y: Floats, statistic: Statistic) -> tuple[float, float] | None:
+    """Return the percentile interval, at 1 - LEVEL, of statistic(x) / statistic(y); each group is resampled by itself.
+
+    A resample whose denominator is 0 counts as an infinite ratio, or as none if its numerator is 0 too. None if that
+    leaves the interval an end that is not finite.
+    """
+    rng = np.random.default_rng(0)
+    above, below = (statistic(v[rng.integers(len(v), size=(RESAMPLES, len(v)))], axis=-1) for v in (x, y))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = above / below
+    ratios = ratios[~np.isnan(ratios)]
+    if not len(ratios):
+        return None
+    low, high = (float(v) for v in np.quantile(ratios, [LEVEL / 2, 1.0 - LEVEL / 2], method="inverted_cdf"))
+    return (low, high) if np.isfinite(high) else None
