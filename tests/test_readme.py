@@ -29,7 +29,7 @@ OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
 def handover(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     arguments = shlex.split(command)[1:]
-    call = [sys.executable, "-c", "from handover.scenarios.command import main; main()", *arguments]
+    call = [sys.executable, "-c", "from handover.scenarios.cli.command import main; main()", *arguments]
     return subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
 
 

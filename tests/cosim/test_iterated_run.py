@@ -11,7 +11,7 @@ from two_masses import TwoMasses
 
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from oscillator import PLAIN, STATES
 
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 SCENARIO = "flyer_impedance"
 """Its units have FMI 2 forms, steps of one length, and no enumerations that would have to be set."""

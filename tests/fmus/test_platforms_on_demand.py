@@ -26,7 +26,7 @@ from handover.fmus.compile import (
     named_platforms,
     wanted_platforms,
 )
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 COMPILE = r"""
 from pathlib import Path

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.ir_table import IrTable
 

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parent))  # the modules beside the tests
 
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 _FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",

@@ -8,7 +8,7 @@ from campaigns import folder_of, table_of, told
 from click.testing import CliRunner
 
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 

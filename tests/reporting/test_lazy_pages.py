@@ -7,14 +7,14 @@ import click
 import pytest
 
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
-from handover.scenarios.command import COMMANDS, main
+from handover.scenarios.cli.command import COMMANDS, main
 
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
 HELP = HEAVY | {"numpy", "rich", "pymunk", "cosim", "fmus"}
 _CALL = """
 import sys
-from handover.scenarios.entry import main
+from handover.scenarios.cli.entry import main
 
 sys.argv[0] = "handover"
 try:
@@ -32,7 +32,7 @@ def loaded_by(*arguments: str) -> set[str]:
 
 
 def test_what_carries_runs_out_loads_neither_pages_nor_statistics():
-    told = "import sys, handover.scenarios.run_command, handover.scenarios.sweep_command; print(*sys.modules)"
+    told = "import sys, handover.scenarios.cli.run, handover.scenarios.cli.sweep; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
     assert not (PAGES | {"matplotlib"}) & set(done.stdout.split())
 

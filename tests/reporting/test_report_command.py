@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 FILES = {"figures", "report.html", "run.json", "signals.parquet", "summary.json"}
 

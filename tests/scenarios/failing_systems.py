@@ -15,7 +15,7 @@ from handover.cosim.system.system import System
 sys.path.insert(0, str(Path(__file__).parents[1] / "cosim"))
 native_fmu: Callable[..., Path] = importlib.import_module("native_units").native_fmu
 
-_MAIN = "from handover.scenarios.entry import main; main()"
+_MAIN = "from handover.scenarios.cli.entry import main; main()"
 IN_TERMINAL = f"import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); {_MAIN}"
 """The command where standard input is a terminal, which it makes the one that controls it."""
 

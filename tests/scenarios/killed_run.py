@@ -13,14 +13,14 @@ import sys
 sys.path.insert(0, sys.argv[1])
 from killed_run import tell_from
 tell_from(float(sys.argv[2]), float(sys.argv[3]))
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 main(sys.argv[4:])
 """
 
 
 def tell_from(passed: float, waits: float) -> None:
     """Let runs of this process tell from one simulated time on that they have passed it, and wait at another."""
-    import handover.scenarios.run_command
+    import handover.scenarios.cli.run
 
     @contextmanager
     def telling(_stream: TextIO) -> Generator[Callable[[float, float], None], None, None]:
@@ -33,7 +33,7 @@ def tell_from(passed: float, waits: float) -> None:
         if t >= waits:
             sys.stdin.read()
 
-    handover.scenarios.run_command.progress_bar = telling
+    handover.scenarios.cli.run.progress_bar = telling
 
 
 def end_between(passed: float, waits: float, number: signal.Signals, *arguments: str | Path) -> int:

@@ -12,7 +12,7 @@ import psutil
 
 from handover.scenarios.campaign.table import CampaignTable
 
-_ENTRY = [sys.executable, "-c", "from handover.scenarios.entry import main; main()"]
+_ENTRY = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()"]
 Going = subprocess.Popen[str]
 
 

@@ -20,7 +20,7 @@ from handover.scenarios.campaign.cluster import ClusterCrew
 from handover.scenarios.campaign.run_server import RunServer
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import Crew, RunAnswer, RunOrder
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.execution import supervisor
 
 CALL = ["sweep", "ir_grasp", "-p", "strategy=forward", "--repeat", "3", "--out", "c", "--no-report", "--workers", "2"]

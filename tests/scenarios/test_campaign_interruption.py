@@ -11,13 +11,12 @@ import pytest
 from own_crew import OwnCrew
 
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder, Tally
-from handover.scenarios.campaign_call import call_campaign
+from handover.scenarios.cli.campaign import CampaignInterruption, call_campaign
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}

@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from handover.scenarios.campaign.campaign_progress import CampaignProgress, told_done, told_left
 from handover.scenarios.campaign.worker_pool import Tally
+from handover.scenarios.cli.campaign import CampaignProgress, told_done, told_left
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from handover.scenarios.campaign.campaign_summary import print_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import table_of
 from handover.scenarios.campaign.worker_pool import Tally
+from handover.scenarios.cli.campaign_summary import print_campaign
 from handover.scenarios.experiment.experiment import Metric
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.fmi2_description import NoFmi2Form
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 LIGHT = ("Push", "IrReflex", "TrajectoryPlanner")
 
@@ -168,7 +168,7 @@ def test_what_a_file_says_does_not_steer_the_terminal(tmp_path: Path):
 
 
 def test_a_reader_who_leaves_does_not_change_the_status(broken: Path, tmp_path: Path):
-    command = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "check", str(broken)]
+    command = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "check", str(broken)]
     reading, writing = os.pipe()
     os.close(reading)
     try:

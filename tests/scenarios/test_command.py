@@ -14,7 +14,7 @@ from handover.cosim.record.reader import Record
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 
 def call(*arguments: str | Path) -> Result:
@@ -60,7 +60,7 @@ def test_every_unit_can_be_listed(name: str):
 
 
 def test_a_reader_who_leaves_does_not_change_the_status(tmp_path: Path):
-    command = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "list"]
+    command = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "list"]
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -72,7 +72,7 @@ def test_a_reader_who_leaves_does_not_change_the_status(tmp_path: Path):
 
 def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
     (tmp_path / "click.py").write_text("raise KeyboardInterrupt\n")
-    command = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "list"]
+    command = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "list"]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (130, "Aborted!\n")

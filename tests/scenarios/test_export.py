@@ -12,7 +12,7 @@ from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.parameters import parse_parameters
 
 CHEAP = "ir_grasp"

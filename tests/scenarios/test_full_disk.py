@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
 from failing_systems import failing_ssp
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 FILES = ["run.json", "signals.csv", "summary.json", "report.html"]
 

@@ -2,8 +2,8 @@
 
 from click.testing import CliRunner
 
-from handover.scenarios.command import main
-from handover.scenarios.run_command import run
+from handover.scenarios.cli.command import main
+from handover.scenarios.cli.run import run
 
 
 def test_help_of_a_run_has_every_option_once_below_its_heading():

@@ -10,10 +10,10 @@ import pytest
 from own_crew import OwnCrew
 
 from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.campaign_progress import CampaignProgress
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.local_cluster import embedded_crew
 from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.cli.campaign import CampaignProgress
 from handover.scenarios.published.helix_1 import Helix1
 from handover.scenarios.published.published_experiment import Verdict, draw_figures, write_claims
 

@@ -21,7 +21,7 @@ from handover.scenarios.helix.parameters import Parameters
 
 
 def command(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-c", "from handover.scenarios.command import main; main()", *map(str, arguments)]
+    return [sys.executable, "-c", "from handover.scenarios.cli.command import main; main()", *map(str, arguments)]
 
 
 def run(out: Path, *arguments: str) -> tuple[int, dict[str, Any]]:

@@ -16,7 +16,7 @@ BLOCKS = ["HangingArm", "NativelyHangingArm"][: 2 if sys.platform.startswith("li
 
 
 def start(*arguments: str | Path) -> "subprocess.Popen[str]":
-    call = [sys.executable, "-c", "from handover.scenarios.entry import main; main()", "run", "helix_handover"]
+    call = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "run", "helix_handover"]
     return subprocess.Popen([*call, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

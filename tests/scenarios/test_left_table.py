@@ -15,7 +15,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.table_writer import complete_table
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}

@@ -7,7 +7,7 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from handover.scenarios.limit_arguments import limit_options, limits
+from handover.scenarios.cli.options import limit_options, limits
 
 
 def call(*arguments: str) -> tuple[Result, dict[str, Any]]:

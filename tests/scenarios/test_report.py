@@ -15,7 +15,7 @@ from failing_systems import failing_ssp, native_fmu
 
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tables import master_rows

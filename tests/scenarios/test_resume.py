@@ -13,11 +13,11 @@ from killed_run import end_between
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
+from handover.scenarios.cli.listing import print_summary
 from handover.scenarios.execution.task import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.listing import print_summary
 from handover.scenarios.results.run_folder import RunFolder
 
 fcntl = pytest.importorskip("fcntl")

@@ -13,7 +13,7 @@ from flyer_runs import run
 
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.execution.summary import parameter_rows, told_system
 from handover.scenarios.execution.task import Task
 from handover.scenarios.free_flyer.impedance import FlyerImpedance

@@ -21,7 +21,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
 

@@ -14,7 +14,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 
 
 def run(file: Path, *arguments: str | Path) -> Result:

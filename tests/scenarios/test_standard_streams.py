@@ -7,7 +7,7 @@ import pytest
 
 PROGRAM = """
 import sys
-from handover.scenarios.standard_streams import open_standard_streams
+from handover.scenarios.cli.entry import open_standard_streams
 open_standard_streams()
 made = open(sys.argv[1], "w")
 assert made.fileno() > 2

@@ -15,7 +15,7 @@ from handover.scenarios.campaign import local_cluster, plan_check
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunOrder
-from handover.scenarios.command import main
+from handover.scenarios.cli.command import main
 from handover.scenarios.execution.errors import BadCrew, CrewLost
 
 CALL = [

@@ -9,8 +9,8 @@ import psutil
 import pytest
 from sweeping import Going, ended, runs_in, sweeping, wait_for
 
-from handover.scenarios.campaign.campaign_interruption import CampaignInterruption
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.cli.campaign import CampaignInterruption
 
 pytestmark = pytest.mark.slow
 

@@ -18,10 +18,10 @@ from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl.parameters import Params as ArmParams
+from handover.scenarios.cli.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl.training import SPLIT
-from handover.scenarios.vsl_train_command import vsl_train
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}

@@ -25,10 +25,10 @@ from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block, cached
-from handover.scenarios import vsl_train_command
+from handover.scenarios.cli import vsl_train as vsl_train_command
+from handover.scenarios.cli.vsl_train import vsl_train
 from handover.scenarios.vsl.training import Errors, VslTraining, content_key, split
 from handover.scenarios.vsl.training_data import Dataset, describe_arm
-from handover.scenarios.vsl_train_command import vsl_train
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 TRAINING = VslTraining(fmu=Path("none"), kinematics=ARM, points=0, seed=0)

@@ -6,9 +6,8 @@ from typing import Any
 
 import click
 
+from handover.scenarios.cli.options import HeadedOption, Seconds
 from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.headed_options import HeadedOption
-from handover.scenarios.seconds import Seconds
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
 _STOP = _option(

@@ -14,7 +14,11 @@ import click
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
-from handover.scenarios.ending import end_with
+from handover.scenarios.cli.listing import end_with
+from handover.scenarios.cli.master_options import coupling_of, master_options
+from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
+from handover.scenarios.cli.progress import progress_bar
+from handover.scenarios.cli.ssp import refuse_for_ssp, ssp_options
 from handover.scenarios.execution.errors import BadCall, told_in_one_line
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import carry_out
@@ -23,14 +27,7 @@ from handover.scenarios.execution.ssp_run import NoParameters, is_ssp, open_expe
 from handover.scenarios.execution.task import Task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.headed_options import HeadedCommand, HeadedOption
-from handover.scenarios.limit_arguments import limit_options, limits
-from handover.scenarios.master_arguments import coupling_of, master_options
-from handover.scenarios.progress import progress_bar
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.scenario_arguments import scenario_options
-from handover.scenarios.seconds import Seconds
-from handover.scenarios.ssp_call import refuse_for_ssp, ssp_options
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 

@@ -82,46 +82,46 @@ class DeferringGroup(click.Group):
 COMMANDS = (
     DeferredCommand(
         "build",
-        "handover.scenarios.build_command:build_command",
+        "handover.scenarios.cli.build:build_command",
         help="Build UNITs (all by default) as FMUs for other tools.",
     ),
     DeferredCommand(
-        "check", "handover.scenarios.check_command:check", short_help="Tell what is wrong with FMUs, whoever made them."
+        "check", "handover.scenarios.cli.check:check", short_help="Tell what is wrong with FMUs, whoever made them."
     ),
     DeferredCommand(
         "export",
-        "handover.scenarios.export_command:export_command",
+        "handover.scenarios.cli.export:export_command",
         short_help="Write a SCENARIO as an SSP, for other tools.",
     ),
     DeferredCommand(
         "list",
-        "handover.scenarios.list_command:list_command",
+        "handover.scenarios.cli.list:list_command",
         short_help="List scenarios and units, or what one of them takes and gives.",
     ),
     DeferredCommand(
         "paper",
-        "handover.scenarios.paper_command:paper",
+        "handover.scenarios.cli.paper:paper",
         help="Carry out a paper's EXPERIMENT, and put what comes out beside what was published.",
     ),
     DeferredCommand(
-        "report", "handover.scenarios.report_command:report", short_help="Write the page of a run or of a campaign."
+        "report", "handover.scenarios.cli.report:report", short_help="Write the page of a run or of a campaign."
     ),
     DeferredCommand(
-        "resume", "handover.scenarios.resume_command:resume", short_help="Go on with a run from its last checkpoint."
+        "resume", "handover.scenarios.cli.resume:resume", short_help="Go on with a run from its last checkpoint."
     ),
     DeferredCommand(
         "run",
-        "handover.scenarios.run_command:run",
+        "handover.scenarios.cli.run:run",
         help="Run a SCENARIO once and write summary, signals, figures and a report into a folder.",
     ),
     DeferredCommand(
         "sweep",
-        "handover.scenarios.sweep_command:sweep",
+        "handover.scenarios.cli.sweep:sweep",
         help="Run a SCENARIO many times: all combinations of the given values, each --repeat times.",
     ),
     DeferredCommand(
         "vsl-train",
-        "handover.scenarios.vsl_train_command:vsl_train",
+        "handover.scenarios.cli.vsl_train:vsl_train",
         help="Train the kinematics of the arm with variable-stiffness links on the arm's own FMU.",
     ),
 )

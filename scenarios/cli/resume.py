@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.ending import end_with
+from handover.scenarios.cli.listing import end_with
+from handover.scenarios.cli.options import limit_options, limits
+from handover.scenarios.cli.progress import progress_bar
 from handover.scenarios.execution.errors import told_in_one_line
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resume import LeftRun
 from handover.scenarios.execution.runner import carry_out
-from handover.scenarios.limit_arguments import limit_options, limits
-from handover.scenarios.progress import progress_bar
 from handover.scenarios.results.run_folder import RunFolder
 
 _HELP = """Go on with a run that was interrupted, killed, or that failed, from its last checkpoint.

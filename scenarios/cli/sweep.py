@@ -12,15 +12,12 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
 from handover.scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign_arguments import campaign_options
-from handover.scenarios.campaign_call import call_campaign, workforce_of
+from handover.scenarios.cli.campaign import call_campaign, workforce_of
+from handover.scenarios.cli.master_options import coupling_of, master_options
+from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
 from handover.scenarios.execution.errors import BadCall, told_in_one_line
 from handover.scenarios.execution.selection import replacements, scenario_named
 from handover.scenarios.execution.ssp_run import is_ssp
-from handover.scenarios.headed_options import HeadedCommand
-from handover.scenarios.limit_arguments import limit_options, limits
-from handover.scenarios.master_arguments import coupling_of, master_options
-from handover.scenarios.scenario_arguments import scenario_options
 
 _HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
 
@@ -102,8 +99,8 @@ def sweep(
         )
     call = call_campaign(plan, out, crew, (lambda _folder, _table: None) if no_report else _write_report)
 
-    from handover.scenarios.campaign.campaign_summary import print_campaign
     from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
+    from handover.scenarios.cli.campaign_summary import print_campaign
 
     print_campaign(CampaignResults(call.folder.read(), call.table), call.tally, call.folder)
     sys.exit(call.status)

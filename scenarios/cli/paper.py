@@ -13,11 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.exceptions import nearest
-from handover.scenarios.campaign_arguments import campaign_options
-from handover.scenarios.campaign_call import call_campaign, workforce_of
-from handover.scenarios.console import open_console
+from handover.scenarios.cli.campaign import call_campaign, workforce_of
+from handover.scenarios.cli.listing import open_console
+from handover.scenarios.cli.options import HeadedCommand, campaign_options
 from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.headed_options import HeadedCommand
 from handover.scenarios.results.run_folder import BadRunFolder
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def paper(
     finish = _Finish(carried_out, report=not no_report)
     call = call_campaign(replace(plan, experiment=experiment), out, workforce_of(workers, scheduler), finish)
 
-    from handover.scenarios.published.told_results import print_results
+    from handover.scenarios.cli.claims_summary import print_results
 
     print_results(carried_out, finish.results, call.folder)
     sys.exit(call.status)

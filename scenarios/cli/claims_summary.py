@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.console import open_console
+from handover.scenarios.cli.listing import open_console
 from handover.scenarios.published.published_experiment import (
     Claim,
     ComparisonTable,

@@ -1,10 +1,29 @@
-"""Where the command `handover` starts: Ctrl-C counts from its first instant."""
+"""Where the command `handover` starts: Ctrl-C counts from its first instant.
 
+The standard streams, of which a process may be started without any, as by a daemon or by `>&-`.
+"""
+
+import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
 from handover.scenarios.execution.exit_status import ABORTED
-from handover.scenarios.standard_streams import open_standard_streams
+
+
+def open_standard_streams() -> None:
+    """Let streams that are closed lead nowhere.
+
+    Otherwise the next files that are opened, such as a record, take their numbers, and what a unit prints goes there.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number: this one, as those below are taken
+        if getattr(sys, name) is None:
+            mode = "w" if number else "r"
+            setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
+
 
 if TYPE_CHECKING:
     from handover.cosim.fmu.heartbeat import Heartbeat
@@ -31,14 +50,14 @@ def main() -> None:
 
 def _command() -> None:
     try:
-        from handover.scenarios.command import main as command
+        from handover.scenarios.cli.command import main as command
     except KeyboardInterrupt:
         _abort()
     command()
 
 
 def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:
-    from handover.scenarios.tell_death import tell_death  # what it loads is loaded by no other run
+    from handover.scenarios.cli.crash_report import tell_death  # what it loads is loaded by no other run
 
     return tell_death(heartbeat, end, wall)
 

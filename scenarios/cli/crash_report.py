@@ -4,10 +4,10 @@ import sys
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.scenarios.cli.listing import print_summary
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.execution.crash import Death
 from handover.scenarios.execution.exit_status import UNIT_FAILED
-from handover.scenarios.listing import print_summary
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import told_if_not_written
 

@@ -8,9 +8,8 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
+from handover.scenarios.cli.options import HeadedOption, Seconds
 from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.headed_options import HeadedOption
-from handover.scenarios.seconds import Seconds
 
 _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()

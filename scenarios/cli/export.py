@@ -8,12 +8,12 @@ import click
 from handover.cosim.ssp.writing import write_ssp
 from handover.fmus.build import cached
 from handover.fmus.fmi2_description import NoFmi2Form
+from handover.scenarios.cli.options import scenario_options
 from handover.scenarios.execution.errors import BadCall, told_in_one_line
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import check_place
-from handover.scenarios.scenario_arguments import scenario_options
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 

@@ -7,12 +7,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from handover.scenarios.campaign.campaign_progress import told_done
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import Tally
-from handover.scenarios.console import open_console
+from handover.scenarios.cli.campaign import told_done
+from handover.scenarios.cli.listing import open_console
 from handover.scenarios.experiment.display_unit import shown_unit
 
 _MOST_POINTS = 12

@@ -1,23 +1,65 @@
-"""The command `handover build`."""
+"""The command `handover build`.
 
+A unit of one's own, as `handover build` is given it: the path of a block's class.
+"""
+
+import sys
 from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
 import click
 
-from handover.cosim.exceptions import nearest
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.blocks.description import describe
+from handover.cosim.exceptions import nearest, one_line
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import UnusableName, UnusableStep, build
-from handover.fmus.catalog import UNITS, Entry
+from handover.fmus.catalog import UNITS, Entry, UnknownBlock, import_block
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, UnusableText
+from handover.fmus.sources import closure
 from handover.scenarios.execution.errors import BadCall, told_in_one_line
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.own_unit import own_unit
 from handover.scenarios.results.run_folder import BadRunFolder, check_place
+
+_STEP = Fraction(1, 100)  # s, of a block that is not sampled
+
+
+def own_unit(path: str, step: str | None) -> Entry:
+    """Return the unit that a path such as `spring:Spring` names; the working directory is searched first.
+
+    Its step is that which is given, a number or a fraction of seconds, else the block's period, else 0.01 s.
+
+    Raises:
+        BadCall: there is no such class, its module does not load, it is no block, or the step is none.
+    """
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    given = None if step is None else _seconds(step)
+    try:
+        closure(path)
+        period = describe(import_block(path)).period
+    except (UnknownBlock, DeclarationError) as e:
+        raise BadCall(f"{path}: {e}" if isinstance(e, DeclarationError) else str(e)) from e
+    except Exception as e:  # a module may raise anything while it is loaded
+        raise BadCall(f"{path}: its module cannot be loaded: {type(e).__name__}: {one_line(e)}") from e
+    return Entry(path.rpartition(":")[2], path, given or period or _STEP, "")
+
+
+def _seconds(text: str) -> Fraction:
+    try:
+        step = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        step = Fraction(0)
+    if not sys.float_info.min <= step <= sys.float_info.max:
+        raise BadCall(f"--step {text!r} is not a positive number of seconds, such as 0.01 or 1/30")
+    return step
+
 
 _HELP = """Build UNITs (all by default) as FMUs for other tools. A unit of your own is named MODULE:CLASS, such as
 spring:Spring for the class Spring in spring.py; modules are looked for in the working directory first.

@@ -1,12 +1,47 @@
-"""What `handover` prints of a run that has ended: its summary."""
+"""What `handover` prints of a run that has ended: its summary.
 
+How a command tells the end of a run.
+
+The console that commands print to.
+"""
+
+import os
 import shlex
+import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
-from handover.scenarios.console import open_console, print_rows
-from handover.scenarios.execution.task import Ended
+import click
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from handover.scenarios.execution.exit_status import TASK_FAILED, UNIT_FAILED
+from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tables import pace_rows, told, told_conversion
+
+
+def open_console() -> Console:
+    """Return standard output's console: in colours and as wide as the terminal, plain and wide when piped."""
+    return _Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+
+
+def print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
+    """Print rows of texts in columns, indented; nothing in them is read as rich's markup."""
+    table = Table.grid(padding=(0, 2))
+    for row in rows:
+        table.add_row("", *map(Text, row))
+    console.print(table)
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Say no more to a reader who has left; how the run ended is still told by the exit status."""
+        self.quiet = True
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
+
 
 _MOST_CONVERSIONS = 8
 """Conversions of units that the end of a run tells on the terminal."""
@@ -36,3 +71,11 @@ def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
     left = len(told) - _MOST_CONVERSIONS
     more = [(f"{left} conversions more", "in the report")] if left > 0 else []
     return [(f"converted: {ends}", change) for ends, change in told[:_MOST_CONVERSIONS]] + more
+
+
+def end_with(ended: Ended, task: Task) -> NoReturn:
+    """Print how a run ended, and exit with the status that says so."""
+    if ended.failure:
+        click.echo(str(ended.failure), err=True)
+    print_summary(ended, task.experiment.headline, task.folder)
+    sys.exit(UNIT_FAILED if ended.failure else 0 if ended.outcome.success else TASK_FAILED)

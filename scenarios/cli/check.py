@@ -12,7 +12,7 @@ from rich.text import Text
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section
 from handover.cosim.fmu.archive import NO_FILE_FAULT, folder_fault
-from handover.scenarios.console import open_console
+from handover.scenarios.cli.listing import open_console
 from handover.scenarios.execution.errors import BadCall
 
 _FAULTS = 1

@@ -11,7 +11,7 @@ from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS, Entry, import_block
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
-from handover.scenarios.console import open_console, print_rows
+from handover.scenarios.cli.listing import open_console, print_rows
 from handover.scenarios.execution.errors import BadCall
 from handover.scenarios.experiment.experiment import Experiment
 

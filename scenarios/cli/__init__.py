@@ -1,0 +1,1 @@
+"""The command `handover`: a file a command."""

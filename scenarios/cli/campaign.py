@@ -1,0 +1,302 @@
+"""A campaign as a command carries it out: with its progress, ended in order by Ctrl-C, its end told in a line.
+
+Tells how far a campaign has come: a bar on a terminal, a line now and then elsewhere, as in a batch system's log.
+
+Ctrl-C during a campaign: the first ends it in order, the second at once.
+"""
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import NoReturn, TextIO
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.folder import CampaignFolder, place_of
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import PreparedPlan, prepared
+from handover.scenarios.campaign.pool_config import LateCrew, Workforce
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.worker_pool import Crew, Tally
+from handover.scenarios.execution.errors import BadCall, CrewLost, RunNotWritten, WorkersLost, told_in_one_line
+from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
+from handover.scenarios.execution.supervisor import leave
+
+_PAUSE = 30.0
+"""Seconds from line to line where there is no terminal."""
+
+_STARTING = "starting workers"
+
+
+class CampaignProgress:
+    """Shows a campaign's tally while it is used as a context manager; calling it moves it.
+
+    Args:
+        stream: where to; a bar if it is a terminal.
+        clock: gives the seconds from an instant on.
+    """
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
+        self.tally: Tally | None = None
+        """What it was told last."""
+        self._stream = stream
+        self._clock = clock
+        self._began = self._told = clock()
+        console = Console(file=stream)
+        columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.fields[left]}"))
+        self._bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._bar.add_task(_STARTING, total=None, left="")
+        self._telling, self._ended = threading.Lock(), threading.Event()
+        self._teller = threading.Thread(target=self._tell_while_nothing_ends, daemon=True)
+
+    def __call__(self, tally: Tally) -> None:
+        """Take how far it has come."""
+        if self.tally is None:
+            self._began = self._clock()
+        self.tally = tally
+        ended = tally.ended + tally.lost
+        left = told_left(tally, self._clock() - self._began)
+        self._bar.update(self._task, description=told_done(tally), total=tally.total, completed=ended, left=left)
+        self.tell()
+
+    def tell(self) -> None:
+        """Write a line if one is due."""
+        with self._telling:
+            if not self._bar.disable or self._due() > 0:
+                return
+            self._told = self._clock()
+            tally = self.tally
+            left = told_left(tally, self._told - self._began) if tally else ""
+            self._stream.write(f"{told_done(tally) if tally else _STARTING}{', ' if left else ''}{left}\n")
+            self._stream.flush()
+
+    def __enter__(self) -> "CampaignProgress":
+        self._told = self._clock()
+        self._bar.start()
+        if self._bar.disable:
+            self._teller.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+        self._ended.set()
+        if self._bar.disable:
+            self._teller.join()
+
+    def _due(self) -> float:
+        """Return in how many seconds the next line is due."""
+        return self._told + _PAUSE - self._clock()
+
+    def _tell_while_nothing_ends(self) -> None:
+        while not self._ended.wait(max(self._due(), 0.0)):
+            self.tell()
+
+
+def told_done(tally: Tally) -> str:
+    """Return such as "12 of 60 runs done, 1 failed, 2 lost"."""
+    parts = [f"{tally.ended} of {tally.total} runs done"]
+    parts += [f"{tally.failed} failed"] if tally.failed else []
+    parts += [f"{tally.lost} lost"] if tally.lost else []
+    return ", ".join(parts)
+
+
+def told_left(tally: Tally, elapsed: float) -> str:
+    """Return such as "3 min left", reckoned from the runs of this call; "" where nothing can be said."""
+    here = tally.ended + tally.lost - tally.kept
+    if here == 0 or tally.left == 0:
+        return ""
+    seconds = elapsed / here * tally.left
+    if seconds < 60:
+        return f"{max(1, round(seconds))} s left"
+    if seconds < 3600:
+        return f"{round(seconds / 60)} min left"
+    return f"{seconds / 3600:.1f} h left"
+
+
+_SIGNALS = [n for n in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is not None]
+
+
+class CampaignInterruption:
+    """Takes SIGINT, SIGTERM and SIGHUP over. Use it as a context manager in the main thread.
+
+    The first of them raises KeyboardInterrupt, on which a campaign drops the runs under way and writes its table. The
+    second ends this process at once with status 130; workers end when they miss it. One that is ignored, as under
+    nohup, stays so.
+    """
+
+    def __init__(self) -> None:
+        self._asked = self._holds_back = False
+        self._undo: list[Callable[[], object]] = []
+
+    def __enter__(self) -> "CampaignInterruption":
+        for number in _SIGNALS:
+            before = signal.getsignal(number)
+            if before is not signal.SIG_IGN:
+                signal.signal(number, self._take)
+                self._undo.append(partial(signal.signal, number, before))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for undo in self._undo:
+            undo()
+
+    @contextlib.contextmanager
+    def at_once(self) -> Generator[None, None, None]:
+        """Let the first signal end this process like the second, while there is nothing to put in order."""
+        before, self._asked = self._asked, True
+        try:
+            yield
+        finally:
+            self._asked = before
+
+    @contextlib.contextmanager
+    def held_back(self) -> Generator[None, None, None]:
+        """Let the first signal count at the end of the block, as what is half started or ended is not in order.
+
+        Raises:
+            KeyboardInterrupt: at the end, if there has been one.
+        """
+        self._holds_back = True
+        try:
+            yield
+        finally:
+            self._holds_back = False
+        if self._asked:
+            raise KeyboardInterrupt
+
+    def _take(self, _number: int, _frame: FrameType | None) -> None:
+        if self._asked:
+            os.write(2, b"\nAborted!\n" if os.isatty(2) else b"Aborted!\n")
+            leave(ABORTED)
+        self._asked = True
+        if not self._holds_back:
+            raise KeyboardInterrupt
+
+
+Finish = Callable[[CampaignFolder, CampaignTable], None]
+"""Writes what is made of a campaign that has come to its end."""
+
+
+@dataclass(frozen=True)
+class CampaignCall:
+    """A campaign that has come to its end: the plan as it was checked, where it is, its runs, and how many failed."""
+
+    plan: CampaignPlan
+    folder: CampaignFolder
+    table: CampaignTable
+    tally: Tally
+
+    @property
+    def status(self) -> int:
+        """The command's exit status: whether all runs have ended, whether or not their tasks succeeded."""
+        return UNIT_FAILED if self.tally.failed or self.tally.lost else 0
+
+
+def workforce_of(workers: int | None, scheduler: str | None) -> Workforce:
+    """Return workers of this machine, or those of a scheduler.
+
+    Raises:
+        BadCall: both are given.
+    """
+    if workers is not None and scheduler is not None:
+        raise BadCall("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
+    return Workforce(workers, scheduler)
+
+
+def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, finish: Finish) -> CampaignCall:
+    """Carry out a campaign in a folder, or in one of its own in `campaigns/`, and finish it.
+
+    Interrupted, the command ends here, with the status that says so.
+
+    Raises:
+        BadCall, RunNotWritten, WorkersLost: with what was wrong, in a line.
+    """
+    progress = CampaignProgress(sys.stderr)
+    folder = None
+    try:
+        with CampaignInterruption() as interruption, told_in_one_line():
+            called = CampaignFolder(out) if out else None
+            ready = prepared(plan, lambda checked: _check_cheaply(checked, called, workers, interruption))
+            folder = called or place_of(ready.plan, ready.fmus)
+            folder.check(ready.plan, ready.fmus)  # before it is told what begins
+            table = _carry_out(ready, folder, workers, interruption, progress)
+            finish(folder, table)
+    except KeyboardInterrupt:
+        _end_interrupted(folder, progress)
+    tally = progress.tally
+    assert tally is not None
+    if tally.kept == tally.total:
+        click.echo(f"{folder.path} has all of its runs; none was carried out", err=True)
+    return CampaignCall(ready.plan, folder, table, tally)
+
+
+def _check_cheaply(
+    plan: CampaignPlan, folder: CampaignFolder | None, workers: Workforce, interruption: CampaignInterruption
+) -> None:
+    """Check what takes no units, which may have to be built."""
+    if folder is not None:
+        folder.check_free()
+    if folder is None or not folder.has_all(plan):
+        with interruption.at_once():  # a server that does not answer holds up asyncio's end
+            workers.check()
+
+
+def _carry_out(
+    ready: PreparedPlan,
+    folder: CampaignFolder,
+    workers: Workforce,
+    interruption: CampaignInterruption,
+    progress: CampaignProgress,
+) -> CampaignTable:
+    plan = ready.plan
+    if not folder.has_all(plan):
+        done = sum(map(folder.is_done, plan.runs()))
+        told = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
+        click.echo(f"{told}{f'; {done} are done' if done else ''}", err=True)
+    try:
+        with contextlib.ExitStack() as opened, progress:
+            start = partial(_started, workers, interruption)
+            return carry_out_campaign(ready, folder, LateCrew(start, opened), progress, interruption.held_back)
+    except (RecordNotWritten, CrewLost) as e:
+        if progress.tally is None:
+            raise
+        stopped = WorkersLost if isinstance(e, CrewLost) else RunNotWritten
+        raise stopped(f"{e}; {told_done(progress.tally)}; the same call goes on") from e
+
+
+@contextlib.contextmanager
+def _started(workers: Workforce, interruption: CampaignInterruption) -> Generator[Crew, None, None]:
+    """Give workers; neither their start nor their end is interrupted."""
+    opened = contextlib.ExitStack()
+    try:
+        with interruption.held_back():
+            crew = opened.enter_context(workers.start())
+        yield crew
+    finally:
+        with interruption.held_back():
+            opened.close()
+
+
+def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:
+    if folder is None or progress.tally is None:
+        kept = folder is not None and folder.is_there
+        click.echo(f"Aborted! The same call goes on with {folder.path}" if folder and kept else "Aborted!", err=True)
+        sys.exit(ABORTED)
+    click.echo(f"{told_done(progress.tally)} in {folder.path}; the same call goes on", err=True)
+    sys.exit(INTERRUPTED)
