@@ -21,10 +21,10 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Spent
 from handover.scenarios.execution.runner import carry_out
 from handover.scenarios.execution.selection import scenario_named
-from handover.scenarios.execution.summary import configuration, files_and_forms, told_task
-from handover.scenarios.execution.task import Task
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
+from handover.scenarios.results.summary import configuration, files_and_forms, told_task
+from handover.scenarios.results.task import Task
 
 Refusal = UnitRefused | UnitFailure | WiringError | ScheduleError
 """Why a run cannot begin, where that follows from what it is and not from where it is carried out."""

@@ -17,9 +17,9 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.scenarios.execution.exit_status import TASK_FAILED, UNIT_FAILED
-from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tables import pace_rows, told, told_conversion
+from handover.scenarios.results.task import Ended, Task
 
 
 def open_console() -> Console:

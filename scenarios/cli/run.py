@@ -24,10 +24,10 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import carry_out
 from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
 from handover.scenarios.execution.ssp_run import NoParameters, is_ssp, open_experiment, source_of
-from handover.scenarios.execution.task import Task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.task import Task
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 

@@ -11,10 +11,10 @@ from handover.cosim.fmu.heartbeat import Call, Heartbeat
 from handover.cosim.record.reader import Record
 from handover.cosim.record.stream import complete_record
 from handover.scenarios.execution.child_process import ChildEnd
-from handover.scenarios.execution.summary import unit_data
-from handover.scenarios.execution.task import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, told_if_not_written
+from handover.scenarios.results.summary import unit_data
+from handover.scenarios.results.task import Ended
 
 
 class Death:

@@ -14,7 +14,6 @@ from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution.resumption import Resumption, unpack
 from handover.scenarios.execution.ssp_run import open_experiment
-from handover.scenarios.execution.task import Task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import (
     BadRunFolder,
@@ -24,6 +23,7 @@ from handover.scenarios.results.run_folder import (
     version_differences,
     versions,
 )
+from handover.scenarios.results.task import Task
 
 
 def complete_signals(folder: RunFolder) -> int:

@@ -12,7 +12,11 @@ from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, Spent, pack
-from handover.scenarios.execution.summary import (
+from handover.scenarios.execution.supervisor import heartbeat_of_run
+from handover.scenarios.experiment.experiment import Outcome, Watch
+from handover.scenarios.results.pictures import write_pictures
+from handover.scenarios.results.run_folder import told_if_not_written
+from handover.scenarios.results.summary import (
     configuration,
     files_and_forms,
     presentation,
@@ -20,11 +24,7 @@ from handover.scenarios.execution.summary import (
     summary_of,
     unit_rows,
 )
-from handover.scenarios.execution.supervisor import heartbeat_of_run
-from handover.scenarios.execution.task import Ended, Task
-from handover.scenarios.experiment.experiment import Outcome, Watch
-from handover.scenarios.results.pictures import write_pictures
-from handover.scenarios.results.run_folder import told_if_not_written
+from handover.scenarios.results.task import Ended, Task
 
 Progress = Callable[[float, float], None]
 """Told the simulated time and the time at which the run ends at the latest, in seconds."""

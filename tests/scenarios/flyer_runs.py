@@ -6,10 +6,10 @@ from typing import Any
 from handover.fmus.build import cached
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import carry_out
-from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.task import Ended, Task
 
 
 def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:

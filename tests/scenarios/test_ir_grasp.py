@@ -17,11 +17,11 @@ from handover.fmus.build import cached
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import carry_out
-from handover.scenarios.execution.task import Task
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation, asked_for
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.task import Task
 
 
 def fmu(unit: str) -> Path:

@@ -10,10 +10,10 @@ from flyer_runs import metric, run
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.execution.task import Ended
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.time_plot import Curve, TimePlot
+from handover.scenarios.results.task import Ended
 
 FAST = {
     "ir_grasp": (),

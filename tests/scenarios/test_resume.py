@@ -15,10 +15,10 @@ from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 from handover.scenarios.cli.listing import print_summary
-from handover.scenarios.execution.task import Ended
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.task import Ended
 
 fcntl = pytest.importorskip("fcntl")
 

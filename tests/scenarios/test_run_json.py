@@ -14,10 +14,10 @@ from flyer_runs import run
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution.summary import parameter_rows, told_system
-from handover.scenarios.execution.task import Task
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.results.summary import parameter_rows, told_system
+from handover.scenarios.results.task import Task
 
 
 def read(out: Path, name: str) -> dict[str, Any]:

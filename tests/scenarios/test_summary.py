@@ -2,8 +2,8 @@ import sys
 
 import pytest
 
-from handover.scenarios.execution.summary import metric_data, peak_memory
 from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.results.summary import metric_data, peak_memory
 from handover.scenarios.results.tables import told
 
 

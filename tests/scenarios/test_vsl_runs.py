@@ -17,10 +17,10 @@ from handover.cosim.system.signals import Observer
 from handover.fmus.build import cached
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import carry_out
-from handover.scenarios.execution.task import Ended, Task
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.task import Ended, Task
 from handover.scenarios.vsl.path_experiments import PathExperiment, VslHybrid, VslModelBased
 
 BOTH = [VslModelBased, VslHybrid]

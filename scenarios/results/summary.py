@@ -19,10 +19,10 @@ from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.system import Connection, System
 from handover.scenarios.execution.resumption import Spent
-from handover.scenarios.execution.task import Task
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment, Metric, Outcome
 from handover.scenarios.results.tables import conversions_of, told_value
+from handover.scenarios.results.task import Task
 
 
 def told_system(system: System, *, adaptive: bool) -> dict[str, Any]:
