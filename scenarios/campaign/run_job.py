@@ -1,7 +1,4 @@
-"""Carries out an order in this process, and gives its folder the name that says it is complete.
-
-The folder of a run that ended before it had one, as when a unit does not start: it would end so each time.
-"""
+"""Carries out an order in this process, and gives its folder the name that says it is complete."""
 
 import contextlib
 import os
@@ -10,84 +7,47 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import click
 
-from handover.cosim.exceptions import ScheduleError, UnitFailure, UnitRefused, WiringError, one_line
+from handover.cosim.exceptions import CosimError, ScheduleError, UnitFailure, UnitRefused, WiringError, one_line
 from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
 from handover.scenarios.execution.errors import told_in_one_line
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.resumption import Spent
 from handover.scenarios.execution.runner import carry_out
 from handover.scenarios.execution.selection import scenario_named
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
-from handover.scenarios.results.summary import configuration, files_and_forms, told_task
+from handover.scenarios.results.summary import Spent, refused_run, refused_summary
 from handover.scenarios.results.task import Task
 
-Refusal = UnitRefused | UnitFailure | WiringError | ScheduleError
+_REFUSALS = (UnitRefused, UnitFailure, WiringError, ScheduleError)
 """Why a run cannot begin, where that follows from what it is and not from where it is carried out."""
-
-REFUSALS = (UnitRefused, UnitFailure, WiringError, ScheduleError)
-
-
-def write_refused_run(task: Task, refusal: Refusal, spent: Spent) -> None:
-    """Write `run.json` and `summary.json` into the run's folder, as of a run in which a unit fails later.
-
-    Raises:
-        BadRunFolder: the folder cannot be made. RecordNotWritten: the disk is full.
-    """
-    failure = _failure(refusal)
-    task.folder.make()
-    task.folder.write_run(
-        {**configuration(task), **files_and_forms(task), **told_task(task), "failure": failure}, task.fmus
-    )
-    task.folder.write_summary(
-        {
-            **configuration(task),
-            "complete": False,
-            "success": False,
-            "reason": _reason(refusal),
-            "metrics": {},
-            "simulated_seconds": 0.0,
-            "wall_seconds": spent.wall,
-            "cpu_seconds": spent.cpu,
-            "units": [],
-            "failure": failure,
-        }
-    )
-
-
-def _failure(refusal: Refusal) -> dict[str, Any]:
-    if isinstance(refusal, UnitRefused):
-        return refusal.failure.as_data()
-    if isinstance(refusal, UnitFailure):
-        return refusal.as_data()
-    nothing = {"instance": None, "call": None, "time": 0.0, "log": list[str]()}
-    return {"kind": "refused", "status": one_line(refusal), **nothing}
-
-
-def _reason(refusal: Refusal) -> str:
-    return f"{refusal.verdict}: {refusal.cause}" if isinstance(refusal, UnitFailure) else one_line(refusal)
 
 
 def carry_out_order(order: RunOrder, folder: Path) -> None:
     """Run an order into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `carry_out` and `parse_parameters`, but for `REFUSALS`. BadCall: there is no such scenario.
+        As `carry_out` and `parse_parameters`, but for a refusal of the run. BadCall: there is no such scenario.
     """
     task, clock = _task(order, folder), Spent().clock()
     try:
         carry_out(task, lambda _t, _end: None, Interruption())
-    except REFUSALS as e:
-        write_refused_run(task, e, clock())
+    except _REFUSALS as e:  # it would end so each time
+        _refuse(task, e, clock())
 
 
 def refuse_order(order: RunOrder, folder: Path, failure: UnitFailure, spent: Spent) -> None:
     """Write the folder of a run whose process ended as a unit was loaded or initialised."""
-    write_refused_run(_task(order, folder), failure, spent)
+    _refuse(_task(order, folder), failure, spent)
+
+
+def _refuse(task: Task, refusal: CosimError, spent: Spent) -> None:
+    task.folder.make()
+    task.folder.write_run(refused_run(task, refusal))
+    task.folder.write_summary(refused_summary(task, refusal, spent))
 
 
 def _task(order: RunOrder, folder: Path) -> Task:

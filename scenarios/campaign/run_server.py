@@ -36,7 +36,7 @@ from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
 from handover.scenarios.execution.crash import Death
-from handover.scenarios.execution.resumption import Spent
+from handover.scenarios.results.summary import Spent
 
 IDLE = 60.0
 """Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""

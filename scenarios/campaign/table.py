@@ -18,6 +18,7 @@ from handover.cosim.exceptions import nearest, one_line
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.results.summary import metric_of
 
 _ANEW = "the call that began the campaign writes it anew"
 
@@ -160,12 +161,5 @@ def _row(run: PlannedRun, summary: Mapping[str, Any]) -> RunRow:
         simulated=float(summary["simulated_seconds"]),
         wall=float(summary["wall_seconds"]),
         cpu=float(summary["cpu_seconds"]),
-        metrics={
-            name: Metric(
-                value=float("nan") if m["value"] is None else float(m["value"]),
-                unit=str(m["unit"]),
-                description=str(m["description"]),
-            )
-            for name, m in metrics.items()
-        },
+        metrics={name: metric_of(data) for name, data in metrics.items()},
     )

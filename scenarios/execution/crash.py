@@ -13,7 +13,7 @@ from handover.cosim.record.stream import complete_record
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, told_if_not_written
-from handover.scenarios.results.summary import unit_data
+from handover.scenarios.results.summary import Spent, crashed_summary, failure_reason
 from handover.scenarios.results.task import Ended
 
 
@@ -54,20 +54,10 @@ class Death:
         """
         failure = self.failure
         data = _data(self._call, self._time, self._end) if failure is None else failure.as_data()
-        reason = self.told if failure is None else f"{failure.verdict}: {failure.cause}"
+        reason = self.told if failure is None else failure_reason(failure)
         with told_if_not_written(folder.path):
-            summary: dict[str, Any] = {
-                **self.facts["configuration"],
-                "complete": False,
-                "success": False,
-                "metrics": dict[str, Any](),
-                "simulated_seconds": _simulated(folder),
-                "cpu_seconds": self._end.cpu,
-                "units": unit_data(self.facts["units"]),
-                "reason": reason,
-                "wall_seconds": self._wall,
-                "failure": data,
-            }
+            known = self.facts["configuration"], self.facts["units"]
+            summary = crashed_summary(*known, reason, data, _simulated(folder), Spent(self._wall, self._end.cpu))
             folder.write_summary(summary)
             folder.add_to_run(failure=data)
         return Ended(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
@@ -98,14 +88,10 @@ def _how_it_ended(call: Call | None, t: float, end: ChildEnd) -> str:
 
 
 def _data(call: Call | None, t: float, end: ChildEnd) -> dict[str, Any]:
-    return {
-        "kind": "killed" if end.signal == signal.SIGKILL else "crash",
-        "instance": call.unit if call is not None else None,
-        "call": call.call if call is not None else None,
-        "time": t,
-        "status": f"status {end.status}" if end.signal is None else _meaning(end.signal),
-        "log": [],
-    }
+    unit, name = (None, None) if call is None else (call.unit, call.call)
+    kind = "killed" if end.signal == signal.SIGKILL else "crash"
+    status = f"status {end.status}" if end.signal is None else _meaning(end.signal)
+    return {"kind": kind, "instance": unit, "call": name, "time": t, "status": status, "log": []}
 
 
 def _simulated(folder: RunFolder) -> float:

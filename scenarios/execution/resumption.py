@@ -1,8 +1,6 @@
 """What a run keeps of itself in its checkpoints, and where another process goes on from there."""
 
 import pickle
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,19 +9,7 @@ from handover.cosim.exceptions import one_line
 from handover.cosim.master.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.experiment.experiment import Watch
-
-
-@dataclass(frozen=True)
-class Spent:
-    """Seconds that a run has taken until now, in all its processes."""
-
-    wall: float = 0.0
-    cpu: float = 0.0
-
-    def clock(self) -> Callable[[], "Spent"]:
-        """Return a function that tells what has been spent since, this included."""
-        wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
-        return lambda: Spent(time.perf_counter() - wall, time.process_time() - cpu)
+from handover.scenarios.results.summary import Spent
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,23 +7,16 @@ from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
-from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import FromThenOn, Observer, Signals
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.resumption import Resumption, Spent, pack
+from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run
 from handover.scenarios.experiment.experiment import Outcome, Watch
 from handover.scenarios.results.pictures import write_pictures
+from handover.scenarios.results.run_facts import record_of
 from handover.scenarios.results.run_folder import told_if_not_written
-from handover.scenarios.results.summary import (
-    configuration,
-    files_and_forms,
-    presentation,
-    run_metrics,
-    summary_of,
-    unit_rows,
-)
+from handover.scenarios.results.summary import Spent, begun_run, crash_facts, failure_reason, finished_summary
 from handover.scenarios.results.task import Ended, Task
 
 Progress = Callable[[float, float], None]
@@ -79,16 +72,10 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
         task.folder.make()
     else:
         task.folder.remove_presentation()
-    fmus = {n: u.description.path for n, u in master.system.units.items()}
-    told = {**configuration(task), **files_and_forms(task), **presentation(task, master)}
-    task.folder.write_run(told, fmus)
+    task.folder.write_run(begun_run(task, master))
     if not task.presented:
         task.folder.figures.rmdir()
-    master.heartbeat.tell(
-        folder=str(task.folder.path),
-        configuration=configuration(task),
-        units=[(*row[:3], None, None) for row in unit_rows(master)],
-    )
+    master.heartbeat.tell(folder=str(task.folder.path), **crash_facts(task, master))
 
 
 def _run(
@@ -135,12 +122,11 @@ def _conclude(
 ) -> Ended:
     """Write what is known of a run at its end, and its report."""
     outcome = _outcome(watch, failure, interrupted)
-    metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
     complete = failure is None and (watch.over or not interrupted)
-    summary = summary_of(task, outcome, metrics, master, spent, failure, complete)
+    summary = finished_summary(task, outcome, master, spent, failure, complete)
     task.folder.write_summary(summary)
     if failure is not None:
-        task.folder.add_to_run(failure=failure.as_data())
+        task.folder.add_to_run(failure=summary["failure"])
     write_pictures(task.folder.pictures, watch.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
@@ -153,7 +139,7 @@ def _conclude(
 def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Outcome:
     seen = watch.outcome()
     if failure is not None:
-        return Outcome(success=False, reason=f"{failure.verdict}: {failure.cause}", metrics=seen.metrics)
+        return Outcome(success=False, reason=failure_reason(failure), metrics=seen.metrics)
     if interrupted and not watch.over:
         return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
     return seen
@@ -162,7 +148,6 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
 def _present(task: Task, watch: Watch) -> None:
     from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
 
-    record = Record(task.folder.signals) if task.folder.signals.exists() else None
-    if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
+    if (record := record_of(task.folder)) is not None:
         task.experiment.draw(task.parameters, watch, record, task.folder.figures)
     write_run_page(task.folder)

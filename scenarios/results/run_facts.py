@@ -12,22 +12,10 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.summary import MetricData, RunData, Summary, faults_of, unwritten_summary
 from handover.scenarios.results.tables import told_value
 
-_NUMBER = (int, float)
-_FORMS: Mapping[str, Mapping[str, tuple[type, ...]]] = {
-    "run.json": {
-        "scenario": (str,), "parameters": (dict,), "seed": (int, type(None)), "master": (dict,), "units": (dict,),
-        "versions": (dict,), "title": (str,), "headline": (list,), "told_parameters": (list,), "conversions": (list,),
-        "system": (dict,),
-    },
-    "summary.json": {
-        "success": (bool,), "reason": (str,), "metrics": (dict,), "simulated_seconds": _NUMBER,
-        "wall_seconds": _NUMBER, "failure": (dict, type(None)), "master": (dict,), "units": (list,),
-    },
-}  # fmt: skip
 _NEEDED = {"run.json": ("scenario", "parameters"), "summary.json": ("success", "reason", "metrics")}
-_KILLED = "it has no summary: it was killed before its end, or the machine went down"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,12 +43,11 @@ class RunFacts:
             BadRunFolder: it is not the folder of a run, or one of the files is damaged.
         """
         run, summary = folder.read_run(), folder.read_summary()
-        _check(folder, "run.json", run)
+        _check(folder, "run.json", run, RunData)
         ended = bool(summary)
         if not ended:
-            summary = {"success": False, "reason": _KILLED, "metrics": dict[str, Any](), "complete": False}
-            summary |= {k: run[k] for k in ("scenario", "parameters", "seed", "master") if k in run}
-        _check(folder, "summary.json", summary)
+            summary = unwritten_summary(run)
+        _check(folder, "summary.json", summary, Summary)
         _check_metrics(folder, cast(Mapping[str, Any], summary["metrics"]))
         named = SCENARIOS.get(run["scenario"])
         return cls(folder=folder, run=run, summary=summary, experiment=None if named is None else named(), ended=ended)
@@ -88,11 +75,8 @@ class RunFacts:
         return [(name, told_value(value), "") for name, value in self.run["parameters"].items()]
 
 
-def _check(folder: RunFolder, file: str, content: Mapping[str, Any]) -> None:
-    faults = [f"it has no {name!r}" for name in _NEEDED[file] if name not in content]
-    for name, allowed in _FORMS[file].items():
-        if name in content and not isinstance(content[name], allowed):
-            faults.append(f"{name!r} is {content[name]!r:.40}")
+def _check(folder: RunFolder, file: str, content: Mapping[str, Any], declared: type[Any]) -> None:
+    faults = [f"it has no {name!r}" for name in _NEEDED[file] if name not in content] + faults_of(content, declared)
     rows = content.get("told_parameters", [])
     if isinstance(rows, list) and any(not isinstance(row, list) or len(row) != 3 for row in rows):  # pyright: ignore
         faults.append("'told_parameters' are not rows of three")
@@ -102,11 +86,8 @@ def _check(folder: RunFolder, file: str, content: Mapping[str, Any]) -> None:
 
 def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
     for name, metric in metrics.items():
-        try:
-            fine = isinstance(metric["value"], (*_NUMBER, type(None))) and isinstance(metric["unit"], str)
-        except (KeyError, TypeError):
-            fine = False
-        if not fine:
+        data = cast(dict[str, Any], metric) if isinstance(metric, dict) else {}
+        if not {"value", "unit"} <= data.keys() or faults_of(data, MetricData):
             raise BadRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")
 
 

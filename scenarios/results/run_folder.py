@@ -130,11 +130,9 @@ class RunFolder:
         """Write `summary.json`; this and what follows raise `RecordNotWritten` where they cannot."""
         _write_json(self.path / "summary.json", summary)
 
-    def write_run(self, configuration: Mapping[str, Any], fmus: Mapping[str, Path]) -> None:
-        """Write `run.json`: configuration, versions, and name and hash of every unit's FMU."""
-        units = {n: {"fmu": p.name, "sha256": sha256_of(p)} for n, p in fmus.items()}
-        told = {"platform": platform.platform(), **versions()}
-        _write_json(self.path / "run.json", {**configuration, "units": units, "versions": told})
+    def write_run(self, run: Mapping[str, Any]) -> None:
+        """Write `run.json`."""
+        _write_json(self.path / "run.json", run)
 
     def add_to_run(self, **told: Any) -> None:
         """Add facts to `run.json`.

@@ -1,4 +1,8 @@
-"""What a run's folder says of it: what was chosen, what came out, and the rows of its report's tables.
+"""A run's `summary.json` (how it went) and `run.json` (what was run): declared, made, and checked as they are read.
+
+However a run ends, its summary is made here: `finished_summary`, also where a unit failed; `crashed_summary`, where the
+run's process ended; `refused_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
+Keys stand in the files as the calls here name them.
 
 Figures of every run, whatever the scenario: what it cost in CPU time, memory and iterations.
 
@@ -6,21 +10,25 @@ What a run's folder keeps of its system: the units, and which output feeds which
 """
 
 import math
+import platform
 import statistics
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import UnionType
+from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_typeddict
 
 import numpy as np
 
-from handover.cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import CosimError, UnitFailure, UnitRefused, one_line
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import IterationCount
-from handover.cosim.system.system import Connection, System
-from handover.scenarios.execution.resumption import Spent
+from handover.cosim.system.system import Connection, PlacedUnit, System
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment, Metric, Outcome
+from handover.scenarios.results.run_folder import sha256_of, versions
 from handover.scenarios.results.tables import conversions_of, told_value
 from handover.scenarios.results.task import Task
 
@@ -28,19 +36,24 @@ from handover.scenarios.results.task import Task
 def told_system(system: System, *, adaptive: bool) -> dict[str, Any]:
     """Return units and connections of a system without faults, as JSON can hold it.
 
-    `adaptive` says that the master chooses its steps: then only sampled units have a period of their own.
+    For `adaptive` see `own_period`.
     """
     units = [
         {
             "name": name,
             "model": unit.description.name,
             "fmi": str(unit.description.fmi),
-            "period": None if adaptive and not unit.sampled else float(unit.period),
+            "period": own_period(unit, adaptive=adaptive),
             "sampled": unit.sampled,
         }
         for name, unit in system.units.items()
     ]
     return {"units": units, "connections": [_told(system, c) for c in system.connections]}
+
+
+def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
+    """Return a unit's step, s; None where it varies: if the master chooses the steps, all but sampled units follow."""
+    return None if adaptive and not unit.sampled else float(unit.period)
 
 
 def _told(system: System, c: Connection) -> dict[str, Any]:
@@ -50,106 +63,6 @@ def _told(system: System, c: Connection) -> dict[str, Any]:
     else:
         kind, unit, size = port.kind.value, port.unit.symbol, port.size
     return {"source": str(c.source), "target": str(c.target), "unit": unit, "size": size, "kind": kind}
-
-
-UnitRow = tuple[str, str, str, int | None, float | None]
-"""Name, FMU, step, number of steps and CPU seconds of a unit, the last two where they are known."""
-
-
-def configuration(task: Task) -> dict[str, Any]:
-    """Return what decides on a run's signals, as JSON can hold it."""
-    values = {v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()}
-    seed = task.seed if task.experiment.is_seeded else None
-    return {"scenario": task.experiment.name, "parameters": values, "seed": seed, "master": task.options.as_data()}
-
-
-def files_and_forms(task: Task) -> dict[str, Any]:
-    """Return what else a run needs to go on in another process, as JSON can hold it."""
-    every = None if task.every is None else str(task.every)
-    files = {name: str(path.absolute()) for name, path in task.fmus.items()}
-    return {"source": task.source, "files": files, "formats": list(task.formats), "checkpoint": every}
-
-
-def told_task(task: Task) -> dict[str, Any]:
-    """Return what is told of a run that is known before its system is, as JSON can hold it."""
-    return {
-        "title": task.experiment.title,
-        "headline": list(task.experiment.headline),
-        "told_parameters": [list(row) for row in parameter_rows(task)],
-    }
-
-
-def presentation(task: Task, master: Master) -> dict[str, Any]:
-    """Return what is needed to present a run by its folder alone, as JSON can hold it."""
-    return {
-        **told_task(task),
-        "system": told_system(master.system, adaptive=master.steps is not None),
-        "conversions": conversions_of(master.system),
-    }
-
-
-def summary_of(
-    task: Task,
-    outcome: Outcome,
-    metrics: Mapping[str, Metric],
-    master: Master,
-    spent: Spent,
-    failure: UnitFailure | None,
-    complete: bool,
-) -> dict[str, Any]:
-    """Return a run's summary as JSON can hold it; a run that is not complete can go on."""
-    return {
-        **configuration(task),
-        "complete": complete,
-        "success": outcome.success,
-        "reason": outcome.reason,
-        "metrics": {k: metric_data(m) for k, m in metrics.items()},
-        "simulated_seconds": master.time,
-        **({} if master.steps is None else {"steps": asdict(master.steps)}),
-        "wall_seconds": spent.wall,
-        "cpu_seconds": spent.cpu,
-        "units": unit_data(unit_rows(master)),
-        "failure": None if failure is None else failure.as_data(),
-        **({} if master.pacer is None else {"pace": master.pacer.report.as_data()}),
-    }
-
-
-def metric_data(m: Metric) -> dict[str, Any]:
-    """Return a metric as JSON, which knows no infinity: what is not finite is null."""
-    return {"value": m.value if math.isfinite(m.value) else None, "unit": m.unit, "description": m.description}
-
-
-def parameter_rows(task: Task) -> list[tuple[str, str, str]]:
-    """Return name, value with unit, and description of each parameter."""
-    rows: list[tuple[str, str, str]] = []
-    for v in task.experiment.parameters():
-        value = _plain(getattr(task.parameters, v.name))
-        unit = unit_symbol(v.unit.symbol)
-        rows.append((v.name, f"{told_value(value)} {unit}".rstrip(), v.description))
-    return rows
-
-
-def unit_rows(master: Master) -> list[UnitRow]:
-    """Return what is told of each unit."""
-    rows: list[UnitRow] = []
-    for name, unit in master.system.units.items():
-        d = unit.description
-        follows = master.steps is not None and not unit.sampled
-        period = "varies" if follows else f"{float(unit.period) * 1000:.4g} ms"
-        rows.append((name, f"{d.name} (FMI {d.fmi})", period, len(master.cpu[name]), sum(master.cpu[name])))
-    return rows
-
-
-def unit_data(rows: Sequence[UnitRow]) -> list[dict[str, Any]]:
-    """Return rows of units as JSON can hold them."""
-    return [dict(zip(("name", "model", "step", "steps", "cpu_seconds"), row, strict=True)) for row in rows]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    name = getattr(value, "name", None)
-    return value if name is None else name.lower()
 
 
 def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
@@ -165,8 +78,8 @@ def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric
     for name, spent in master.cpu.items():
         total = float(np.sum(spent))
         metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
-        unit = master.system.units[name]  # its own period says nothing of steps that follow their error
-        simulated = master.time if master.steps and not unit.sampled else len(spent) * float(unit.period)
+        period = own_period(master.system.units[name], adaptive=master.steps is not None)
+        simulated = master.time if period is None else len(spent) * period
         metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
     return {**metrics, **_iterations(master.iterations)}
 
@@ -188,3 +101,244 @@ def _iterations(count: IterationCount) -> dict[str, Metric]:
         "iterations": Metric(count.iterations / count.steps, "1", told),
         "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
     }
+
+
+class Configuration(TypedDict):
+    """What decides on a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`."""
+
+    scenario: str
+    parameters: dict[str, Any]
+    seed: int | None
+    master: dict[str, Any]
+
+
+class MetricData(TypedDict):
+    """A figure of merit; JSON knows no infinity: what is not finite is None."""
+
+    value: float | None
+    unit: str
+    description: str
+
+
+class UnitData(TypedDict):
+    """A unit's FMU and step in words, its number of steps and its CPU time; None where they are not known."""
+
+    name: str
+    model: str
+    step: str
+    steps: int | None
+    cpu_seconds: float | None
+
+
+class _OfSomeSummaries(TypedDict, total=False):
+    steps: dict[str, Any]
+    pace: dict[str, Any]
+
+
+class Summary(Configuration, _OfSomeSummaries):
+    """How a run went: a run that is not `complete` can go on; `failure` is as `UnitFailure.as_data`, None if none.
+
+    Steps that follow their error leave `steps`, see `StepStatistics`; a pace that was asked for, `pace`: `PaceReport`.
+    """
+
+    complete: bool
+    success: bool
+    reason: str
+    metrics: dict[str, MetricData]
+    simulated_seconds: float
+    wall_seconds: float
+    cpu_seconds: float
+    units: list[UnitData]
+    failure: dict[str, Any] | None
+
+
+class _OfSomeRuns(TypedDict, total=False):
+    system: dict[str, Any]
+    conversions: list[dict[str, Any]]
+    failure: dict[str, Any] | None
+
+
+class RunData(Configuration, _OfSomeRuns):
+    """What another process needs to go on with a run, or to present it: see `Task` and `Experiment`.
+
+    A run that began has `system` and `conversions`, one that failed `failure`; `units` are names and hashes of FMUs.
+    """
+
+    source: dict[str, Any]
+    files: dict[str, str]
+    formats: list[str]
+    checkpoint: str | None
+    title: str
+    headline: list[str]
+    told_parameters: list[list[str]]
+    units: dict[str, dict[str, str]]
+    versions: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Seconds that a run has taken until now, in all its processes."""
+
+    wall: float = 0.0
+    cpu: float = 0.0
+
+    def clock(self) -> Callable[[], "Spent"]:
+        """Return a function that tells what has been spent since, this included."""
+        wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
+        return lambda: Spent(time.perf_counter() - wall, time.process_time() - cpu)
+
+
+def configuration(task: Task) -> Configuration:
+    """Return what decides on a run's signals."""
+    return Configuration(
+        scenario=task.experiment.name,
+        parameters={v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()},
+        seed=task.seed if task.experiment.is_seeded else None,
+        master=task.options.as_data(),
+    )
+
+
+def finished_summary(
+    task: Task, outcome: Outcome, master: Master, spent: Spent, failure: UnitFailure | None, complete: bool
+) -> Summary:
+    """Return the summary of a run that came to its end, its failure or its interruption."""
+    metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
+    steps: _OfSomeSummaries = {} if master.steps is None else {"steps": asdict(master.steps)}
+    summary = Summary(
+        **configuration(task), complete=complete, success=outcome.success, reason=outcome.reason,
+        metrics={name: metric_data(metric) for name, metric in metrics.items()}, simulated_seconds=master.time, **steps,
+        wall_seconds=spent.wall, cpu_seconds=spent.cpu, units=_units(master),
+        failure=None if failure is None else failure.as_data(),
+    )  # fmt: skip
+    if master.pacer is not None:
+        summary["pace"] = master.pacer.report.as_data()
+    return summary
+
+
+def crash_facts(task: Task, master: Master) -> dict[str, Any]:
+    """Return what `crashed_summary` is given of a run, to be kept while its process is there."""
+    return {
+        "configuration": configuration(task),
+        "units": [(unit["name"], unit["model"], unit["step"]) for unit in _units(master)],
+    }
+
+
+def crashed_summary(
+    configuration: Configuration, units: Sequence[tuple[str, str, str]], reason: str, failure: dict[str, Any],
+    simulated: float, spent: Spent,
+) -> Summary:  # fmt: skip
+    """Return the summary of a run whose process ended in it after so many simulated seconds."""
+    return Summary(
+        **configuration, complete=False, success=False, metrics={}, simulated_seconds=simulated, cpu_seconds=spent.cpu,
+        units=[UnitData(name=n, model=m, step=s, steps=None, cpu_seconds=None) for n, m, s in units],
+        reason=reason, wall_seconds=spent.wall, failure=failure,
+    )  # fmt: skip
+
+
+def refused_summary(task: Task, refusal: CosimError, spent: Spent) -> Summary:
+    """Return the summary of a run that could not begin."""
+    reason = failure_reason(refusal) if isinstance(refusal, UnitFailure) else one_line(refusal)
+    return Summary(
+        **configuration(task), complete=False, success=False, reason=reason, metrics={}, simulated_seconds=0.0,
+        wall_seconds=spent.wall, cpu_seconds=spent.cpu, units=[], failure=_refusal_data(refusal),
+    )  # fmt: skip
+
+
+def unwritten_summary(run: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is known, by its `run.json`, of a run that has written no summary."""
+    reason = "it has no summary: it was killed before its end, or the machine went down"
+    kept = {name: run[name] for name in Configuration.__annotations__ if name in run}
+    return {"success": False, "reason": reason, "metrics": dict[str, Any](), "complete": False, **kept}
+
+
+def begun_run(task: Task, master: Master) -> RunData:
+    """Return `run.json` of a run that begins."""
+    system = told_system(master.system, adaptive=master.steps is not None)
+    fmus = {name: unit.description.path for name, unit in master.system.units.items()}
+    return _run(task, fmus, {"system": system, "conversions": conversions_of(master.system)})
+
+
+def refused_run(task: Task, refusal: CosimError) -> RunData:
+    """Return `run.json` of a run that could not begin."""
+    return _run(task, task.fmus, {"failure": _refusal_data(refusal)})
+
+
+def failure_reason(failure: UnitFailure) -> str:
+    """Return why a run in which a unit failed did not succeed."""
+    return f"{failure.verdict}: {failure.cause}"
+
+
+def metric_data(m: Metric) -> MetricData:
+    """Return a metric as JSON can hold it."""
+    return MetricData(value=m.value if math.isfinite(m.value) else None, unit=m.unit, description=m.description)
+
+
+def metric_of(data: Mapping[str, Any]) -> Metric:
+    """Return a metric that was read, NaN where it was not finite; raises KeyError, TypeError, ValueError if damaged."""
+    value = float("nan") if data["value"] is None else float(data["value"])
+    return Metric(value=value, unit=str(data["unit"]), description=str(data["description"]))
+
+
+def parameter_rows(task: Task) -> list[list[str]]:
+    """Return name, value with unit, and description of each parameter."""
+    rows: list[list[str]] = []
+    for v in task.experiment.parameters():
+        value = told_value(_plain(getattr(task.parameters, v.name)))
+        rows.append([v.name, f"{value} {unit_symbol(v.unit.symbol)}".rstrip(), v.description])
+    return rows
+
+
+def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
+    """Return what in a file that was read is of another type than declared; other versions may have written less."""
+    kinds = {name: _kinds(kind) for name, kind in get_type_hints(declared).items() if name in content}
+    return [f"{name!r} is {content[name]!r:.40}" for name, kind in kinds.items() if not isinstance(content[name], kind)]
+
+
+def _run(task: Task, fmus: Mapping[str, Path], known: _OfSomeRuns) -> RunData:
+    return RunData(
+        **configuration(task),
+        source=dict(task.source),
+        files={name: str(path.absolute()) for name, path in task.fmus.items()},
+        formats=list(task.formats),
+        checkpoint=None if task.every is None else str(task.every),
+        title=task.experiment.title,
+        headline=list(task.experiment.headline),
+        told_parameters=parameter_rows(task),
+        **known,
+        units={name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
+        versions={"platform": platform.platform(), **versions()},
+    )
+
+
+def _units(master: Master) -> list[UnitData]:
+    units: list[UnitData] = []
+    for name, unit in master.system.units.items():
+        model, spent = f"{unit.description.name} (FMI {unit.description.fmi})", master.cpu[name]
+        period = own_period(unit, adaptive=master.steps is not None)
+        step = "varies" if period is None else f"{period * 1000:.4g} ms"
+        units.append(UnitData(name=name, model=model, step=step, steps=len(spent), cpu_seconds=sum(spent)))
+    return units
+
+
+def _refusal_data(refusal: CosimError) -> dict[str, Any]:
+    if isinstance(refusal, UnitRefused):
+        return refusal.failure.as_data()
+    if isinstance(refusal, UnitFailure):
+        return refusal.as_data()
+    nothing = {"instance": None, "call": None, "time": 0.0, "log": list[str]()}
+    return {"kind": "refused", "status": one_line(refusal), **nothing}
+
+
+def _kinds(declaration: Any) -> tuple[type, ...]:
+    """Return the types that JSON's values of a declared type have when they are read."""
+    if isinstance(declaration, UnionType):
+        return tuple(kind for part in get_args(declaration) for kind in _kinds(part))
+    kind: type = get_origin(declaration) or declaration
+    return (dict,) if is_typeddict(kind) else (float, int) if kind is float else (kind,)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    name = getattr(value, "name", None)
+    return value if name is None else name.lower()

@@ -13,6 +13,7 @@ from handover.cosim.exceptions import UnitFailure
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.experiment.experiment import Experiment, Outcome
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.summary import Summary
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,5 +48,5 @@ class Ended:
     """A run after its end. `failure` is set when a unit failed; the record then ends there."""
 
     outcome: Outcome
-    summary: Mapping[str, Any]
+    summary: Summary
     failure: UnitFailure | None = None

@@ -40,7 +40,7 @@ def test_the_page_of_a_long_run(benchmark: BenchmarkFixture, tmp_path: Path) -> 
     folder = RunFolder(tmp_path / "run")
     folder.make()
     pq.write_table(table, folder.signals)
-    folder.write_run({"scenario": "long", "parameters": {}}, {})
+    folder.write_run({"scenario": "long", "parameters": {}})
     folder.write_summary({"success": True, "reason": "it ran", "metrics": {}, "simulated_seconds": t[-1].item()})
     costs: dict[str, float] = {}
 

@@ -9,12 +9,18 @@ from handover.scenarios.execution.runner import carry_out
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.summary import metric_of
 from handover.scenarios.results.task import Ended, Task
 
 
 def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:
     """Run a scenario with parameters as the command takes them; without figures and report unless `drawn`."""
-    task = Task(
+    return carry_out(task_of(scenario, out, *given, seed=seed, drawn=drawn), _tell_nobody, Interruption())
+
+
+def task_of(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Task:
+    """Return what `run` runs."""
+    return Task(
         experiment=scenario(),
         parameters=parse_parameters(scenario, given),
         seed=seed,
@@ -22,13 +28,11 @@ def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, 
         folder=RunFolder(out),
         presented=drawn,
     )
-    return carry_out(task, _tell_nobody, Interruption())
 
 
 def metric(ended: Ended, name: str) -> float:
     """Return a figure of a run."""
-    value: float = ended.summary["metrics"][name]["value"]
-    return value
+    return metric_of(ended.summary["metrics"][name]).value
 
 
 def _tell_nobody(*_: float) -> None:

@@ -18,6 +18,7 @@ from handover.cosim.system.system import System
 from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.summary import Summary
 from handover.scenarios.results.tables import master_rows
 
 
@@ -89,6 +90,7 @@ def test_the_report_tells_how_units_were_coupled(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear")
     page, summary = Page(out / "report.html"), json.loads((out / "summary.json").read_text())
+    assert set(summary) == set(Summary.__annotations__)
     rows = dict(row for row in page.rows if len(row) == 2)
     assert rows["algorithm"] == "gauss-seidel"
     assert rows["extrapolation"] == "linear"
@@ -116,7 +118,7 @@ def test_iterations_are_told_once():
 def test_a_failure_s_log_is_shown_and_what_is_not_known_is_not_zero(tmp_path: Path):
     folder = RunFolder(tmp_path / "out")
     folder.make()
-    folder.write_run({"scenario": "x.ssp", "parameters": {}}, {})
+    folder.write_run({"scenario": "x.ssp", "parameters": {}})
     master = {"algorithm": "jacobi", "tolerance": 1e-8, "iterations": 100, "extrapolation": "hold", "adaptive": None,
               "repeat_discarded": False}  # fmt: skip
     summary = {

@@ -4,7 +4,7 @@ import shutil
 import signal
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner, Result
@@ -18,6 +18,7 @@ from handover.scenarios.cli.listing import print_summary
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.summary import Summary
 from handover.scenarios.results.task import Ended
 
 fcntl = pytest.importorskip("fcntl")
@@ -144,7 +145,7 @@ def test_a_run_that_can_go_on_is_told_how(copy: Path, capsys: pytest.CaptureFixt
         "simulated_seconds": 0.3,
         "wall_seconds": 1.0,
     }
-    ended = Ended(outcome=Outcome(success=False, reason="interrupted"), summary=summary)
+    ended = Ended(outcome=Outcome(success=False, reason="interrupted"), summary=cast(Summary, summary))
     print_summary(ended, (), RunFolder.left_at(copy))
     assert f"to go on: handover resume {copy}\n" in capsys.readouterr().out
     (copy / "checkpoint.zip").unlink()

@@ -49,7 +49,7 @@ def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):
     scene, reflex = ended.summary["units"]
     assert (scene["name"], scene["model"], scene["step"]) == ("scene", "GraspScene (FMI 3)", "15 ms")
     assert reflex["steps"] == pytest.approx(ended.summary["simulated_seconds"] / 0.015, abs=1)
-    assert 0.0 < reflex["cpu_seconds"] < scene["cpu_seconds"] < ended.summary["cpu_seconds"]
+    assert 0.0 < (reflex["cpu_seconds"] or 0.0) < (scene["cpu_seconds"] or 0.0) < ended.summary["cpu_seconds"]
 
 
 @pytest.mark.slow

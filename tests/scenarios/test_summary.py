@@ -1,10 +1,49 @@
+"""A run's summary: of one declaration however the run ended, with figures as JSON can hold them."""
+
+import json
 import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
+from flyer_runs import run, task_of
 
+from handover.cosim.exceptions import WiringError
 from handover.scenarios.experiment.experiment import Metric
-from handover.scenarios.results.summary import metric_data, peak_memory
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.results.summary import (
+    RunData,
+    Spent,
+    Summary,
+    configuration,
+    crashed_summary,
+    faults_of,
+    metric_data,
+    peak_memory,
+    refused_run,
+    refused_summary,
+)
 from handover.scenarios.results.tables import told
+
+
+def assert_of(declared: type[Any], content: Any) -> None:
+    """Assert that a file has all that every run has, and nothing that is not declared, or else than declared."""
+    assert declared.__required_keys__ <= set(content) <= set(declared.__annotations__)
+    assert faults_of(json.loads(json.dumps(content)), declared) == []
+
+
+def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
+    task, spent = task_of(IrGrasp, tmp_path / "refused"), Spent(wall=2.0, cpu=1.0)
+    finished = run(IrGrasp, tmp_path / "run").summary
+    refusal = WiringError(["nothing feeds scene.goal"])
+    refused = refused_summary(task, refusal, spent)
+    units = [("scene", "GraspScene (FMI 3)", "15 ms")]
+    crashed = crashed_summary(configuration(task), units, "it crashed", {"kind": "crash"}, 0.3, spent)
+    assert set(finished) == set(crashed) == set(refused)
+    for summary in (finished, crashed, refused):
+        assert_of(Summary, summary)
+    assert_of(RunData, json.loads((tmp_path / "run" / "run.json").read_text()))
+    assert_of(RunData, refused_run(task, refusal))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
