@@ -14,7 +14,6 @@ from typing import Any
 from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import BadParameter, parameters_of
 from handover.scenarios.reporting.cpu_section import cpu_section
@@ -131,17 +130,12 @@ def _table(anchor: str, title: str, rows: Sequence[tuple[str, str, str]], first:
     return Section(anchor=anchor, title=title, html=Markup(html))
 
 
-def published_section(summary: Mapping[str, Any], run: Mapping[str, Any]) -> Section | None:
-    """Return the run's figures that the paper has too, for parameters near the published ones; None if there are none.
-
-    Args:
-        summary: what is in `summary.json`.
-        run: what is in `run.json`.
-    """
-    values = [v for v in _values(run) if v.metric in summary["metrics"]]
-    if not values:
+def published_section(facts: RunFacts) -> Section | None:
+    """Return the run's figures that the paper has too, for parameters near the published; None if there are none."""
+    metrics = facts.summary["metrics"]
+    rows = [_row(v, metrics[v.metric]) for v in _values(facts) if v.metric in metrics]
+    if not rows:
         return None
-    rows = [_row(v, summary["metrics"][v.metric]) for v in values]
     note = "One run is no trial of what was published: it does not tell how its figures vary."
     html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
     return Section(
@@ -149,12 +143,11 @@ def published_section(summary: Mapping[str, Any], run: Mapping[str, Any]) -> Sec
     )
 
 
-def _values(run: Mapping[str, Any]) -> Sequence[PublishedValue]:
-    experiment = SCENARIOS.get(run["scenario"])
-    if experiment is None:
+def _values(facts: RunFacts) -> Sequence[PublishedValue]:
+    if facts.experiment is None:
         return ()
     try:
-        return experiment().published(parameters_of(experiment, run["parameters"]))
+        return facts.experiment.published(parameters_of(type(facts.experiment), facts.run["parameters"]))
     except BadParameter:  # of another version: the page tells it where it leaves plots out
         return ()
 
@@ -186,7 +179,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     record = record_of(folder)
     sections = [
         metrics_section(facts),
-        published_section(facts.summary, facts.run),
+        published_section(facts),
         *_seen(facts, record),
         pictures_section(folder),
         None if record is None else explorer_section(record),

@@ -1,6 +1,5 @@
 """Published values beside a run's figures: where the paper has them, for runs like the published."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,8 @@ from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.reporting.run_page import published_section
+from handover.scenarios.results.run_facts import RunFacts
+from handover.scenarios.results.run_folder import RunFolder
 
 FAST = {
     "ir_grasp": {(): 3},
@@ -32,11 +33,11 @@ def values_of(scenario: str, given: tuple[str, ...]) -> list[PublishedValue]:
 def check(scenario: str, given: tuple[str, ...], number: int, folder: Path) -> None:
     """Run it, and compare the section's rows with the paper file."""
     run(SCENARIOS[scenario], folder, *given)
-    summary, told = (json.loads((folder / f"{name}.json").read_bytes()) for name in ("summary", "run"))
+    facts = RunFacts.read(RunFolder.left_at(folder))
     values = values_of(scenario, given)
-    assert [v.metric for v in values if v.metric not in summary["metrics"]] == []
+    assert [v.metric for v in values if v.metric not in facts.summary["metrics"]] == []
     assert len(values) == number
-    section = published_section(summary, told)
+    section = published_section(facts)
     assert section is not None
     assert section.html.count("<tr>") == 1 + number
 
