@@ -4,14 +4,24 @@ import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from handover.cosim.record.reader import Record, RecordedSignals
-from handover.scenarios.execution.ssp_run import draw_outputs
-from handover.scenarios.experiment.experiment import Figure, Watch
+from handover.scenarios.execution.ssp_run import figures_of_outputs
+from handover.scenarios.experiment.experiment import Experiment, Figure, Watch
 from handover.scenarios.experiment.parameters import BadParameter, parameters_of
+from handover.scenarios.experiment.plotting import draw_time_figures
 from handover.scenarios.results.pictures import read_pictures
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import BadRunFolder, RunFolder, told_if_not_written
+
+
+def draw_figures(
+    experiment: Experiment[Any], parameters: Any, watch: Watch, record: Record, folder: Path
+) -> Sequence[Figure]:
+    """Draw what a scenario shows of a run into a folder: the scene and the like, then curves over time."""
+    scenes = experiment.draw(parameters, watch, record, folder)
+    return [*scenes, *draw_time_figures(experiment.time_figures(parameters, record), record.time, folder)]
 
 
 def draw_run(folder: RunFolder) -> Sequence[Figure]:
@@ -40,12 +50,12 @@ def draw_run(folder: RunFolder) -> Sequence[Figure]:
 def _drawn(facts: RunFacts, record: Record, to: Path) -> Sequence[Figure]:
     experiment = facts.experiment
     if experiment is None:
-        return draw_outputs(facts.run.get("units", {}), record, to)
+        return draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
     try:
         parameters = parameters_of(type(experiment), facts.run["parameters"])
         watch = experiment.watch_of_record(parameters, read_pictures(facts.folder.pictures))
         _show(record, watch)
-        return experiment.draw(parameters, watch, record, to)
+        return draw_figures(experiment, parameters, watch, record, to)
     except (BadParameter, KeyError) as e:
         raise BadRunFolder(facts.folder.path, f"the run is of another version of {facts.scenario}: {e.args[0]}") from e
 

@@ -146,8 +146,10 @@ def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Ou
 
 
 def _present(task: Task, watch: Watch) -> None:
-    from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
+    from handover.scenarios.cli.run_figures import draw_figures  # plots take long to load
+    from handover.scenarios.reporting.run_page import write_run_page
 
-    if (record := record_of(task.folder)) is not None:
-        task.experiment.draw(task.parameters, watch, record, task.folder.figures)
+    record = record_of(task.folder)
+    if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
+        draw_figures(task.experiment, task.parameters, watch, record, task.folder.figures)
     write_run_page(task.folder)

@@ -14,7 +14,9 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf, Outcome, Watch
+from handover.scenarios.experiment.display_unit import unit_symbol
+from handover.scenarios.experiment.experiment import Experiment, FmuOf, Outcome, Watch
+from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, TimePlot
 from handover.scenarios.results.run_folder import sha256_of
 
 _MOST_SIGNALS = 6
@@ -77,31 +79,21 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
         def cycle(self) -> tuple[str, ...]:
             return ()
 
-        def draw(self, parameters: Any, watch: UntilStop, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
-            return draw_outputs(ssp.system.units, record, folder)
+        def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
+            return figures_of_outputs(ssp.system.units, record)
 
     return SspExperiment()
 
 
-def draw_outputs(units: Iterable[str], record: Record, folder: Path) -> list[Figure]:
-    """Draw the first real outputs of each unit over time, an axis for each."""
-    from handover.scenarios.experiment.plotting import COLOURS, figure  # what draws takes long to load
-
-    figures: list[Figure] = []
+def figures_of_outputs(units: Iterable[str], record: Record) -> list[TimeFigure]:
+    """Return the first real outputs of each unit over time, an axis for each."""
+    figures: list[TimeFigure] = []
     for name in units:
         ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MOST_SIGNALS]
-        if not ports:
-            continue
-        file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
-        with figure(folder / file, len(ports), size=(8.0, 1.6 * len(ports) + 0.4)) as axes:
-            for ax, port in zip(axes, ports, strict=True):
-                values = record[port].reshape(len(record.time), -1)
-                for k, colour in enumerate(COLOURS[: values.shape[1]]):
-                    ax.plot(record.time, values[:, k], color=colour, lw=1.0)
-                unit = "" if record.unit(port) in ("", "1") else f"\n({record.unit(port)})"
-                ax.set_ylabel(port.removeprefix(f"{name}.") + unit)
-            axes[-1].set_xlabel("time (s)")
-        figures.append(Figure(file, f"Outputs of {name} over time."))
+        if ports:
+            file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
+            plots = [_output(port, port.removeprefix(f"{name}."), record) for port in ports]
+            figures.append(TimeFigure(name=file, caption=f"Outputs of {name} over time.", plots=plots))
     return figures
 
 
@@ -125,3 +117,10 @@ def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, An
     """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
     told = {"stop": str(stop), "step": None if step is None else str(step)}
     return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **told}
+
+
+def _output(port: str, quantity: str, record: Record) -> TimePlot:
+    values = record[port].reshape(len(record.time), -1)[:, : len(COLOURS)]
+    labels = [quantity] if values.shape[1] == 1 else [f"element {k + 1}" for k in range(values.shape[1])]
+    curves = [Curve(label=label, values=values[:, k]) for k, label in enumerate(labels)]
+    return TimePlot(title=port, quantity=quantity, unit=unit_symbol(record.unit(port)), curves=curves)

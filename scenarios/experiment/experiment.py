@@ -15,7 +15,7 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.replay import Replay
-from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 
 FmuOf = Callable[[str], Path]
 """Gives a unit's FMU by the unit's name in the system."""
@@ -104,12 +104,24 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
     def cycle(self) -> tuple[str, ...]:
         """Return the units that make up one control cycle, whose CPU time the summary tells."""
 
-    @abc.abstractmethod
-    def draw(self, parameters: Any, watch: AnyWatch, record: Record, folder: Path) -> list["Figure"]:
-        """Draw the run's figures into a folder."""
+    def time_figures(self, parameters: Any, record: Record) -> Sequence[TimeFigure]:  # noqa: ARG002
+        """Return what is drawn over time, by the report before all other signals, and for papers; nothing by default.
 
-    def plots(self, parameters: Any, record: Record) -> Sequence[TimePlot]:  # noqa: ARG002
-        """Return what the report draws over time before all other signals; nothing by default."""
+        Raises:
+            KeyError: the record has no signal that is to be drawn.
+        """
+        return ()
+
+    def plots(self, parameters: Any, record: Record) -> Sequence[TimePlot]:
+        """Return the plots of all time figures, as the report draws them.
+
+        Raises:
+            KeyError: the record has no signal that is to be drawn.
+        """
+        return [plot for figure in self.time_figures(parameters, record) for plot in figure.plots]
+
+    def draw(self, parameters: Any, watch: AnyWatch, record: Record, folder: Path) -> Sequence["Figure"]:  # noqa: ARG002
+        """Draw into a folder what is no curve over time, such as the scene; nothing by default."""
         return ()
 
     def replay(self, parameters: Any, record: Record) -> Replay | None:  # noqa: ARG002

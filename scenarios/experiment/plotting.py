@@ -1,7 +1,9 @@
-"""The look of all figures, and time plots with units, by matplotlib."""
+"""The look of all figures by matplotlib, and curves over time as it draws them."""
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from itertools import cycle
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +12,13 @@ import matplotlib as mpl
 mpl.use("Agg")
 
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
-from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
+from matplotlib.transforms import ScaledTranslation
+
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.time_plot import COLOURS, Phase, TimeFigure, TimePlot
 
 STYLE: dict[Any, Any] = {
     "font.size": 10,
@@ -29,12 +33,18 @@ STYLE: dict[Any, Any] = {
     "svg.hashsalt": "handover",
 }
 
-COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#b58a1b", "#4d5866")
+_SOFT, _SHADE = "#4d5866", "#eef2f7"
+_STROKES: dict[str, dict[str, Any]] = {
+    "solid": {"lw": 1.4},
+    "dashed": {"lw": 1.4, "ls": (0, (4, 2))},
+    "dotted": {"lw": 1.0, "ls": ":"},
+}
+_LEVELS = ((0, (7, 3)), (0, (7, 2, 1, 2)))
 
-
-_NAME = "#4d5866"
+_WIDTH, _ALONE, _STACKED = 8.0, 2.6, 1.6
+"""Width of a figure over time, height of one that is alone, and of one of several, in."""
 _LETTER, _UPRIGHT = 5.2, 8.5
-"""Widths of a letter of a name over a phase, and of an upright name, in points."""
+"""Widths of a letter, and of an upright name over a phase, points."""
 
 
 @contextmanager
@@ -59,57 +69,159 @@ def figure(
             plt.close(canvas)
 
 
-def shade_phases(axes: Axes, t: NDArray[np.float64], phase: NDArray[np.int64], names: Mapping[int, str]) -> None:
-    """Shade every second phase and write the names of phases, where `names` has them.
+def draw_time_figures(figures: Sequence[TimeFigure], time: Floats, folder: Path) -> list[Figure]:
+    """Draw curves over the record's time, s, into a folder."""
+    for described in figures:
+        _draw_time_figure(described, time, folder / described.name)
+    return [Figure(described.name, described.caption) for described in figures]
 
-    A name stands over its phase if it is narrower; else upright at the top of the axes, with a line to its phase.
+
+def _draw_time_figure(described: TimeFigure, time: Floats, path: Path) -> None:
+    plots, columns = described.plots, described.columns
+    rows = ceil(len(plots) / columns)
+    wide = 72.0 * 0.86 * _WIDTH / columns
+    span = float(time[-1] - time[0])
+    above = max(_height_of_names(p.phases, span / wide) for p in plots) / 72.0
+    legends = sum(_legend_rows(p, wide) for p in plots[:rows]) * 0.18
+    size = (_WIDTH, (_ALONE if rows == 1 else _STACKED * rows) + above + legends + 0.4)
+    with figure(path, rows, columns, size) as grid:
+        for k, plot in enumerate(plots):
+            column, row = divmod(k, rows)
+            axes = grid[row * columns + column]
+            is_last = row == rows - 1 or k == len(plots) - 1
+            draw_time_plot(axes, plot, time)
+            if row == 0 or plot.phases != plots[k - 1].phases:
+                name_phases(axes, plot.phases, span / wide)
+            if is_last:
+                axes.set_xlabel("time (s)")
+            axes.tick_params(labelbottom=is_last)
+            if plot.has_legend and (is_last or _entries(plot) != _entries(plots[k + 1])):
+                _legend_below(axes, plot, wide, 34.0 if is_last else 6.0)
+        for axes in grid:
+            axes.set_visible(axes.has_data())
+        _canvas(grid[0]).align_ylabels()
+
+
+def draw_time_plot(axes: Axes, plot: TimePlot, time: Floats) -> None:
+    """Draw curves, levels and shades of phases into axes, over the record's time, s."""
+    for phase in plot.phases[1::2]:
+        axes.axvspan(phase.begin, phase.end, color=_SHADE, lw=0, zorder=0)
+    for curve, colour in zip(plot.curves, plot.colours, strict=True):
+        style = "steps-post" if curve.held else "default"
+        axes.plot(time, curve.values, color=COLOURS[colour], label=curve.label, ds=style, **_STROKES[curve.stroke])
+    for level, label, dashes in zip(plot.levels, plot.level_labels, cycle(_LEVELS)):
+        axes.axhline(level.value, color=_SOFT, lw=0.8, ls=dashes, label=label)
+    if plot.logarithmic:
+        axes.set_yscale("log")
+    label = plot.axis_label if len(plot.axis_label) < 19 else plot.axis_label.replace(" (", "\n(")
+    axes.set(ylabel=label, xlim=(time[0], time[-1]))
+    if plot.shown_range is not None:
+        axes.set_ylim(*plot.shown_range)
+
+
+def name_phases(axes: Axes, phases: Sequence[Phase], per_point: float) -> None:
+    """Write the names of phases over axes, upright with a line to its phase where one has no room beside the others.
+
+    `per_point` is the time, s, that a point on paper stands for. The shortest go if there is no room for all.
     """
-    edges = np.flatnonzero(np.diff(phase)) + 1
-    starts = [0, *edges.tolist()]
-    ends = [*edges.tolist(), len(t) - 1]
-    per_point = float(t[-1] - t[0]) / _width(axes)
-    narrow: list[tuple[float, float, str]] = []
-    for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
-        if k % 2:
-            axes.axvspan(t[a], t[b], color="#eef2f7", lw=0, zorder=0)
-        name, wide = names.get(int(phase[a]), "").replace("_", " ").lower(), float(t[b] - t[a])
-        if _LETTER * len(name) * per_point < wide:
-            axes.text((t[a] + t[b]) / 2, 1.02, name, transform=axes.get_xaxis_transform(), ha="center", color=_NAME)
-        elif name:
-            narrow.append((wide, float(t[a] + t[b]) / 2, name))
-    _upright(axes, narrow, float(t[0]), float(t[-1]), _UPRIGHT * per_point)
-
-
-def leave_room(axes: Axes) -> None:
-    """Let axes with upright names of phases reach beyond what is drawn, so that the names stand above it."""
-    if not any(text.get_rotation() for text in axes.texts):
+    if not phases:
         return
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.55 * (high - low))
+    low, high = phases[0].begin, phases[-1].end
+    levels, upright = _named(phases, per_point)
+    for phase in levels:
+        middle = (phase.begin + phase.end) / 2
+        axes.text(middle, 1.02, phase.name, transform=axes.get_xaxis_transform(), ha="center", color=_SOFT)
+    room = max(int((high - low) / per_point / _UPRIGHT), 1)
+    kept = sorted(sorted(upright, key=lambda p: p.begin - p.end)[:room], key=lambda p: p.begin)
+    middles = [(p.begin + p.end) / 2 for p in kept]
+    places = _spread(middles, low, high, _UPRIGHT * per_point)
+    for phase, middle, place in zip(kept, middles, places, strict=True):
+        axes.annotate(
+            phase.name,
+            xy=(middle, 1.0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=((place - middle) / per_point, 20.0 if levels else 8.0),
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            va="bottom",
+            size=7,
+            color=_SOFT,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": _SOFT,
+                "lw": 0.5,
+                "shrinkA": 0.0,
+                "shrinkB": 0.0,
+                "relpos": (0.5, 0.0),
+            },
+            annotation_clip=False,
+        )
 
 
-def _width(axes: Axes) -> float:
-    """Return about how wide the axes are, in points."""
-    inches: float = axes.figure.get_figure(root=True).get_size_inches()[0]  # pyright: ignore
-    return 72.0 * 0.88 * inches
+def _named(phases: Sequence[Phase], per_point: float) -> tuple[list[Phase], list[Phase]]:
+    """Return the phases over which there is room for their names, and those over which there is none."""
+    level: list[Phase] = []
+    upright: list[Phase] = []
+    for phase in phases:
+        if phase.name:
+            fits = _LETTER * len(phase.name) * per_point < phase.end - phase.begin
+            (level if fits else upright).append(phase)
+    return level, upright
 
 
-def _upright(axes: Axes, labels: Sequence[tuple[float, float, str]], low: float, high: float, apart: float) -> None:
-    """Write names upright at places, given with widths, at least so far apart; the narrowest go if there is no room."""
-    room = max(int((high - low) / apart), 1)
-    kept = sorted(sorted(labels, reverse=True)[:room], key=lambda label: label[1])
-    placed: list[float] = []
-    for _, x, _ in kept:
-        placed.append(max(x, low + apart / 2, placed[-1] + apart if placed else low))
-    for n in reversed(range(len(placed))):
-        placed[n] = min(placed[n], high - apart * (len(placed) - n - 0.5))
-    across = axes.get_xaxis_transform()
-    for (_, x, name), at in zip(kept, placed, strict=True):
-        top = 0.98 if abs(at - x) < apart / 4 else 0.93
-        if top < 0.98:
-            axes.plot([x, at], [1.0, top + 0.01], transform=across, color=_NAME, lw=0.5)
-        text = axes.text(at, top, name, transform=across, rotation=90, ha="center", va="top", size=7, color=_NAME)
-        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+def _height_of_names(phases: Sequence[Phase], per_point: float) -> float:
+    """Return about how high the names of phases stand above axes, points."""
+    levels, upright = _named(phases, per_point)
+    return (14.0 if levels else 0.0) + max((4.0 * len(p.name) + 8.0 for p in upright), default=0.0)
+
+
+def _spread(places: Sequence[float], low: float, high: float, apart: float) -> list[float]:
+    """Return ascending places moved so that they are at least so far apart, between low and high."""
+    spread: list[float] = []
+    for place in places:
+        spread.append(max(place, low + apart / 2, spread[-1] + apart if spread else low))
+    for n in reversed(range(len(spread))):
+        spread[n] = min(spread[n], high - apart * (len(spread) - n - 0.5))
+    return spread
+
+
+def _entries(plot: TimePlot) -> tuple[Any, ...]:
+    """Return what the legend of a plot shows; two with the same share theirs."""
+    return (*((c.label, c.stroke, k) for c, k in zip(plot.curves, plot.colours, strict=True)), *plot.level_labels)
+
+
+def _legend_columns(plot: TimePlot, wide: float) -> int:
+    """Return how many columns of a legend fit into a width, points, so that curves of one colour stand together."""
+    labels = [*(c.label for c in plot.curves), *plot.level_labels]
+    most = max(int(wide / (0.8 * _LETTER * max(len(label) for label in labels) + 42.0)), 1)
+    together = max((plot.colours.count(k) for k in plot.colours), default=1)
+    rows = together * ceil(len(labels) / most / together)
+    return ceil(len(labels) / rows)
+
+
+def _legend_rows(plot: TimePlot, wide: float) -> int:
+    count = len(plot.curves) + len(plot.levels)
+    return ceil(count / _legend_columns(plot, wide)) if plot.has_legend else 0
+
+
+def _legend_below(axes: Axes, plot: TimePlot, wide: float, gap: float) -> None:
+    """Put the legend so many points below the axes, clear of what stands at the axis."""
+    below = axes.transAxes + ScaledTranslation(0.0, -gap / 72.0, _canvas(axes).dpi_scale_trans)
+    axes.legend(
+        ncols=_legend_columns(plot, wide),
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=below,
+        borderaxespad=0.0,
+        fontsize=9,
+    )
+
+
+def _canvas(axes: Axes) -> Canvas:
+    found = axes.get_figure(root=True)
+    assert found is not None, "axes are drawn within a figure"
+    return found
 
 
 def _save(canvas: Canvas, path: Path) -> None:

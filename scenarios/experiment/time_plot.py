@@ -1,9 +1,22 @@
-"""What is to be drawn over time: curves with a unit, levels, and the phases behind them."""
+"""What is to be drawn over time: curves with a unit, levels, phases. Pages draw it by Plotly, papers by matplotlib."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
+
+COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
+"""Of curves, in the order in which they are given out; those of page.css by day, `var(--c0)` and on."""
+
+_MARGIN = 0.06
+"""Room between what is drawn and the end of an axis, in lengths of the axis."""
+
+Stroke = Literal["solid", "dashed", "dotted"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,14 +27,14 @@ class Curve:
         label: what the legend says.
         values: in the plot's unit.
         held: whether a value holds until the next one (a command, a sampled measurement), else they are joined.
-        faint: whether it is drawn thin and dotted, as ground truth beside what a controller sees.
+        stroke: dashed over a curve before it with which it may coincide; dotted is also thin, as of a reference.
         group: curves of one group have one colour; by default each has its own.
     """
 
     label: str
     values: Floats
     held: bool = False
-    faint: bool = False
+    stroke: Stroke = "solid"
     group: str = ""
 
 
@@ -34,6 +47,15 @@ class Level:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Phase:
+    """A span of time, s, and the name over it, "" for none."""
+
+    begin: float
+    end: float
+    name: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class TimePlot:
     """Curves over time that share an axis.
 
@@ -41,9 +63,11 @@ class TimePlot:
         title: in a few words.
         quantity: what the vertical axis shows, such as "distance".
         unit: the unit of its values as one reads it, such as "mm"; "" for pure numbers.
-        curves, levels: what is drawn.
-        phases: an enumeration's signal whose values are named over the plot, such as "servo.phase"; "" for none.
+        curves, levels: what is drawn; a later curve over those before.
+        phases: every second of them is shaded.
         logarithmic: whether the vertical axis is.
+        limits: of the vertical axis unless it is logarithmic; None where what is drawn sets it.
+        palette: groups that have the first colours whether they are drawn here or not, for plots that share groups.
     """
 
     title: str
@@ -51,5 +75,85 @@ class TimePlot:
     unit: str
     curves: Sequence[Curve]
     levels: Sequence[Level] = ()
-    phases: str = ""
+    phases: Sequence[Phase] = ()
     logarithmic: bool = False
+    limits: tuple[float | None, float | None] = (None, None)
+    palette: Sequence[str] = ()
+
+    @property
+    def axis_label(self) -> str:
+        """The quantity with its unit."""
+        return f"{self.quantity} ({self.unit})" if self.unit else self.quantity
+
+    @property
+    def colours(self) -> tuple[int, ...]:
+        """Places of the curves' colours in `COLOURS`."""
+        groups = list(dict.fromkeys([*self.palette, *(c.group or c.label for c in self.curves)]))
+        return tuple(groups.index(c.group or c.label) % len(COLOURS) for c in self.curves)
+
+    @property
+    def level_labels(self) -> tuple[str, ...]:
+        """What the legend says of the levels: each with its value."""
+        return tuple(f"{level.label}: {level.value:.4g}{self.unit_after_value}" for level in self.levels)
+
+    @property
+    def unit_after_value(self) -> str:
+        """The unit as it follows a value, with the space between them if it has one."""
+        return self.unit if self.unit in ("", "°") else f" {self.unit}"
+
+    @property
+    def shown_range(self) -> tuple[float, float] | None:
+        """The limits, where only one is given with the other a little beyond what is drawn; None if none is given."""
+        drawn = np.concatenate([*(c.values for c in self.curves), [level.value for level in self.levels]])
+        drawn = drawn[np.isfinite(drawn)]
+        if self.limits == (None, None) or not drawn.size:
+            return None
+        low, high = (
+            float(most) if limit is None else limit
+            for limit, most in zip(self.limits, (drawn.min(), drawn.max()), strict=True)
+        )
+        margin = _MARGIN * (high - low)
+        return (low - margin if self.limits[0] is None else low, high + margin if self.limits[1] is None else high)
+
+    @property
+    def has_legend(self) -> bool:
+        """Whether a legend says more than the axis does."""
+        return len(self.curves) + len(self.levels) > 1 or any(c.label != self.quantity for c in self.curves)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeFigure:
+    """Plots that a figure for papers draws below each other, sharing time.
+
+    Attributes:
+        name: of its file within the figures folder, without suffix.
+        caption: what is seen, in a sentence or two.
+        plots: from above; with more than one column, the second column follows the first.
+    """
+
+    name: str
+    caption: str
+    plots: Sequence[TimePlot]
+    columns: int = 1
+
+
+def phases_of(record: Record, signal: str, names: Mapping[int, str] | None = None) -> tuple[Phase, ...]:
+    """Return when a signal had which value, by name; neighbours of one name are one phase.
+
+    `names` are by value, by default those of the signal's enumeration.
+
+    Raises:
+        KeyError: no such signal was recorded.
+    """
+    values, time = record[signal], record.time
+    if names is None:
+        names = {value: name.replace("_", " ").lower() for value, name in record.items(signal).items()}
+    changes = np.flatnonzero(np.diff(values)) + 1
+    phases: list[Phase] = []
+    for a, b in pairwise([0, *changes.tolist(), len(time) - 1]):
+        phase = Phase(begin=float(time[a]), end=float(time[b]), name=names.get(int(values[a]), str(values[a])))
+        if phases and phases[-1].name == phase.name:
+            phases[-1] = replace(phases[-1], end=phase.end)
+        else:
+            phases.append(phase)
+    return tuple(phases)

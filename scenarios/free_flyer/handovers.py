@@ -23,7 +23,7 @@ from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.experiment.replay import Replay
-from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
@@ -123,17 +123,17 @@ class FlyerHandover(Experiment[HandoverWatch]):
         """Return the robot's own computing: deciding and controlling."""
         return ("decision", "impedance", "pose")
 
-    def draw(self, parameters: HandoverParameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw paths, gripper, thrust over time, and the scene at three moments."""
-        from handover.scenarios.free_flyer.figures import draw_handover  # what draws takes long to load
+    def draw(self, parameters: HandoverParameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
+        """Draw the scene at three moments, and the transfers from near."""
+        from handover.scenarios.free_flyer.figures import draw_scenes  # what draws takes long to load
 
-        return draw_handover(parameters, watch, record, folder)
+        return draw_scenes(watch, record, folder)
 
-    def plots(self, parameters: HandoverParameters, record: Record) -> Sequence[TimePlot]:
-        """Return the gripper's place, speed and angle, who holds the object, and thrust over time."""
-        from handover.scenarios.free_flyer.plots import plot_handover
+    def time_figures(self, parameters: HandoverParameters, record: Record) -> list[TimeFigure]:
+        """Return paths, the gripper, who holds the object, and thrust over time."""
+        from handover.scenarios.free_flyer.plots import figures_of_handover
 
-        return plot_handover(parameters, record, self.receivers)
+        return figures_of_handover(parameters, record)
 
     def replay(self, parameters: HandoverParameters, record: Record) -> Replay:  # noqa: ARG002
         """Return robot, hand and object in space."""

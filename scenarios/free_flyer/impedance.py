@@ -12,7 +12,7 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.replay import Replay
-from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceWatch
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.published import published_of_push
@@ -94,16 +94,16 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
     def draw(
         self, parameters: ImpedanceParameters, watch: ImpedanceWatch, record: Record, folder: Path
     ) -> list[Figure]:
-        """Draw actual and calculated errors with the push, thrust, and the scene at three moments."""
-        from handover.scenarios.free_flyer.figures import draw_push  # what draws takes long to load
+        """Draw the scene at three moments."""
+        from handover.scenarios.free_flyer.figures import draw_moments  # what draws takes long to load
 
-        return draw_push(parameters, watch, record, folder)
+        return [draw_moments(watch.errors(), parameters, record, folder)]
 
-    def plots(self, parameters: ImpedanceParameters, record: Record) -> Sequence[TimePlot]:
+    def time_figures(self, parameters: ImpedanceParameters, record: Record) -> list[TimeFigure]:
         """Return errors actual and calculated, push and thrust over time."""
-        from handover.scenarios.free_flyer.plots import plot_push
+        from handover.scenarios.free_flyer.plots import figures_of_push
 
-        return plot_push(parameters, record)
+        return figures_of_push(parameters, record)
 
     def replay(self, parameters: ImpedanceParameters, record: Record) -> Replay:  # noqa: ARG002
         """Return the robot, its gripper's place of rest and the push in space."""

@@ -1,134 +1,276 @@
-"""What the report draws of a handover in microgravity over time.
+"""Curves of a handover in microgravity over time, as in [Fernandes2020] figs. 4.29-4.38: paths, gripper, thrust.
 
-What the report draws of a push over time.
+Curves of a push over time: errors as in [Fernandes2020] figs. 4.5-4.16, the push, and thrust.
 
-What the report draws over time of the wrench that is commanded and of the one that the thrusters give.
+Curves over time of the wrench that is commanded and of the one that the thrusters give.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
+from handover.scenarios.experiment.time_plot import (
+    Curve,
+    Level,
+    Phase,
+    Stroke,
+    TimeFigure,
+    TimePlot,
+    phases_of,
+)
 from handover.scenarios.free_flyer.impedance_evaluation import MOTION_SIGNALS, Motion, errors_of
 from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Wrench
 
-BEYOND = 2.0
+_BEYOND = 2.0
 """How far plots reach beyond what the thrusters give at most: a command may be twenty times as much."""
+_QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N·m"))
 
-QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N·m"))
-
-
-def commanded_wrench(record: Record, controllers: Sequence[str], what: str) -> Floats:
-    """Return the sum of commands, as the thrusters take it, in B, shape (rows, 3); `what` is `f` or `tau`."""
-    return np.sum([record[f"{name}.{what}_cmd"] for name in controllers], axis=0)
+CAPTION = "Force and torque on the robot in B; dotted: as commanded, where the thrusters give less, cut off far beyond."
 
 
-def plot_thrust(record: Record, controllers: Sequence[str], phases: str = "") -> list[TimePlot]:
-    """Return force and torque on the robot in B; commands far beyond what the thrusters give are left out."""
+def plot_thrust(record: Record, controllers: Sequence[str], phases: Sequence[Phase]) -> list[TimePlot]:
+    """Return force and torque on the robot in B; commands of several controllers are added, as the thrusters do.
+
+    The axes show what the thrusters give; commands run out of them.
+    """
     plots: list[TimePlot] = []
-    for what, name, unit in QUANTITIES:
-        given, commanded = record[f"thrusters.{what}_B"], commanded_wrench(record, controllers, what)
-        limit = BEYOND * float(np.abs(given).max(initial=0.0))
-        if limit > 0.0:
-            commanded = np.where(np.abs(commanded) <= limit, commanded, np.nan)
+    for what, name, unit in _QUANTITIES:
+        given = record[f"thrusters.{what}_B"]
+        commanded = np.sum([record[f"{controller}.{what}_cmd"] for controller in controllers], axis=0)
+        limit = _BEYOND * float(np.abs(given).max(initial=0.0))
+        is_beyond = float(np.abs(commanded).max(initial=0.0)) > limit > 0.0
         curves: list[Curve] = []
         for i, axis in enumerate("xyz"):
             curves.append(Curve(label=f"{axis}, given", values=given[:, i], group=axis))
             told = f"{axis}, commanded"
-            curves.append(Curve(label=told, values=commanded[:, i], held=True, faint=True, group=axis))
-        title = f"{name} of the thrusters in B"
-        plots.append(TimePlot(title=title, quantity=name.lower(), unit=unit, curves=curves, phases=phases))
+            curves.append(Curve(label=told, values=commanded[:, i], held=True, stroke="dotted", group=axis))
+        plots.append(
+            TimePlot(
+                title=f"{name} of the thrusters in B",
+                quantity=name.lower(),
+                unit=unit,
+                curves=curves,
+                phases=phases,
+                limits=(-limit, limit) if is_beyond else (None, None),
+            )
+        )
     return plots
 
 
-_PHASES = "decision.phase"
-_TOUCHES = {"HAND": "a pull", "GRIPPER": "a push"}
+_FOLLOWED: tuple[tuple[str, str, Stroke], ...] = (
+    ("gripper", "robot.{}_WG", "solid"),
+    ("hand", "person.{}_WH", "solid"),
+    ("object", "person.{}_WO", "dashed"),
+)
+"""The object goes with the gripper or the hand."""
+_PALETTE = ("gripper", "object", "hand")
+_WATCHING = ("signal", "check velocity")
+"""Phases in which the threshold of the gripper's speed counts."""
 
 
-def plot_handover(parameters: HandoverParameters, record: Record, receivers: Sequence[str]) -> list[TimePlot]:
-    """Return the gripper's place, speed and angle, who holds the object, and thrust."""
-    published = paper_values("free_flyer", "published")
+def figures_of_handover(parameters: HandoverParameters, record: Record) -> list[TimeFigure]:
+    """Return paths of gripper, hand and object, the gripper with who holds the object, and thrust."""
+    phases = phases_of(record, "decision.phase")
     return [
-        _place(record),
-        _speed(parameters, record, receivers),
-        TimePlot(
-            title="Angle of the gripper",
-            quantity="angle",
-            unit="°",
-            phases=_PHASES,
-            curves=(Curve(label="angle", values=np.degrees(record["person.gripper_angle"])),),
-            levels=(Level(label="counts as full", value=float(np.degrees(published["angle_threshold"]))),),
+        TimeFigure(
+            name="positions",
+            caption="Positions of gripper, hand and object in W, and where the gripper is to be; shaded by the robot's "
+            "phases.",
+            plots=_positions(record, phases),
         ),
+        TimeFigure(
+            name="orientations",
+            caption="Orientations of gripper, hand and object in W; shaded by the robot's phases.",
+            plots=_orientations(record, phases),
+        ),
+        TimeFigure(
+            name="gripper",
+            caption="Angle of the gripper with the threshold above which it counts as full; its speed, with the one at "
+            "which the robot would act; forces on gripper and hand, shaded by who holds the object.",
+            plots=[_angle(record, phases), _speed(parameters, record, phases), _forces(record)],
+        ),
+        TimeFigure(name="thrust", caption=CAPTION, plots=plot_thrust(record, ("impedance", "pose"), phases)),
+    ]
+
+
+def _positions(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
+    goal = 1000 * record["decision.p_WG_goal"]
+    followed = {name: 1000 * record[signal.format("p")] for name, signal, _ in _FOLLOWED}
+    return [
         TimePlot(
-            title="Forces, and who holds the object",
-            quantity="force",
-            unit="N",
-            phases="person.holder",
-            curves=(
-                Curve(label="on the gripper", values=np.linalg.norm(record["person.f_G"], axis=1)),
-                Curve(label="on the hand", values=np.linalg.norm(record["person.f_H"], axis=1)),
+            title=f"Gripper, hand and object along {axis} of W",
+            quantity=f"{axis} in W",
+            unit="mm",
+            curves=[
+                *_curves(followed, i),
+                Curve(label="gripper's goal", values=goal[:, i], held=True, stroke="dotted", group="gripper"),
+            ],
+            phases=phases,
+            palette=_PALETTE,
+        )
+        for i, axis in enumerate("xyz")
+    ]
+
+
+def _orientations(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
+    followed = {name: _angles(record[signal.format("q")]) for name, signal, _ in _FOLLOWED}
+    return [
+        TimePlot(
+            title=f"{angle.capitalize()} of gripper, hand and object in W",
+            quantity=angle,
+            unit="°",
+            curves=_curves(followed, i),
+            phases=phases,
+            palette=_PALETTE,
+        )
+        for i, angle in enumerate(("roll", "pitch", "yaw"))
+    ]
+
+
+def _curves(followed: dict[str, Floats], i: int) -> list[Curve]:
+    return [Curve(label=name, values=followed[name][:, i], stroke=stroke) for name, _, stroke in _FOLLOWED]
+
+
+def _angles(q: Floats) -> Floats:
+    """Return roll, pitch and yaw, °, without jumps by a whole turn."""
+    yaw_pitch_roll = Rotation.from_quat(q, scalar_first=True).as_euler("ZYX")
+    return np.degrees(np.unwrap(yaw_pitch_roll[:, ::-1], axis=0))
+
+
+def _angle(record: Record, phases: Sequence[Phase]) -> TimePlot:
+    threshold = float(np.degrees(paper_values("free_flyer", "published")["angle_threshold"]))
+    return TimePlot(
+        title="Angle of the gripper",
+        quantity="angle",
+        unit="°",
+        phases=phases,
+        curves=(Curve(label="angle", values=np.degrees(record["person.gripper_angle"])),),
+        levels=(Level(label="counts as full", value=threshold),),
+        limits=(0.0, None),
+    )
+
+
+def _speed(parameters: HandoverParameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
+    return TimePlot(
+        title="Speed of the gripper",
+        quantity="speed",
+        unit="m/s",
+        phases=phases,
+        curves=(
+            Curve(label="as the robot sees it", values=record["decision.speed_G"]),
+            Curve(label="true", values=np.linalg.norm(record["robot.v_WG"], axis=1), stroke="dotted"),
+            Curve(
+                label="at which the robot acts, while it counts",
+                values=_threshold(parameters, record, phases),
+                held=True,
+                stroke="dashed",
             ),
         ),
-        *plot_thrust(record, ("impedance", "pose"), _PHASES),
-    ]
-
-
-def _place(record: Record) -> TimePlot:
-    p_WG, p_WG_goal = 1000 * record["robot.p_WG"], 1000 * record["decision.p_WG_goal"]
-    curves: list[Curve] = []
-    for i, axis in enumerate("xyz"):
-        curves.append(Curve(label=f"{axis}, gripper", values=p_WG[:, i], group=axis))
-        curves.append(Curve(label=f"{axis}, its goal", values=p_WG_goal[:, i], held=True, faint=True, group=axis))
-    return TimePlot(
-        title="The gripper and its goal in W", quantity="position", unit="mm", curves=curves, phases=_PHASES
+        limits=(0.0, None),
     )
 
 
-def _speed(parameters: HandoverParameters, record: Record, receivers: Sequence[str]) -> TimePlot:
+def _threshold(parameters: HandoverParameters, record: Record, phases: Sequence[Phase]) -> Floats:
+    """Return the speed, m/s, that the robot takes for a pull or a push, not a number while it does not wait for it.
+
+    It waits for a pull while it has the object, for a push else; who has it as the robot gives its signal decides.
+    """
     published = paper_values("free_flyer", "published")
-    levels = [
-        Level(
-            label=f"counts as {_TOUCHES[receiver]}",
-            value=published[f"velocity_{receiver.lower()}"][parameters.behaviour],
-        )
-        for receiver in dict.fromkeys(receivers)
-    ]
-    curves = (
-        Curve(label="as the robot sees it", values=record["decision.speed_G"]),
-        Curve(label="true", values=np.linalg.norm(record["robot.v_WG"], axis=1), faint=True),
-    )
+    pull, push = (float(published[f"velocity_{who}"][parameters.behaviour]) for who in ("hand", "gripper"))
+    holder = [record.items("person.holder")[code] for code in record["person.holder"].tolist()]
+    values = np.full(len(record.time), np.nan)
+    speed = np.nan
+    for phase in phases:
+        first, last = np.searchsorted(record.time, (phase.begin, phase.end)).tolist()
+        if phase.name == _WATCHING[0]:
+            speed = pull if holder[first] == "GRIPPER" else push
+        if phase.name in _WATCHING:
+            values[first : last + 1] = speed
+    return values
+
+
+def _forces(record: Record) -> TimePlot:
     return TimePlot(
-        title="Speed of the gripper", quantity="speed", unit="m/s", curves=curves, levels=levels, phases=_PHASES
+        title="Forces, and who holds the object",
+        quantity="force",
+        unit="N",
+        phases=phases_of(record, "person.holder"),
+        curves=(
+            Curve(label="on the gripper", values=np.linalg.norm(record["person.f_G"], axis=1)),
+            Curve(label="on the hand", values=np.linalg.norm(record["person.f_H"], axis=1), stroke="dashed"),
+        ),
     )
 
 
-def plot_push(parameters: ImpedanceParameters, record: Record) -> list[TimePlot]:
-    """Return errors beside those that the model calls for, the push, and thrust; nothing of a single instant."""
+_PUSH_PALETTE = ("actual", "calculated")
+_AXES: dict[str, Stroke] = {"x": "solid", "y": "dashed", "z": "dotted"}
+"""Two of them have no part in the push."""
+
+
+def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[TimeFigure]:
+    """Return errors beside those that the model calls for, thrust, and the push; nothing of a single instant."""
     if len(record.time) < 2:
         return []
     motion = Motion(record.time, *(record[name] for name in MOTION_SIGNALS))
     p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
     errors = errors_of(motion, p_WG_goal, parameters.behaviour)
-    turned, turned_model = errors.without_jumps
+    turned, turned_model = (np.degrees(values) for values in errors.without_jumps)
+    phases = _phases(parameters, float(record.time[-1]))
     return [
-        _error("Error of the gripper's position, rest minus actual", "mm", 1000 * errors.p, 1000 * errors.p_model),
-        _error("Error of its orientation, rest minus actual", "°", np.degrees(turned), np.degrees(turned_model)),
-        _push(parameters, record),
-        *plot_thrust(record, ("impedance",)),
+        TimeFigure(
+            name="errors",
+            caption="Error of the gripper's pose, rest minus actual, in the whole run, and as [Fernandes2020] "
+            f"eq. (4.4) calls for; {_told(parameters)}.",
+            plots=[
+                *_errors("position", "mm", 1000 * errors.p, 1000 * errors.p_model, phases),
+                *_errors("orientation", "°", turned, turned_model, phases),
+            ],
+            columns=2,
+        ),
+        TimeFigure(
+            name="thrust",
+            caption=f"{CAPTION} Above: the push on the gripper in W.",
+            plots=[_push(parameters, record, phases), *plot_thrust(record, ("impedance",), phases)],
+        ),
     ]
 
 
-def _error(title: str, unit: str, actual: Floats, calculated: Floats) -> TimePlot:
-    curves: list[Curve] = []
-    for i, axis in enumerate("xyz"):
-        curves.append(Curve(label=f"{axis}, actual", values=_to_the_end(actual[:, i]), group=axis))
-        told = f"{axis}, by the model"
-        curves.append(Curve(label=told, values=_to_the_end(calculated[:, i]), faint=True, group=axis))
-    return TimePlot(title=title, quantity="error", unit=unit, curves=curves)
+def _phases(p: ImpedanceParameters, end: float) -> list[Phase]:
+    begin, over = min(p.begin, end), min(p.end, end)
+    return [
+        Phase(begin=0.0, end=begin, name=""),
+        Phase(begin=begin, end=over, name="push" if p.kind is Wrench.FORCE else "twist"),
+        Phase(begin=over, end=end, name=""),
+    ]
+
+
+def _told(p: ImpedanceParameters) -> str:
+    what = f"pushed with {p.force:g} N along" if p.kind is Wrench.FORCE else f"twisted with {p.torque:g} N·m about"
+    return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
+
+
+def _errors(what: str, unit: str, actual: Floats, calculated: Floats, phases: Sequence[Phase]) -> list[TimePlot]:
+    """Return the errors along or about x, y and z, whose axes show the same range."""
+    limit = 1.1 * max(float(np.nanmax(np.abs(values), initial=1e-3)) for values in (actual, calculated))
+    return [
+        TimePlot(
+            title=f"Error of the gripper's {what}, rest minus actual, {axis} of W",
+            quantity=f"error, {axis}",
+            unit=unit,
+            curves=(
+                Curve(label="calculated", values=_to_the_end(calculated[:, i])),
+                Curve(label="actual", values=_to_the_end(actual[:, i]), stroke="dashed"),
+            ),
+            phases=phases,
+            limits=(-limit, limit),
+            palette=_PUSH_PALETTE,
+        )
+        for i, axis in enumerate("xyz")
+    ]
 
 
 def _to_the_end(values: Floats) -> Floats:
@@ -136,10 +278,14 @@ def _to_the_end(values: Floats) -> Floats:
     return np.append(values, np.nan)
 
 
-def _push(parameters: ImpedanceParameters, record: Record) -> TimePlot:
+def _push(parameters: ImpedanceParameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
     signal, quantity, unit = (
         ("push.f_G", "force", "N") if parameters.kind is Wrench.FORCE else ("push.tau_G", "torque", "N·m")
     )
     values = record[signal]
-    curves = [Curve(label=axis, values=values[:, i], held=True) for i, axis in enumerate("xyz")]
-    return TimePlot(title=f"The push: {quantity} on the gripper in W", quantity=quantity, unit=unit, curves=curves)
+    curves = [
+        Curve(label=axis, values=values[:, i], held=True, stroke=stroke)
+        for i, (axis, stroke) in enumerate(_AXES.items())
+    ]
+    title = f"The push: {quantity} on the gripper in W"
+    return TimePlot(title=title, quantity=f"push: {quantity}", unit=unit, curves=curves, phases=phases)

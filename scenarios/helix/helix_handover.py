@@ -16,7 +16,7 @@ from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.replay import Replay
-from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.helix.cameras import calibration
 from handover.scenarios.helix.evaluation import HandoverWatch
 from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
@@ -140,17 +140,18 @@ class HelixHandover(Experiment[HandoverWatch]):
         """Return what table 1 and fig. 9 tell."""
         return published_of(parameters)
 
-    def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw errors, paths and tendons over time, and the camera pictures of some moments."""
-        from handover.scenarios.helix.plots import draw_handover  # what draws takes long to load
+    def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
+        """Draw the camera pictures of some moments."""
+        from handover.scenarios.helix.plots import draw_pictures  # what draws takes long to load
 
-        return draw_handover(parameters, watch.pictures(), record, folder)
+        pictures = watch.pictures()
+        return [draw_pictures(pictures, folder)] if pictures else []
 
-    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+    def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
         """Return distance to the goal, positions, tendons and gripper over time."""
-        from handover.scenarios.helix.plots import plot_handover
+        from handover.scenarios.helix.plots import figures_of_handover
 
-        return plot_handover(parameters, record)
+        return figures_of_handover(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
         """Return arm, gripper, hand, ball and cameras in space."""

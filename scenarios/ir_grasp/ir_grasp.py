@@ -17,7 +17,7 @@ from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.experiment.replay import Replay
-from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.ir_grasp.evaluation import GraspWatch
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation
 
@@ -131,16 +131,16 @@ class IrGrasp(Experiment[GraspWatch]):
         return published_of(parameters)
 
     def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw the scene at three moments, distances and cost, and the commands."""
-        from handover.scenarios.ir_grasp.plots import draw_grasp  # what draws takes long to load
+        """Draw the scene at three moments."""
+        from handover.scenarios.ir_grasp.plots import draw_scene  # what draws takes long to load
 
-        return draw_grasp(parameters, watch.moments, record, folder)
+        return [draw_scene(parameters, watch.moments, record, folder)]
 
-    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+    def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
         """Return distances, cost, and wrist, heading and closure over time."""
-        from handover.scenarios.ir_grasp.plots import plot_grasp
+        from handover.scenarios.ir_grasp.plots import figures_of_grasp
 
-        return plot_grasp(parameters, record)
+        return figures_of_grasp(parameters, record)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:
         """Return hand, object and beams in space."""

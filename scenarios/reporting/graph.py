@@ -14,7 +14,8 @@ from markupsafe import Markup, escape
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.conversion import Linear
-from handover.scenarios.reporting.html import COLOURS, plot_html
+from handover.scenarios.experiment.time_plot import COLOURS
+from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, template
 
 Pair = tuple[str, str]
@@ -140,7 +141,7 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
     names = [u["name"] for u in units]
     between = {pair: cs for pair, cs in bundles.items() if pair[0] != pair[1]}
     at = places(names, between)
-    colour = {name: f"var(--c{k % COLOURS})" for k, name in enumerate(names)}
+    colour = {name: f"var(--c{k % len(COLOURS)})" for k, name in enumerate(names)}
     lines = [bent(at[a], at[b]) for a, b in between]
     drawn = [_line(points, colour[a]) for points, (a, _) in zip(lines, between, strict=True)]
     heads = [

@@ -11,9 +11,6 @@ import plotly.graph_objects as go
 import plotly.io.json
 from markupsafe import Markup, escape
 
-COLOURS = 9
-"""Colours of curves in page.css, `var(--c0)` and on."""
-
 _packed = cast(Callable[[Any], str], plotly.io.json.to_json_plotly)
 
 

@@ -200,7 +200,7 @@ def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
         parameters: Any = parameters_of(type(facts.experiment), facts.run["parameters"])
         plots, replay = facts.experiment.plots(parameters, record), facts.experiment.replay(parameters, record)
         return [
-            time_plots_section(plots, record),
+            time_plots_section(plots, record.time),
             None if replay is None else replay_section(replay, record),
         ]
     except (BadParameter, KeyError) as e:

@@ -7,7 +7,7 @@ Few rows of a signal that look like all of them.
 
 import base64
 from collections.abc import Mapping, Sequence
-from itertools import cycle, pairwise, product
+from itertools import cycle, product
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,8 @@ from tsdownsample import MinMaxLTTBDownsampler
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.display_unit import unit_symbol
-from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
-from handover.scenarios.reporting.html import COLOURS, json_html, plot_html
+from handover.scenarios.experiment.time_plot import Curve, Phase, TimePlot
+from handover.scenarios.reporting.html import json_html, plot_html
 from handover.scenarios.reporting.page import Section, template
 
 Rows = NDArray[np.int64]
@@ -43,13 +43,17 @@ def rows_of_curve(values: Floats, most: int) -> Rows:
 
 
 def rows_of_steps(values: Floats, most: int) -> Rows:
-    """Return the rows where a value that is held changes, the first and the last; a curve's if they are too many."""
+    """Return the rows where a value that is held changes, the first and the last; a curve's if they are too many.
+
+    Of a gap (NaN) the row before it is one, too: until there the value is drawn.
+    """
     if len(values) == 0:
         return np.zeros(0, np.int64)
     changes = changes_of(values)
     if len(changes) > most:
         return rows_of_curve(values, most)
-    return np.union1d(np.append(changes, 0), [len(values) - 1])
+    before_gaps = changes[np.isnan(values[changes])] - 1
+    return np.unique(np.concatenate((changes, before_gaps, [0, len(values) - 1])))
 
 
 def changes_of(values: Floats) -> Rows:
@@ -62,95 +66,81 @@ TIME_AXIS = "time (s)"
 _MOST = 900
 """Points of a curve: more than a plot has pixels for."""
 _MOST_PHASES = 200
-_DASHES = ("dash", "longdashdot")
-"""Of a plot's levels."""
+_STROKES: dict[str, dict[str, Any]] = {
+    "solid": {"width": 1.8},
+    "dashed": {"width": 1.8, "dash": "dash"},
+    "dotted": {"width": 1.2, "dash": "dot"},
+}
+_LEVELS = ("longdash", "longdashdot")
 
 
-def time_plots_section(plots: Sequence[TimePlot], record: Record) -> Section | None:
-    """Return the plots below each other; None where there are none.
-
-    Raises:
-        KeyError: the record has no signal that a plot names.
-    """
+def time_plots_section(plots: Sequence[TimePlot], time: Floats) -> Section | None:
+    """Return the plots below each other, over the record's time, s; None where there are none."""
     if not plots:
         return None
     html = Markup("").join(
-        Markup("<h3>{}</h3>").format(p.title) + plot_html(time_figure(p, record), height=280, label=p.title)
+        Markup("<h3>{}</h3>").format(p.title) + plot_html(time_figure(p, time), height=280, label=p.title)
         for p in plots
     )
     return Section(anchor="time", title="Over time", html=html, scripts=("phases.js",))
 
 
-def time_figure(plot: TimePlot, record: Record) -> go.Figure:
+def time_figure(plot: TimePlot, time: Floats) -> go.Figure:
     """Return a plot as a figure, with its unit at the axis and at each value told; the page draws the phases."""
-    colours = _colours(plot.curves)
     meta: dict[str, Any] = {"time": True}
     if plot.phases:
-        meta["phases"] = _phases(record, plot.phases)
+        meta["phases"] = _phases(plot.phases)
+    kind = {"type": "log", "dtick": 1} if plot.logarithmic else {"type": "linear"}
+    shown = {} if plot.shown_range is None else {"range": plot.shown_range}
+    unit = plot.unit_after_value
     return go.Figure(
         [
-            *(_trace(c, record.time, plot.unit, colour) for c, colour in zip(plot.curves, colours, strict=True)),
-            *(_level(level, record.time, plot.unit, dash) for level, dash in zip(plot.levels, cycle(_DASHES))),
+            *(_trace(c, time, unit, colour) for c, colour in zip(plot.curves, plot.colours, strict=True)),
+            *(
+                _level(level.value, label, time, dash)
+                for level, label, dash in zip(plot.levels, plot.level_labels, cycle(_LEVELS))
+            ),
         ],
         {
             "meta": meta,
             "hovermode": "x unified",
-            "showlegend": len(plot.curves) + len(plot.levels) > 1
-            or bool(plot.curves[:1] and plot.curves[0].label != plot.quantity),
+            "showlegend": plot.has_legend,
             "xaxis": {"title": {"text": TIME_AXIS}, "unifiedhovertitle": {"text": "%{x:.4~f} s"}},
-            "yaxis": {"title": {"text": _with_unit(plot)}, "exponentformat": "power",
-                      **({"type": "log", "dtick": 1} if plot.logarithmic else {"type": "linear"})},
+            "yaxis": {"title": {"text": plot.axis_label}, "exponentformat": "power", **kind, **shown},
         },
-    )  # fmt: skip
+    )
 
 
-def _with_unit(plot: TimePlot) -> str:
-    return f"{plot.quantity} ({plot.unit})" if plot.unit else plot.quantity
-
-
-def _colours(curves: Sequence[Curve]) -> list[str]:
-    groups = list(dict.fromkeys(c.group or c.label for c in curves))
-    return [f"var(--c{groups.index(c.group or c.label) % COLOURS})" for c in curves]
-
-
-def _trace(curve: Curve, time: Floats, unit: str, colour: str) -> Any:
+def _trace(curve: Curve, time: Floats, unit: str, colour: int) -> Any:
     values = np.asarray(curve.values, dtype=np.float64)
     rows = rows_of_steps(values, _MOST) if curve.held else rows_of_curve(values, _MOST)
-    drawn: dict[str, Any] = {"width": 1.2, "dash": "dot"} if curve.faint else {"width": 1.8}
+    shape = "hv" if curve.held else "linear"
     return go.Scatter(
         x=time[rows].astype(np.float32),
         y=values[rows].astype(np.float32),
         name=curve.label,
         mode="lines",
-        line={**drawn, "color": colour, "shape": "hv" if curve.held else "linear"},
-        hovertemplate="%{y:.4~g}" + (f" {unit}" if unit else ""),
+        line={**_STROKES[curve.stroke], "color": f"var(--c{colour})", "shape": shape},
+        hovertemplate="%{y:.4~g}" + unit,
         connectgaps=False,
     )
 
 
-def _level(level: Level, time: Floats, unit: str, dash: str) -> Any:
+def _level(value: float, label: str, time: Floats, dash: str) -> Any:
     return go.Scatter(
         x=[float(time[0]), float(time[-1])],
-        y=[level.value, level.value],
-        name=f"{level.label}: {level.value:.4g} {unit}".rstrip(),
+        y=[value, value],
+        name=label,
         mode="lines",
         line={"color": "var(--soft)", "width": 1.2, "dash": dash},
         hoverinfo="skip",
     )
 
 
-def _phases(record: Record, signal: str) -> list[dict[str, Any]]:
-    """Return when each phase began and ended, s, and its name; the longest ones where there are too many to be seen."""
-    values, names, time = record[signal], record.items(signal), record.time
-    edges = [0, *changes_of(values.astype(np.float64)).tolist(), len(time) - 1]
-    longest = sorted(pairwise(edges), key=lambda span: float(time[span[0]] - time[span[1]]))[:_MOST_PHASES]
-    return [
-        {"from": float(time[a]), "to": float(time[b]), "name": _told(names, int(values[a]))} for a, b in sorted(longest)
-    ]
-
-
-def _told(names: dict[int, str], value: int) -> str:
-    return names.get(value, str(value)).replace("_", " ").lower()
+def _phases(phases: Sequence[Phase]) -> list[dict[str, Any]]:
+    """Return the phases as the page's script takes them; the longest ones where there are too many to be seen."""
+    longest = sorted(phases, key=lambda phase: phase.begin - phase.end)[:_MOST_PHASES]
+    return [{"from": p.begin, "to": p.end, "name": p.name} for p in sorted(longest, key=lambda p: p.begin)]
 
 
 _BUDGET = 1_400_000

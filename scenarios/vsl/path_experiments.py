@@ -5,7 +5,7 @@ The arm follows a path by rigid-link kinematics with learned corrections. [Ganda
 The arm follows a path by rigid-link kinematics. [Gandarias2020] sec. V-A, experiment 1.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,7 +17,7 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.experiment.replay import Replay
-from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.evaluation import PathWatch
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
@@ -116,16 +116,16 @@ class PathExperiment(Experiment[PathWatch]):
         return ("planner", "kinematics")
 
     def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
-        """Draw the path, the arm's shape at three moments, errors, and joints, currents and pressures over time."""
+        """Draw the path, the arm's shape at three moments, and errors."""
         from handover.scenarios.vsl.plots import draw_path_run  # what draws takes long to load
 
         return draw_path_run(parameters, watch, record, folder)
 
-    def plots(self, parameters: Parameters, record: Record) -> Sequence[TimePlot]:
+    def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
         """Return error and place of the tip, joints, pressures and currents over time."""
-        from handover.scenarios.vsl.plots import plot_path_run
+        from handover.scenarios.vsl.plots import figures_of_path
 
-        return plot_path_run(parameters, record, hybrid=self.hybrid)
+        return figures_of_path(parameters, record, hybrid=self.hybrid)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:
         """Return arm, load, path and the tip's way in space."""

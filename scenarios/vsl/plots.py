@@ -1,6 +1,6 @@
-"""What the report draws of a run along a path over time.
+"""Curves of a run along a path over time: the tip's error and place, joints, currents and pressures.
 
-Figures of a run along a path: the path, the arm's shape, errors, and joints, currents and pressures over time.
+Figures of a run along a path in space: the path, the arm's shape, and its errors.
 """
 
 from collections.abc import Sequence
@@ -13,103 +13,125 @@ from matplotlib.axes import Axes
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure, shade_phases
-from handover.scenarios.experiment.time_plot import Curve, Level, TimePlot
+from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.time_plot import (
+    COLOURS,
+    Curve,
+    Level,
+    Phase,
+    Stroke,
+    TimeFigure,
+    TimePlot,
+    phases_of,
+)
 from handover.scenarios.vsl.evaluation import PathWatch, distance
 from handover.scenarios.vsl.parameters import Parameters
 
-BY_SERVOS = "tip by the servos, links taken as rigid"
+SERVOS, TIP = "tip by the servos, links taken as rigid", "tip by the tracker"
+_PALETTE = ("servos", "tip", "desired", "estimate")
+SERVO_COLOUR, TIP_COLOUR, DESIRED_COLOUR, ESTIMATE_COLOUR = COLOURS[: len(_PALETTE)]
+_LINKS: tuple[Stroke, ...] = ("solid", "dashed")
+"""Of the links' pressures, which are often the same."""
 _BAR = 1e5  # Pa
 _FLAT = 1e-6  # m
 
 
-def plot_path_run(parameters: Parameters, record: Record, *, hybrid: bool) -> list[TimePlot]:
-    """Return the tip's error, its place and the desired one, joints, currents and pressures."""
+def figures_of_path(parameters: Parameters, record: Record, *, hybrid: bool) -> list[TimeFigure]:
+    """Return the tip's error with its place and the desired one, and joints, currents and pressures."""
+    segments = int(np.max(record["planner.segment"]))
+    names = {0: "before", **{n: f"segment {n}" for n in range(1, segments + 1)}}
+    phases = phases_of(record, "planner.segment", names)
     off_plane = bool(np.any(np.abs(record["planner.p_WG_goal"][:, 1]) > _FLAT))
     return [
-        _error(parameters, record, hybrid=hybrid),
-        *(_position(record, axis) for axis in range(3) if axis != 1 or off_plane),
-        _joints(record),
-        _pressures(record),
-        TimePlot(
-            title="Servos' currents",
-            quantity="current",
-            unit="A",
-            curves=[Curve(label=f"J{k + 1}", values=record["arm.i_meas"][:, k]) for k in range(3)],
+        TimeFigure(
+            name="error",
+            caption="Distance to the desired point over time, on the path, with the tolerance for its mean, and the "
+            "tip's place.",
+            plots=[
+                _error(parameters, record, phases, hybrid=hybrid),
+                *(_position(record, axis, phases) for axis in range(3) if axis != 1 or off_plane),
+            ],
+        ),
+        TimeFigure(
+            name="signals",
+            caption="Joints (desired: those of rigid links, the planner's), currents, pressures, over time.",
+            plots=[_joints(record, phases), _currents(record, phases), _pressures(record, phases)],
         ),
     ]
 
 
-def errors(record: Record, *, hybrid: bool) -> dict[str, Floats]:
-    """Return distances over time by what they are, m: of the tip from the desired point, of the model from the tip."""
-    goal = record["planner.p_WG_goal"]
-    found = {
-        "tip by the tracker": _apart(record["arm.p_WG_meas"], goal),
-        BY_SERVOS: _apart(record["kinematics.p_WG_model"], goal),
-    }
+def _error(parameters: Parameters, record: Record, phases: Sequence[Phase], *, hybrid: bool) -> TimePlot:
+    goal, tip = record["planner.p_WG_goal"], record["arm.p_WG_meas"]
+    found = [(SERVOS, "servos", record["kinematics.p_WG_model"], goal), (TIP, "tip", tip, goal)]
     if hybrid:
-        found["hybrid forward model, to the true tip"] = _apart(record["kinematics.p_WG_est"], record["arm.p_WG"])
-    return found
-
-
-def _apart(p: Floats, q: Floats) -> Floats:
-    return np.linalg.norm(p - q, axis=1)
-
-
-def _error(parameters: Parameters, record: Record, *, hybrid: bool) -> TimePlot:
+        estimate = record["kinematics.p_WG_est"]
+        found.append(("hybrid forward model, to the true tip", "estimate", estimate, record["arm.p_WG"]))
     moving = record["planner.moving"]
-    curves = [
-        Curve(label=label, values=np.where(moving, 1000 * values, np.nan))
-        for label, values in errors(record, hybrid=hybrid).items()
-    ]
     return TimePlot(
         title="Error of the tip, on the path",
         quantity="error",
         unit="mm",
-        curves=curves,
+        curves=[
+            Curve(label=label, values=np.where(moving, 1000 * np.linalg.norm(p - q, axis=1), np.nan), group=group)
+            for label, group, p, q in found
+        ],
         levels=(Level(label="tolerance for the mean", value=1000 * parameters.tolerance),),
+        phases=phases,
+        limits=(0.0, None),
+        palette=_PALETTE,
     )
 
 
-def _position(record: Record, axis: int) -> TimePlot:
-    followed = (
-        ("desired", "planner.p_WG_goal", True),
-        ("tip by the tracker", "arm.p_WG_meas", False),
-        (BY_SERVOS, "kinematics.p_WG_model", False),
+def _position(record: Record, axis: int, phases: Sequence[Phase]) -> TimePlot:
+    servos, tip, desired = (
+        1000 * record[signal][:, axis] for signal in ("kinematics.p_WG_model", "arm.p_WG_meas", "planner.p_WG_goal")
     )
-    curves = [
-        Curve(label=label, values=1000 * record[signal][:, axis], held=desired, faint=desired)
-        for label, signal, desired in followed
-    ]
     name = "xyz"[axis]
-    return TimePlot(title=f"Tip along {name} of W", quantity=name, unit="mm", curves=curves)
+    return TimePlot(
+        title=f"Tip along {name} of W",
+        quantity=f"{name} in W",
+        unit="mm",
+        curves=(
+            Curve(label=SERVOS, values=servos, group="servos"),
+            Curve(label=TIP, values=tip, group="tip"),
+            Curve(label="desired", values=desired, held=True, stroke="dashed", group="desired"),
+        ),
+        phases=phases,
+        palette=_PALETTE,
+    )
 
 
-def _joints(record: Record) -> TimePlot:
-    cmd, meas = (np.degrees(record[signal]) for signal in ("kinematics.q_cmd", "arm.q_meas"))
-    curves = [c for k in range(3) for c in _both(f"J{k + 1}", cmd[:, k], meas[:, k])]
-    return TimePlot(title="Joints", quantity="angle", unit="°", curves=curves)
+def _joints(record: Record, phases: Sequence[Phase]) -> TimePlot:
+    measured, commanded, desired = (
+        np.degrees(record[signal]) for signal in ("arm.q_meas", "kinematics.q_cmd", "planner.q_ref")
+    )
+    curves: list[Curve] = []
+    for k, name in enumerate(("J1", "J2", "J3")):
+        curves.append(Curve(label=f"{name}, measured", values=measured[:, k], group=name))
+        curves.append(Curve(label=f"{name}, commanded", values=commanded[:, k], held=True, stroke="dashed", group=name))
+        curves.append(Curve(label=f"{name}, desired", values=desired[:, k], held=True, stroke="dotted", group=name))
+    return TimePlot(title="Joints", quantity="angle", unit="°", curves=curves, phases=phases)
 
 
-def _pressures(record: Record) -> TimePlot:
-    cmd, meas = (record[signal] / _BAR for signal in ("planner.p_cmd", "arm.p_meas"))
-    curves = [c for k in range(2) for c in _both(f"link {k + 2}", cmd[:, k], meas[:, k])]
-    return TimePlot(title="Pressures inside the links", quantity="pressure", unit="bar", curves=curves)
+def _currents(record: Record, phases: Sequence[Phase]) -> TimePlot:
+    current = record["arm.i_meas"]
+    curves = [Curve(label=f"J{k + 1}", values=current[:, k]) for k in range(3)]
+    return TimePlot(title="Servos' currents", quantity="current", unit="A", curves=curves, phases=phases)
 
 
-def _both(name: str, commanded: Floats, measured: Floats) -> list[Curve]:
-    return [
-        Curve(label=f"{name}, measured", values=measured, group=name),
-        Curve(label=f"{name}, commanded", values=commanded, held=True, faint=True, group=name),
-    ]
+def _pressures(record: Record, phases: Sequence[Phase]) -> TimePlot:
+    commanded, measured = (record[signal] / _BAR for signal in ("planner.p_cmd", "arm.p_meas"))
+    curves: list[Curve] = []
+    for k, stroke in enumerate(_LINKS):
+        name = f"link {k + 2}"
+        curves.append(Curve(label=f"{name}, measured", values=measured[:, k], stroke=stroke, group=name))
+        curves.append(Curve(label=f"{name}, commanded", values=commanded[:, k], held=True, stroke="dotted", group=name))
+    title = "Pressures inside the links"
+    return TimePlot(title=title, quantity="pressure", unit="bar", curves=curves, phases=phases, limits=(0.0, None))
 
 
-_SERVO, _TIP, _ESTIMATE, _DESIRED = COLOURS[0], COLOURS[1], COLOURS[3], COLOURS[5]
 _ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
 """The arm's lines at its three moments: where they lie over each other, all are seen."""
-
-_LINES = (("desired", ":"), ("commanded", "--"), ("measured", "-"))
-"""What the lines of joints and pressures are."""
 
 _DISTANCE = "horizontal distance from the base (mm)"
 
@@ -118,33 +140,32 @@ _APART = 0.01
 
 
 def draw_path_run(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
-    """Draw all figures of a run into a folder; return them in the order of a report."""
-    made = [_error_over_time(watch, record, folder), _signals(record, folder)]
+    """Draw a run's path and what it was like into a folder; nothing of a run that did not come to a point of it."""
     if not watch.points:
-        return made
-    return [_path(watch, folder), _shapes(parameters, watch, record, folder), _errors(watch, folder), *made]
+        return []
+    return [_path(watch, folder), _shapes(parameters, watch, record, folder), _errors(watch, folder)]
 
 
 def _path(watch: PathWatch, folder: Path) -> Figure:
     points = watch.points
     lines: list[tuple[Sequence[Floats], dict[str, Any]]] = [
-        (list(watch.path), {"color": _DESIRED, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
+        (list(watch.path), {"color": DESIRED_COLOUR, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
         (
             [p.servo for p in points],
-            {"color": _SERVO, "ls": "--", "lw": 1.3, "label": BY_SERVOS},
+            {"color": SERVO_COLOUR, "ls": "--", "lw": 1.3, "label": SERVOS},
         ),
-        ([p.tracked for p in points], {"color": _TIP, "lw": 1.3, "label": "tip by the tracker"}),
+        ([p.tracked for p in points], {"color": TIP_COLOUR, "lw": 1.3, "label": TIP}),
     ]
     if watch.hybrid:
         label = "tip by the hybrid forward model"
-        lines.append(([p.estimated for p in points], {"color": _ESTIMATE, "ls": ":", "lw": 1.8, "label": label}))
+        lines.append(([p.estimated for p in points], {"color": ESTIMATE_COLOUR, "ls": ":", "lw": 1.8, "label": label}))
     places = [_in_plane(np.array(positions), watch) for positions, _ in lines]
     xlim, zlim = _limits(np.hstack([np.array(place) for place in places]))
     size = (6.4, min(1.5 + 5.6 * (zlim[1] - zlim[0]) / (xlim[1] - xlim[0]), 7.6))
     with figure(folder / "path", 1, size=size) as (axes,):
         for place, (_, style) in zip(places, lines, strict=True):
             axes.plot(*place, **style)
-        axes.plot(*_in_plane(watch.path[:1], watch), "o", ms=6, color=_DESIRED, label="start")
+        axes.plot(*_in_plane(watch.path[:1], watch), "o", ms=6, color=DESIRED_COLOUR, label="start")
         axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal", xlim=xlim, ylim=zlim)
         axes.figure.legend(ncols=2, loc="outside lower center")
     return Figure("path", "The path: desired, by the servos' encoders, and of the tip. Equal scales.")
@@ -153,7 +174,7 @@ def _path(watch: PathWatch, folder: Path) -> Figure:
 def _shapes(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> Figure:
     shapes = record["arm.shape"]
     with figure(folder / "shape", 1, size=(8.0, 5.2)) as (axes,):
-        axes.plot(*_in_plane(watch.path, watch), color=_DESIRED, lw=3.0, alpha=0.35, label="desired path")
+        axes.plot(*_in_plane(watch.path, watch), color=DESIRED_COLOUR, lw=3.0, alpha=0.35, label="desired path")
         for k, (role, t) in enumerate(_moments(watch).items()):
             arm_x, arm_z = _along_tip(shapes[np.searchsorted(record.time, t - 1e-9)], watch)
             axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
@@ -176,7 +197,7 @@ def _errors(watch: PathWatch, folder: Path) -> Figure:
     }
     if watch.hybrid:
         groups["hybrid model,\nto true tip"] = [distance(p.estimated, p.true) for p in watch.points]
-    colours = (_SERVO, _TIP, COLOURS[4], _ESTIMATE)
+    colours = (SERVO_COLOUR, TIP_COLOUR, COLOURS[4], ESTIMATE_COLOUR)
     with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
         for k, (values, colour) in enumerate(zip(groups.values(), colours, strict=False)):
             _draw_box(boxes, k, np.array(values) * 1000, colour)
@@ -184,7 +205,7 @@ def _errors(watch: PathWatch, folder: Path) -> Figure:
         boxes.set(ylabel="error (mm)", ylim=(0.0, None))
         boxes.grid(visible=False, axis="x")
         where, label = _spread(watch)
-        reach.plot(where, [p.error * 1000 for p in watch.points], ".", color=_TIP)
+        reach.plot(where, [p.error * 1000 for p in watch.points], ".", color=TIP_COLOUR)
         reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
     caption = (
         "Left: 25th to 75th percentile (box), range, median (line) and mean (dot), of distances of the tip by the "
@@ -192,49 +213,6 @@ def _errors(watch: PathWatch, folder: Path) -> Figure:
         "true tip. Right: error of the tip over the desired point's place."
     )
     return Figure("errors", caption)
-
-
-def _error_over_time(watch: PathWatch, record: Record, folder: Path) -> Figure:
-    t = record.time
-    moving = record["planner.moving"]
-    segments = {0: "before", **{n: f"segment {n}" for n in range(1, int(np.max(record["planner.segment"])) + 1)}}
-    with figure(folder / "error", 1, size=(8.0, 3.8)) as (axes,):
-        shade_phases(axes, t, record["planner.segment"], segments)
-        of_curves = errors(record, hybrid=watch.hybrid)
-        for (label, error), colour in zip(of_curves.items(), (_TIP, _SERVO, _ESTIMATE), strict=False):
-            axes.plot(t[moving], 1000 * error[moving], color=colour, lw=1.2, label=label)
-        axes.axhline(
-            watch.parameters.tolerance * 1000, color="#4d5866", lw=0.8, ls="--", label="tolerance for the mean"
-        )
-        axes.set(xlabel="time (s)", ylabel="distance to desired point (mm)", ylim=(0.0, None), xlim=(t[0], t[-1]))
-        axes.figure.legend(ncols=2, loc="outside lower center")
-    return Figure("error", "Distance to the desired point over time, on the path. Dashed: the tolerance for its mean.")
-
-
-def _signals(record: Record, folder: Path) -> Figure:
-    t = record.time
-    with figure(folder / "signals", 3, size=(8.0, 7.0)) as (joints, currents, pressures):
-        for k in range(3):
-            colour, name = COLOURS[k], f"J{k + 1}"
-            for signal, style in (("planner.q_ref", ":"), ("kinematics.q_cmd", "--"), ("arm.q_meas", "-")):
-                joints.plot(t, np.degrees(record[signal][:, k]), color=colour, ls=style, lw=1.2)
-            joints.plot([], [], color=colour, label=name)
-            currents.plot(t, record["arm.i_meas"][:, k], color=colour, lw=0.9, label=name)
-        for k in range(2):
-            colour, lw = COLOURS[k + 1], (2.6, 1.0)[k]  # equal pressures lie over each other
-            pressures.plot(t, record["planner.p_cmd"][:, k] / 1e5, color=colour, ls="--", lw=lw)
-            pressures.plot(t, record["arm.p_meas"][:, k] / 1e5, color=colour, lw=lw, label=f"link {k + 2}")
-        for axes, styles in ((joints, _LINES), (pressures, _LINES[1:])):
-            for name, style in styles:
-                axes.plot([], [], color=_DESIRED, ls=style, lw=1.2, label=name)
-        joints.set(ylabel="joint angle (°)")
-        currents.set(ylabel="current (A)")
-        pressures.set(ylabel="pressure (bar)", xlabel="time (s)", ylim=(0.0, None))
-        for axes in (joints, currents, pressures):
-            axes.set_xlim(t[0], t[-1])
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    caption = "Joints (desired: those of rigid links, the planner's), currents, pressures, over time."
-    return Figure("signals", caption)
 
 
 def _moments(watch: PathWatch) -> dict[str, float]:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.time_plot import COLOURS
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.reporting.html import COLOURS
 from handover.scenarios.reporting.time_plots import time_figure
 
 PAGE = files("handover.scenarios.reporting") / "page"
@@ -21,18 +21,19 @@ def page_colours() -> list[dict[str, str]]:
 
 
 def test_the_page_has_as_many_colours_as_are_given_to_curves():
-    names = [f"c{k}" for k in range(COLOURS)]
+    names = [f"c{k}" for k in range(len(COLOURS))]
     assert [list(colours) for colours in page_colours()] == [names, names]
+    assert tuple(page_colours()[0].values()) == COLOURS
     script = (PAGE / "page.js").read_text(encoding="utf-8")
     assert re.findall(r'"(c\d+)"', script) == names
     assert re.findall(r"c\.(c\d+)", script) == names
-    assert f"colour++ % {COLOURS}" in (PAGE / "explorer.js").read_text(encoding="utf-8")
+    assert f"colour++ % {len(COLOURS)}" in (PAGE / "explorer.js").read_text(encoding="utf-8")
 
 
 def test_a_finger_is_as_coloured_in_space_as_its_curve(grasp: Path):
     record, parameters = Record(grasp / "signals.parquet"), Parameters()
     distances = IrGrasp().plots(parameters, record)[0]
-    traces: tuple[Any, ...] = time_figure(distances, record).data  # pyright: ignore
+    traces: tuple[Any, ...] = time_figure(distances, record.time).data  # pyright: ignore
     names = {t.name.split(",")[0]: t.line.color for t in traces}
     lines = {line.label: line.colour for line in IrGrasp().replay(parameters, record).lines}
     day = page_colours()[0]

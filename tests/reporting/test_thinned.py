@@ -38,6 +38,12 @@ def test_every_change_of_a_held_value_is_kept():
     assert len(rows) <= 32
 
 
+def test_a_held_value_is_drawn_until_the_gap_after_it():
+    values = np.full(1000, np.nan)
+    values[200:700] = 0.06
+    assert rows_of_steps(values, 100).tolist() == [0, 200, 699, 700, 999]
+
+
 def test_few_rows_are_all_kept():
     assert rows_of_curve(T[:5], 900).tolist() == [0, 1, 2, 3, 4]
     assert rows_of_steps(T[:0], 900).tolist() == []

@@ -11,6 +11,7 @@ from flyer_runs import metric, run
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import BadParameter
 from handover.scenarios.free_flyer.handovers import (
     Collaborative,
@@ -85,8 +86,18 @@ def test_a_failed_reception_is_noticed_and_repeated(tmp_path: Path):
 def test_the_robot_holds_an_object_for_a_person(tmp_path: Path):
     ended = run(Collaborative, tmp_path / "r")
     assert ended.outcome.success, ended.outcome.reason
-    assert holders(Record(tmp_path / "r" / "signals.parquet")) == [FREE, GRIPPER, BOTH, HAND, BOTH, GRIPPER]
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert holders(record) == [FREE, GRIPPER, BOTH, HAND, BOTH, GRIPPER]
     assert {"transfer_time", "return_time", "transfer_speed", "return_speed"} <= set(ended.summary["metrics"])
+    speed = next(p for p in Collaborative().plots(HandoverParameters(), record) if p.title == "Speed of the gripper")
+    threshold = speed.curves[-1].values
+    names = record.items("decision.phase")
+    waits = [names[k] in ("SIGNAL", "CHECK_VELOCITY") for k in record["decision.phase"].tolist()]
+    assert np.isfinite(threshold[waits]).all()
+    assert np.isfinite(threshold).sum() == pytest.approx(sum(waits), abs=2)  # drawn as far as the next phase begins
+    published, rigid = paper_values("free_flyer", "published"), HandoverParameters().behaviour
+    pull, push = (published[f"velocity_{who}"][rigid] for who in ("hand", "gripper"))
+    assert [k for k, _ in itertools.groupby(threshold[np.isfinite(threshold)].tolist())] == [pull, push]
 
 
 def test_a_pull_that_is_too_weak_is_not_felt_and_the_verdict_says_so(tmp_path: Path):

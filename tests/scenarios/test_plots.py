@@ -1,5 +1,6 @@
 """What scenarios give to be drawn over time, from real runs: what it is, in its unit, however short the record is."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -7,12 +8,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from flyer_runs import metric, run
+from matplotlib.axes import Axes
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.experiment.time_plot import Curve, TimePlot
+from handover.scenarios.experiment.plotting import draw_time_figures, draw_time_plot
+from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
+from handover.scenarios.reporting.time_plots import time_figure
 from handover.scenarios.results.task import Ended
 
 FAST = {
@@ -50,13 +55,14 @@ def check(plots: list[TimePlot], record: Record) -> None:
         labels = [c.label for c in plot.curves]
         assert len(set(labels)) == len(labels)
         assert all(c.values.shape == record.time.shape for c in plot.curves), plot.title
-        assert not plot.phases or record.items(plot.phases)
+        assert all(p.begin <= p.end for p in plot.phases), plot.title
+        assert all(a.end == b.begin and a.name != b.name for a, b in pairwise(plot.phases)), plot.title
 
 
 @pytest.mark.parametrize("name", FAST)
 def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: dict[str, Run]):
     done = runs[name]
-    assert 3 <= len(done.plots) <= 7
+    assert 3 <= len(done.plots) <= 11
     check(list(done.plots.values()), done.record)
     assert all(any(np.isfinite(c.values).any() for c in p.curves) for p in done.plots.values())
 
@@ -71,7 +77,7 @@ def test_a_record_of_a_row_or_two_is_no_fault(name: str, rows: int, runs: dict[s
 
 
 def test_every_scenario_has_plots_of_its_own():
-    assert all(s.plots is not Experiment.plots for s in SCENARIOS.values())
+    assert all(s.time_figures is not Experiment.time_figures for s in SCENARIOS.values())
 
 
 def test_the_helix_true_distance_ends_where_the_summary_says(runs: dict[str, Run]):
@@ -84,12 +90,10 @@ def test_the_helix_true_distance_ends_where_the_summary_says(runs: dict[str, Run
 
 def test_a_push_disagrees_with_the_model_as_much_as_the_summary_says(runs: dict[str, Run]):
     done = runs["flyer_impedance"]
-    title = "Error of the gripper's position, rest minus actual"
+    titles = [f"Error of the gripper's position, rest minus actual, {axis} of W" for axis in "xyz"]
     apart = [
-        np.nanmax(
-            np.abs(done.curve(title, f"{axis}, actual").values - done.curve(title, f"{axis}, by the model").values)
-        )
-        for axis in "xyz"
+        np.nanmax(np.abs(done.curve(title, "actual").values - done.curve(title, "calculated").values))
+        for title in titles
     ]
     assert max(apart) == pytest.approx(1000 * metric(done.ended, "disagreement_position"))
 
@@ -112,10 +116,40 @@ def test_fingers_that_see_nothing_are_not_drawn(runs: dict[str, Run]):
     assert min(done.curve("Cost of thumb and ring, [Luberto] eq. (4)", "cost f").values) > 0.0
 
 
-def test_commands_far_beyond_the_thrusters_are_left_out(runs: dict[str, Run]):
+def test_commands_far_beyond_the_thrusters_run_out_of_the_axes(runs: dict[str, Run]):
     done = runs["flyer_robot_to_human"]
-    commanded = done.curve("Force of the thrusters in B", "x, commanded").values
-    asked = done.record["impedance.f_cmd"][:, 0] + done.record["pose.f_cmd"][:, 0]
-    drawn = np.isfinite(commanded)
-    assert commanded[drawn] == pytest.approx(asked[drawn])
-    assert np.nanmax(np.abs(commanded)) <= 2.0 * np.abs(done.record["thrusters.f_B"]).max()
+    force = done.plots["Force of the thrusters in B"]
+    commanded = done.curve(force.title, "x, commanded").values
+    asked = done.record["impedance.f_cmd"] + done.record["pose.f_cmd"]
+    assert commanded == pytest.approx(asked[:, 0])
+    low, high = force.limits
+    given = float(np.abs(done.record["thrusters.f_B"]).max())
+    if np.abs(asked).max() > 2.0 * given:
+        assert (low, high) == (-2.0 * given, 2.0 * given)
+    else:
+        assert (low, high) == (None, None)
+
+
+@pytest.mark.parametrize("name", FAST)
+def test_page_and_figure_draw_the_same_curves_in_the_same_colours(
+    name: str, runs: dict[str, Run], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    done = runs[name]
+    drawn: dict[str, list[tuple[str, str]]] = {}
+
+    def note(axes: Axes, plot: TimePlot, time: Floats) -> None:
+        draw_time_plot(axes, plot, time)
+        lines = [line for line in axes.lines if str(line.get_label())]
+        drawn[plot.title] = [(str(line.get_label()), str(line.get_color())) for line in lines]
+
+    monkeypatch.setattr("handover.scenarios.experiment.plotting.draw_time_plot", note)
+    figures = done.experiment.time_figures(done.parameters, done.record)
+    made = draw_time_figures(figures, done.record.time, tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {f"{f.name}.{kind}" for f in made for kind in ("png", "svg")}
+    assert set(drawn) == set(done.plots)
+    for title, plot in done.plots.items():
+        traces: tuple[Any, ...] = time_figure(plot, done.record.time).data  # pyright: ignore
+        on_page = [(t.name, t.line.color) for t in traces]
+        assert [label for label, _ in drawn[title]] == [label for label, _ in on_page]
+        curves = drawn[title][: len(plot.curves)]
+        assert [f"var(--c{COLOURS.index(colour)})" for _, colour in curves] == [c for _, c in on_page[: len(curves)]]

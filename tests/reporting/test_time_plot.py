@@ -1,0 +1,112 @@
+"""What is drawn over time is described once: phases by name, colours by group, and names over figures for papers."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from matplotlib.text import Annotation, Text
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.plotting import figure, name_phases
+from handover.scenarios.experiment.time_plot import COLOURS, Curve, Level, Phase, TimePlot, phases_of
+from handover.scenarios.reporting.time_plots import time_figure
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Record:
+    """Return six rows, a second apart, of an enumeration's signal."""
+    phase = pa.field("servo.phase", pa.int64(), metadata={"items": "0 WAIT, 1 LOOK_FAR, 2 LOOK_NEAR, 3 DONE"})
+    schema = pa.schema([pa.field("time", pa.float64()), phase])
+    table = pa.table({"time": np.arange(6.0), "servo.phase": np.array([0, 1, 2, 2, 1, 3])}, schema=schema)
+    pq.write_table(table, tmp_path / "signals.parquet")
+    return Record(tmp_path / "signals.parquet")
+
+
+def spans(phases: tuple[Phase, ...]) -> list[tuple[float, float, str]]:
+    return [(p.begin, p.end, p.name) for p in phases]
+
+
+def layout_on_page(plot: TimePlot, time: Floats) -> Any:
+    return time_figure(plot, time).layout  # pyright: ignore
+
+
+def test_phases_have_the_names_of_the_enumeration(record: Record):
+    assert spans(phases_of(record, "servo.phase")) == [
+        (0.0, 1.0, "wait"),
+        (1.0, 2.0, "look far"),
+        (2.0, 4.0, "look near"),
+        (4.0, 5.0, "look far"),
+        (5.0, 5.0, "done"),
+    ]
+
+
+def test_neighbours_of_one_name_are_one_phase_and_one_stripe(record: Record):
+    phases = phases_of(record, "servo.phase", {0: "wait", 1: "look", 2: "look", 3: ""})
+    assert spans(phases) == [(0.0, 1.0, "wait"), (1.0, 5.0, "look"), (5.0, 5.0, "")]
+    plot = TimePlot(title="", quantity="x", unit="", curves=[Curve(label="x", values=record.time)], phases=phases)
+    assert [p["name"] for p in layout_on_page(plot, record.time).meta["phases"]] == ["wait", "look", ""]
+
+
+def test_groups_have_one_colour_and_a_palette_keeps_it_where_others_are_missing():
+    values = np.zeros(2)
+    curves = [
+        Curve(label="tip, true", values=values, group="tip"),
+        Curve(label="goal", values=values),
+        Curve(label="tip, seen", values=values, group="tip"),
+    ]
+    plot = TimePlot(title="", quantity="x", unit="mm", curves=curves)
+    assert plot.colours == (0, 1, 0)
+    kept = TimePlot(title="", quantity="x", unit="mm", curves=curves[1:], palette=("tip", "arm"))
+    assert kept.colours == (2, 0)
+    many = [Curve(label=str(k), values=values) for k in range(len(COLOURS) + 1)]
+    assert TimePlot(title="", quantity="x", unit="", curves=many).colours[-1] == 0
+
+
+@pytest.mark.parametrize(("unit", "told"), [("mm", "full: 2.5 mm"), ("°", "full: 2.5°"), ("", "full: 2.5")])
+def test_levels_are_told_with_their_unit(unit: str, told: str):
+    plot = TimePlot(title="", quantity="x", unit=unit, curves=(), levels=(Level(label="full", value=2.5),))
+    assert plot.level_labels == (told,)
+
+
+def test_an_axis_with_one_limit_shows_all_that_is_drawn():
+    curve = Curve(label="x", values=np.array([20.0, np.nan, 100.0]))
+    plot = TimePlot(title="", quantity="x", unit="", curves=[curve], limits=(0.0, None))
+    assert plot.shown_range == (0.0, pytest.approx(106.0))
+    assert layout_on_page(plot, np.arange(3.0)).yaxis.range == plot.shown_range
+    assert TimePlot(title="", quantity="x", unit="", curves=[curve]).shown_range is None
+
+
+def phases_at(edges: list[float], names: list[str]) -> list[Phase]:
+    return [Phase(begin=a, end=b, name=name) for (a, b), name in zip(pairwise(edges), names, strict=True)]
+
+
+def test_short_phases_are_named_upright_beside_each_other(tmp_path: Path):
+    phases = phases_at([0.0, 30.0, 30.5, 31.0, 60.0], ["fly", "close gripper", "check angle", "retreat"])
+    with figure(tmp_path / "phases", 1) as (axes,):
+        axes.set_xlim(0.0, 60.0)
+        name_phases(axes, phases, 60.0 / 500.0)
+        texts = {text.get_text(): text for text in axes.texts}
+        assert set(texts) == {"fly", "close gripper", "check angle", "retreat"}
+        upright = [texts["close gripper"], texts["check angle"]]
+        assert [text.get_rotation() for text in texts.values() if text not in upright] == [0.0, 0.0]
+        axes.figure.canvas.draw()
+        first, second = (Text.get_window_extent(text) for text in upright)  # without the lines to their phases
+        assert first.x1 <= second.x0
+        assert min(first.y0, second.y0) > texts["fly"].get_window_extent().y1
+
+
+def test_of_many_short_phases_the_names_that_fit_are_written(tmp_path: Path):
+    edges = np.linspace(0.0, 10.0, 202).tolist()
+    with figure(tmp_path / "phases", 1) as (axes,):
+        axes.set_xlim(0.0, 10.0)
+        name_phases(axes, phases_at(edges, [f"phase {k}" for k in range(201)]), 10.0 / 480.0)
+        names = [text for text in axes.texts if isinstance(text, Annotation)]
+        assert 10 < len(names) < 201
+        places = [float(name.xy[0]) + float(name.get_position()[0]) * 10.0 / 480.0 for name in names]
+        assert 0.0 <= min(places) <= max(places) <= 10.0
+        assert min(b - a for a, b in pairwise(places)) >= 8.4 * 10.0 / 480.0
