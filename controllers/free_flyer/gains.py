@@ -10,6 +10,7 @@ import numpy as np
 from handover.controllers.free_flyer.body import FlyerBody, positive_definite
 from handover.controllers.free_flyer.ports import Behaviour
 from handover.controllers.free_flyer.sampled_loop import LinearController, without_memory
+from handover.cosim.blocks.plain_rotation import Vector, weighted_sum
 from handover.cosim.blocks.ports import Floats
 
 
@@ -70,6 +71,10 @@ class PidGains:
         if not 0.0 <= self.k_I < self.k_P * self.k_D:
             return [f"{name}: k_I = {self.k_I:g} must be from 0 to less than k_P k_D = {self.k_P * self.k_D:g} 1/s3"]
         return []
+
+    def acceleration(self, e: Vector, integral: Vector, rate: Vector) -> Vector:
+        """Return k_P e + k_I integral + k_D rate, in m/s2 or rad/s2, for an error's integral and rate."""
+        return weighted_sum(self.k_P, e, self.k_I, integral, self.k_D, rate)
 
     def scaled(self, factor: float) -> "PidGains":
         """Return all gains times a factor."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.free_flyer.ports import ARM, Behaviour
-from handover.controllers.free_flyer.rotations import rows_of, unit_quaternion
+from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.cosim.blocks.block import Refusal
-from handover.cosim.blocks.plain_rotation import triple, turned
+from handover.cosim.blocks.plain_rotation import rotate, vector
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, Second
 
@@ -100,8 +100,8 @@ class Params:
 
     def standoff(self) -> Floats:
         """Return p_WG where the straight way to the object begins."""
-        back = turned(rows_of(unit_quaternion(self.q_WG_object, NAME, "q_WG_object")), (self.approach, 0.0, 0.0))
-        return self.object_goal() + np.array(back)
+        R_WG = rotation_matrix(unit_quaternion(self.q_WG_object, NAME, "q_WG_object"))
+        return self.object_goal() + np.array(rotate(R_WG, (self.approach, 0.0, 0.0)))
 
     @property
     def fetches(self) -> bool:
@@ -136,7 +136,7 @@ class Params:
         return places
 
     def _outside(self, name: str, p_WG: Floats, q_WG: Floats) -> list[str]:
-        back = turned(rows_of(unit_quaternion(q_WG, NAME, name)), triple(self.p_BG))
+        back = rotate(rotation_matrix(unit_quaternion(q_WG, NAME, name)), vector(self.p_BG))
         low, high = self.workspace_low, self.workspace_high
         return [
             f"{name} takes the {what} to {np.round(p, 3).tolist()} m, out of the workspace from {low.tolist()} to "

@@ -10,9 +10,18 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.free_flyer.handover_parameters import NAME, HandoverTask, Params, UnusableHandover
-from handover.controllers.free_flyer.rotations import angle_between, rows_of, unit_quaternion
+from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
-from handover.cosim.blocks.plain_rotation import Quaternion, Triple, cross, norm, triple, turned
+from handover.cosim.blocks.plain_rotation import (
+    Quaternion,
+    Vector,
+    add,
+    angle_between,
+    cross,
+    distance,
+    rotate,
+    vector,
+)
 from handover.cosim.blocks.ports import Vector3, Vector4, output, port
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
@@ -108,17 +117,17 @@ class HandoverStateMachine:
         self._params = params
         self._T = float(Fraction(2, 125))
         self._release, self._receive = params.velocities()
-        self._p_BG = triple(params.p_BG)
+        self._p_BG = vector(params.p_BG)
         q_handover = unit_quaternion(params.q_WG_handover, NAME, "q_WG_handover")
-        self._handover: tuple[Triple, Quaternion] = (triple(params.p_WG_handover), q_handover)
-        self._retreat: tuple[Triple, Quaternion] = (triple(params.p_WG_retreat), q_handover)
+        self._handover: tuple[Vector, Quaternion] = (vector(params.p_WG_handover), q_handover)
+        self._retreat: tuple[Vector, Quaternion] = (vector(params.p_WG_retreat), q_handover)
         q_object = unit_quaternion(params.q_WG_object, NAME, "q_WG_object")
-        self._standoff: tuple[Triple, Quaternion] = (triple(params.standoff()), q_object)
-        self._object: tuple[Triple, Quaternion] = (triple(params.object_goal()), q_object)
+        self._standoff: tuple[Vector, Quaternion] = (vector(params.standoff()), q_object)
+        self._object: tuple[Vector, Quaternion] = (vector(params.object_goal()), q_object)
         holds = params.task is HandoverTask.HOLD
         self._monitor = VelocityMonitor(params.filter_time, self._T)
         self._phase = HandoverPhase.ACTIVATE_IMPEDANCE if holds else HandoverPhase.OPEN_GRIPPER
-        self._goal: tuple[Triple, Quaternion] | None = self._handover if holds else None
+        self._goal: tuple[Vector, Quaternion] | None = self._handover if holds else None
         self._impedance = holds
         self._closure = 0.0
         self._receiving = params.task is HandoverTask.HUMAN_TO_ROBOT
@@ -150,12 +159,9 @@ class HandoverStateMachine:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Measure, decide, and return the commands that hold until t + dt; at most one transition."""
         q_WB = unit_quaternion(u.q_WB_meas, NAME, "q_WB_meas")
-        r = r_x, r_y, r_z = turned(rows_of(q_WB), self._p_BG)
-        p_x, p_y, p_z = u.p_WB_meas.tolist()
-        v_x, v_y, v_z = u.v_WB_meas.tolist()
-        t_x, t_y, t_z = cross(triple(u.w_WB_meas), r)
-        self._monitor.measure((v_x + t_x, v_y + t_y, v_z + t_z))
-        here = (p_x + r_x, p_y + r_y, p_z + r_z), q_WB
+        r = rotate(rotation_matrix(q_WB), self._p_BG)
+        self._monitor.measure(add(vector(u.v_WB_meas), cross(vector(u.w_WB_meas), r)))
+        here = add(vector(u.p_WB_meas), r), q_WB
         if self._goal is None:
             self._goal = here
         self._judge_place(here)
@@ -193,15 +199,14 @@ class HandoverStateMachine:
         self._impedance, self._closure, self._receiving = switches
         self._monitor.set_state(monitor)
 
-    def _judge_place(self, here: tuple[Triple, Quaternion]) -> None:
+    def _judge_place(self, here: tuple[Vector, Quaternion]) -> None:
         """Count the steps for which the gripper has been at rest at its goal."""
         p, (p_WG, q_WG), goal = self._params, here, self._goal
         if goal is None or self._monitor.speed >= p.gate_speed:
             self._settled = 0
             return
-        (a, b, c), (x, y, z) = goal[0], p_WG
         to_handover = self._phase is HandoverPhase.MOVE_TO_HANDOVER
-        near = norm((a - x, b - y, c - z)) < (p.gate_error if to_handover else p.tolerance)
+        near = distance(goal[0], p_WG) < (p.gate_error if to_handover else p.tolerance)
         self._settled = self._settled + 1 if near and angle_between(goal[1], q_WG) < p.tolerance_angle else 0
 
     def _arrived(self) -> bool:
@@ -214,7 +219,7 @@ class HandoverStateMachine:
         holds = self._params.task is HandoverTask.HOLD
         return not holds and self._lasted(self._params.patience)
 
-    def _enter(self, phase: HandoverPhase, here: tuple[Triple, Quaternion]) -> None:
+    def _enter(self, phase: HandoverPhase, here: tuple[Vector, Quaternion]) -> None:
         goals = {
             HandoverPhase.MOVE_TO_OBJECT: self._standoff,
             HandoverPhase.MOVE_TO_HANDOVER: self._handover,

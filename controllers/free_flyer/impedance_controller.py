@@ -10,9 +10,22 @@ import numpy as np
 from handover.controllers.free_flyer.body import FlyerBody, UnusableController, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Behaviour, Inputs, Outputs
-from handover.controllers.free_flyer.rotations import rotation_vector, rows_of, seen_from, unit_quaternion
+from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
-from handover.cosim.blocks.plain_rotation import ZERO, cross, norm, rows, triple, turned, turned_back
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    add,
+    cross,
+    inverse_rotate,
+    multiply,
+    norm,
+    relative_quaternion,
+    rotate,
+    rotation_vector,
+    row_major,
+    subtract,
+    vector,
+)
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
 from handover.cosim.blocks.units import (
     Kilogram,
@@ -112,9 +125,9 @@ class ImpedanceController:
         self.loop = SampledLoop(body.linear_plant(params.lag), gains.law(body), period, params.delay)
         self._pole_radius = self.loop.pole_radius
         self._damping_ratio, self._pole_frequency = self.loop.least_damped
-        self._p_BG = triple(params.p_BG)
-        self._k, self._d = rows(gains.stiffness_translation), rows(gains.damping_translation)
-        self._k_R, self._d_R = rows(gains.stiffness_rotation), rows(gains.damping_rotation)
+        self._p_BG = vector(params.p_BG)
+        self._k, self._d = row_major(gains.stiffness_translation), row_major(gains.damping_translation)
+        self._k_R, self._d_R = row_major(gains.stiffness_rotation), row_major(gains.damping_rotation)
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command for the measurements; the law has no memory."""
@@ -134,26 +147,19 @@ class ImpedanceController:
     def _command(self, u: Inputs) -> Outputs:
         q_WD = unit_quaternion(u.q_WG_goal, _NAME, "q_WG_goal")
         q_WB = unit_quaternion(u.q_WB_meas, _NAME, "q_WB_meas")
-        r_x, r_y, r_z = r = turned(rows_of(q_WB), self._p_BG)
-        p_x, p_y, p_z = u.p_WB_meas.tolist()
-        g_x, g_y, g_z = u.p_WG_goal.tolist()
-        e = (g_x - p_x - r_x, g_y - p_y - r_y, g_z - p_z - r_z)
-        q_DB = seen_from(q_WD, q_WB)
+        r = rotate(rotation_matrix(q_WB), self._p_BG)
+        e = subtract(subtract(vector(u.p_WG_goal), vector(u.p_WB_meas)), r)
+        q_DB = relative_quaternion(q_WD, q_WB)
         phi = rotation_vector(q_DB)
         f, tau = ZERO, ZERO
         if u.active:
-            w = triple(u.w_WB_meas)
-            v_x, v_y, v_z = u.v_WB_meas.tolist()
-            t_x, t_y, t_z = cross(w, r)
-            R_WD, R_DB = rows_of(q_WD), rows_of(q_DB)
-            k_x, k_y, k_z = turned(self._k, turned_back(R_WD, e))
-            d_x, d_y, d_z = turned(self._d, turned_back(R_WD, (v_x + t_x, v_y + t_y, v_z + t_z)))
-            f = turned_back(R_DB, (k_x - d_x, k_y - d_y, k_z - d_z))
-            k_x, k_y, k_z = turned(self._k_R, phi)
-            d_x, d_y, d_z = turned(self._d_R, turned_back(R_WD, w))
-            m_x, m_y, m_z = turned_back(R_DB, (-k_x - d_x, -k_y - d_y, -k_z - d_z))
-            l_x, l_y, l_z = cross(self._p_BG, f)
-            tau = (m_x + l_x, m_y + l_y, m_z + l_z)
+            w = vector(u.w_WB_meas)
+            R_WD, R_DB = rotation_matrix(q_WD), rotation_matrix(q_DB)
+            e_D, w_D = inverse_rotate(R_WD, e), inverse_rotate(R_WD, w)
+            v_D = inverse_rotate(R_WD, add(vector(u.v_WB_meas), cross(w, r)))
+            f = inverse_rotate(R_DB, subtract(multiply(self._k, e_D), multiply(self._d, v_D)))
+            resistance = inverse_rotate(R_DB, add(multiply(self._k_R, phi), multiply(self._d_R, w_D)))
+            tau = subtract(cross(self._p_BG, f), resistance)
         return Outputs(
             f_cmd=np.array(f) if u.active else np.zeros(3),
             tau_cmd=np.array(tau) if u.active else np.zeros(3),

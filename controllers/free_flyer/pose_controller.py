@@ -12,25 +12,28 @@ from handover.controllers.free_flyer.body import FlyerBody, UnusableController, 
 from handover.controllers.free_flyer.gains import PidGains, pid_law
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Inputs, Outputs
 from handover.controllers.free_flyer.profile import Bounds, Profile, Reference, profile_between
-from handover.controllers.free_flyer.rotations import (
-    angle_between,
-    rotation_vector,
-    rows_of,
-    seen_from,
-    unit_quaternion,
-)
+from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
+    Matrix,
     Quaternion,
-    Rows,
-    Triple,
+    Vector,
+    add,
+    add_scaled,
+    angle_between,
+    clip,
     cross,
+    inverse_rotate,
+    multiply,
     norm,
-    rows,
-    triple,
-    turned,
-    turned_back,
+    relative_quaternion,
+    rotate,
+    rotation_vector,
+    row_major,
+    scale,
+    subtract,
+    vector,
 )
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
 from handover.cosim.blocks.units import (
@@ -164,8 +167,8 @@ class PoseController:
         self._pole_radius = self.loop.pole_radius
         self._damping_ratio, self._pole_frequency = self.loop.least_damped
         self._position, self._attitude, self._mass = position, attitude, params.mass
-        self._I_B, self._p_BG = rows(params.I_B), triple(params.p_BG)
-        self._f_max, self._tau_max = triple(params.f_max), triple(params.tau_max)
+        self._I_B, self._p_BG = row_major(params.I_B), vector(params.p_BG)
+        self._f_max, self._tau_max = vector(params.f_max), vector(params.tau_max)
         self._bounds = Bounds(
             speed=params.speed, acceleration=params.acceleration, rate=params.rate, turning=params.turning
         )
@@ -182,15 +185,14 @@ class PoseController:
         """Return the command for the measurements of t, which holds until t + dt."""
         q_WB = unit_quaternion(u.q_WB_meas, _NAME, "q_WB_meas")
         q_goal = unit_quaternion(u.q_WG_goal, _NAME, "q_WG_goal")
-        p, goal, R_WB = triple(u.p_WB_meas), triple(u.p_WG_goal), rows_of(q_WB)
-        r_x, r_y, r_z = turned(R_WB, self._p_BG)
-        e = (goal[0] - p[0] - r_x, goal[1] - p[1] - r_y, goal[2] - p[2] - r_z)
+        p, goal, R_WB = vector(u.p_WB_meas), vector(u.p_WG_goal), rotation_matrix(q_WB)
+        e = subtract(subtract(goal, p), rotate(R_WB, self._p_BG))
         f, tau = ZERO, ZERO
         if u.active:
-            v = triple(u.v_WB_meas)
+            v = vector(u.v_WB_meas)
             reference = self._way(p, v, q_WB, goal, q_goal).at(self._elapsed * self._T)
             f = self._force(reference, p, v, R_WB)
-            tau = self._torque(reference, q_WB, triple(u.w_WB_meas), R_WB)
+            tau = self._torque(reference, q_WB, vector(u.w_WB_meas), R_WB)
             self._elapsed += 1
         elif self._profile is not None:
             self._forget()
@@ -217,67 +219,37 @@ class PoseController:
     def _forget(self) -> None:
         self._profile: Profile | None = None
         self._elapsed = 0
-        self._goal: tuple[Triple, Quaternion] | None = None
-        self._sum_e: Triple = ZERO
-        self._sum_phi: Triple = ZERO
+        self._goal: tuple[Vector, Quaternion] | None = None
+        self._sum_e: Vector = ZERO
+        self._sum_phi: Vector = ZERO
 
-    def _way(self, p: Triple, v: Triple, q_WB: Quaternion, goal: Triple, q_goal: Quaternion) -> Profile:
+    def _way(self, p: Vector, v: Vector, q_WB: Quaternion, goal: Vector, q_goal: Quaternion) -> Profile:
         """Return the way to the goal: the one under way, or one from here.
 
         The sums are kept when the goal changes, since what they hold against does not change with it.
         """
         if self._profile is not None and self._goal == (goal, q_goal):
             return self._profile
-        r_x, r_y, r_z = turned(rows_of(q_goal), self._p_BG)
-        base_goal = (goal[0] - r_x, goal[1] - r_y, goal[2] - r_z)
+        base_goal = subtract(goal, rotate(rotation_matrix(q_goal), self._p_BG))
         self._profile = profile_between(p, v, q_WB, base_goal, q_goal, self._bounds)
         self._goal, self._elapsed = (goal, q_goal), 0
         return self._profile
 
-    def _force(self, reference: Reference, p: Triple, v: Triple, R_WB: Rows) -> Triple:
-        g, m, s = self._position, self._mass, self._sum_e
-        (r_x, r_y, r_z), (p_x, p_y, p_z) = reference.p, p
-        e_x, e_y, e_z = r_x - p_x, r_y - p_y, r_z - p_z
-        (r_x, r_y, r_z), (v_x, v_y, v_z) = reference.v, v
-        a_x, a_y, a_z = reference.a
-        f = turned_back(
-            R_WB,
-            (
-                m * (g.k_P * e_x + g.k_I * s[0] + g.k_D * (r_x - v_x) + a_x),
-                m * (g.k_P * e_y + g.k_I * s[1] + g.k_D * (r_y - v_y) + a_y),
-                m * (g.k_P * e_z + g.k_I * s[2] + g.k_D * (r_z - v_z) + a_z),
-            ),
-        )
-        cut = _cut(f, self._f_max)
+    def _force(self, reference: Reference, p: Vector, v: Vector, R_WB: Matrix) -> Vector:
+        e, e_rate = subtract(reference.p, p), subtract(reference.v, v)
+        a = add(self._position.acceleration(e, self._sum_e, e_rate), reference.a)
+        f = inverse_rotate(R_WB, scale(self._mass, a))
+        cut = clip(f, self._f_max)
         if cut == f:
-            T = self._T
-            self._sum_e = (s[0] + T * e_x, s[1] + T * e_y, s[2] + T * e_z)
+            self._sum_e = add_scaled(self._sum_e, self._T, e)
         return cut
 
-    def _torque(self, reference: Reference, q_WB: Quaternion, w_WB: Triple, R_WB: Rows) -> Triple:
-        g, s = self._attitude, self._sum_phi
-        phi = f_x, f_y, f_z = rotation_vector(seen_from(q_WB, reference.q))
-        w = w_x, w_y, w_z = turned_back(R_WB, w_WB)
-        r_x, r_y, r_z = turned_back(R_WB, reference.w)
-        d_x, d_y, d_z = turned_back(R_WB, reference.dw)
-        t_x, t_y, t_z = turned(
-            self._I_B,
-            (
-                g.k_P * f_x + g.k_I * s[0] + g.k_D * (r_x - w_x) + d_x,
-                g.k_P * f_y + g.k_I * s[1] + g.k_D * (r_y - w_y) + d_y,
-                g.k_P * f_z + g.k_I * s[2] + g.k_D * (r_z - w_z) + d_z,
-            ),
-        )
-        c_x, c_y, c_z = cross(w, turned(self._I_B, w))
-        tau = (t_x + c_x, t_y + c_y, t_z + c_z)
-        cut = _cut(tau, self._tau_max)
+    def _torque(self, reference: Reference, q_WB: Quaternion, w_WB: Vector, R_WB: Matrix) -> Vector:
+        phi, w = rotation_vector(relative_quaternion(q_WB, reference.q)), inverse_rotate(R_WB, w_WB)
+        phi_rate = subtract(inverse_rotate(R_WB, reference.w), w)
+        dw = add(self._attitude.acceleration(phi, self._sum_phi, phi_rate), inverse_rotate(R_WB, reference.dw))
+        tau = add(multiply(self._I_B, dw), cross(w, multiply(self._I_B, w)))
+        cut = clip(tau, self._tau_max)
         if cut == tau:
-            T = self._T
-            self._sum_phi = (s[0] + T * phi[0], s[1] + T * phi[1], s[2] + T * phi[2])
+            self._sum_phi = add_scaled(self._sum_phi, self._T, phi)
         return cut
-
-
-def _cut(v: Triple, largest: Triple) -> Triple:
-    x, y, z = v
-    a, b, c = largest
-    return min(max(x, -a), a), min(max(y, -b), b), min(max(z, -c), c)

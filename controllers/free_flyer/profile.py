@@ -4,8 +4,21 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from handover.controllers.free_flyer.rotations import quaternion_about, rotation_vector, rows_of, seen_from
-from handover.cosim.blocks.plain_rotation import Quaternion, Triple, norm, product, turned
+from handover.controllers.free_flyer.rotations import from_rotation_vector, rotation_matrix
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Quaternion,
+    Vector,
+    add,
+    add_scaled,
+    norm,
+    quaternion_multiply,
+    relative_quaternion,
+    rotate,
+    rotation_vector,
+    scale,
+    subtract,
+)
 
 _PEAK_SPEED = 1.875  # of s(x) = 10 x^3 - 15 x^4 + 6 x^5, from 0 to 1 in unit time
 _PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
@@ -25,12 +38,12 @@ class Bounds:
 class Reference(NamedTuple):
     """Where the base is to be: position, velocity, acceleration in W, attitude, rate, its derivative in W."""
 
-    p: Triple
-    v: Triple
-    a: Triple
+    p: Vector
+    v: Vector
+    a: Vector
     q: Quaternion
-    w: Triple
-    dw: Triple
+    w: Vector
+    dw: Vector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,12 +55,12 @@ class Profile:
     v_0 itself keeps it: there the two parts' peaks are added. phi is in q_0's axes, phi_W the same turn in W.
     """
 
-    p_0: Triple
-    d: Triple
-    v_0: Triple
+    p_0: Vector
+    d: Vector
+    v_0: Vector
     q_0: Quaternion
-    phi: Triple
-    phi_W: Triple
+    phi: Vector
+    phi_W: Vector
     T: float
 
     def at(self, t: float) -> Reference:
@@ -56,32 +69,27 @@ class Profile:
         x = min(max(t / T, 0.0), 1.0) if T > 0.0 else 1.0
         y = 1.0 - x
         s = x * x * x * (10.0 + x * (-15.0 + 6.0 * x))
-        p_x, p_y, p_z = self.p_0
-        d_x, d_y, d_z = self.d
         if x == 1.0:
-            still = (0.0, 0.0, 0.0)
-            q = product(self.q_0, quaternion_about(self.phi))
-            return Reference(p=(p_x + d_x, p_y + d_y, p_z + d_z), v=still, a=still, q=q, w=still, dw=still)
+            q = quaternion_multiply(self.q_0, from_rotation_vector(self.phi))
+            return Reference(p=add(self.p_0, self.d), v=ZERO, a=ZERO, q=q, w=ZERO, dw=ZERO)
         ds, dds = 30.0 * x * x * y * y / T, 60.0 * x * y * (1.0 - x - x) / (T * T)
         h = T * x * (1.0 + x * x * (-6.0 + x * (8.0 - 3.0 * x)))
         dh, ddh = 1.0 + x * x * (-18.0 + x * (32.0 - 15.0 * x)), x * (-36.0 + x * (96.0 - 60.0 * x)) / T
-        v_x, v_y, v_z = self.v_0
-        f_x, f_y, f_z = self.phi
-        a_x, a_y, a_z = self.phi_W
+        d, v_0, phi_W = self.d, self.v_0, self.phi_W
         return Reference(
-            p=(p_x + s * d_x + h * v_x, p_y + s * d_y + h * v_y, p_z + s * d_z + h * v_z),
-            v=(ds * d_x + dh * v_x, ds * d_y + dh * v_y, ds * d_z + dh * v_z),
-            a=(dds * d_x + ddh * v_x, dds * d_y + ddh * v_y, dds * d_z + ddh * v_z),
-            q=product(self.q_0, quaternion_about((s * f_x, s * f_y, s * f_z))),
-            w=(ds * a_x, ds * a_y, ds * a_z),
-            dw=(dds * a_x, dds * a_y, dds * a_z),
+            p=add_scaled(add_scaled(self.p_0, s, d), h, v_0),
+            v=add_scaled(scale(ds, d), dh, v_0),
+            a=add_scaled(scale(dds, d), ddh, v_0),
+            q=quaternion_multiply(self.q_0, from_rotation_vector(scale(s, self.phi))),
+            w=scale(ds, phi_W),
+            dw=scale(dds, phi_W),
         )
 
 
-def profile_between(p_0: Triple, v_0: Triple, q_0: Quaternion, p_1: Triple, q_1: Quaternion, bounds: Bounds) -> Profile:
+def profile_between(p_0: Vector, v_0: Vector, q_0: Quaternion, p_1: Vector, q_1: Quaternion, bounds: Bounds) -> Profile:
     """Return the way from one pose, with a velocity, to rest at another."""
-    d = (p_1[0] - p_0[0], p_1[1] - p_0[1], p_1[2] - p_0[2])
-    phi = rotation_vector(seen_from(q_0, q_1))
+    d = subtract(p_1, p_0)
+    phi = rotation_vector(relative_quaternion(q_0, q_1))
     length, angle, speed = norm(d), norm(phi), norm(v_0)
     braking = _PEAK_BRAKING * speed
     return Profile(
@@ -90,7 +98,7 @@ def profile_between(p_0: Triple, v_0: Triple, q_0: Quaternion, p_1: Triple, q_1:
         v_0=v_0,
         q_0=q_0,
         phi=phi,
-        phi_W=turned(rows_of(q_0), phi),
+        phi_W=rotate(rotation_matrix(q_0), phi),
         T=max(
             _PEAK_SPEED * length / max(bounds.speed - speed, bounds.speed / 2.0),
             (braking + math.sqrt(braking**2 + 4.0 * bounds.acceleration * _PEAK_ACCELERATION * length))

@@ -2,7 +2,7 @@
 
 import math
 
-from handover.cosim.blocks.plain_rotation import Triple, norm
+from handover.cosim.blocks.plain_rotation import Vector, lerp, norm
 
 
 class VelocityMonitor:
@@ -17,15 +17,14 @@ class VelocityMonitor:
 
     def __init__(self, time: float, period: float) -> None:
         self._gain = 1.0 - math.exp(-period / time) if time > 0.0 else 1.0
-        self._v: Triple | None = None
+        self._v: Vector | None = None
         self._armed = False
         self.speed = 0.0
 
-    def measure(self, v: Triple) -> None:
+    def measure(self, v: Vector) -> None:
         """Take in a measured velocity; the first one is where the filter begins."""
         if self._v is not None:
-            g, (x, y, z), (a, b, c) = self._gain, self._v, v
-            v = (x + g * (a - x), y + g * (b - y), z + g * (c - z))
+            v = lerp(self._v, v, self._gain)
         self._v = v
         self.speed = norm(v)
 
@@ -40,10 +39,10 @@ class VelocityMonitor:
             return False
         return self._armed
 
-    def get_state(self) -> tuple[Triple | None, bool, float]:
+    def get_state(self) -> tuple[Vector | None, bool, float]:
         """Return the filter, whether the threshold counts, and the speed."""
         return self._v, self._armed, self.speed
 
-    def set_state(self, state: tuple[Triple | None, bool, float]) -> None:
+    def set_state(self, state: tuple[Vector | None, bool, float]) -> None:
         """Go back to a state that `get_state` gave."""
         self._v, self._armed, self.speed = state

@@ -3,25 +3,32 @@
 from dataclasses import dataclass
 
 from handover.cosim.blocks.plain_rotation import (
+    IDENTITY,
     ZERO,
+    Matrix,
     Quaternion,
-    Rows,
-    Triple,
+    Vector,
+    add,
+    add_scaled,
     cross,
-    inverse,
-    product,
-    turned,
-    turned_back,
+    inverse_rotate,
+    lerp,
+    nlerp,
+    quaternion_multiply,
+    relative_quaternion,
+    rotate,
+    rotation_matrix,
+    scale,
+    subtract,
 )
-from handover.plants.free_flyer.rotations import IDENTITY, along, between, matrix_of, minus, plus
 
 
 class Frame:
     """Pose and velocity of a thing that holds, all in world coordinates; R is the matrix of q."""
 
-    def __init__(self, p: Triple, q: Quaternion, v: Triple = ZERO, w: Triple = ZERO) -> None:
+    def __init__(self, p: Vector, q: Quaternion, v: Vector = ZERO, w: Vector = ZERO) -> None:
         self.p, self.q, self.v, self.w = p, q, v, w
-        self.R: Rows = matrix_of(q)
+        self.R: Matrix = rotation_matrix(q)
 
 
 @dataclass(frozen=True)
@@ -49,8 +56,8 @@ class Palm:
         c: damping, N s/m.
     """
 
-    r: Triple
-    n: Triple
+    r: Vector
+    n: Vector
     speed: float
     depth: float
     k: float
@@ -65,29 +72,27 @@ class Attachment:
     """
 
     def __init__(
-        self, stiffness: Stiffness, r: Triple = ZERO, place: Triple = ZERO, turn: Quaternion = IDENTITY
+        self, stiffness: Stiffness, r: Vector = ZERO, place: Vector = ZERO, turn: Quaternion = IDENTITY
     ) -> None:
         self.stiffness = stiffness
         self.r, self.place, self.turn = r, place, turn
 
-    def load(self, F: Frame, p: Triple, q: Quaternion, R: Rows) -> tuple[Triple, Triple]:
+    def load(self, F: Frame, p: Vector, q: Quaternion, R: Matrix) -> tuple[Vector, Vector]:
         """Return force and torque on an object at p, q (R its matrix) that does not move, in its own frame."""
         s = self.stiffness
-        arm = turned(F.R, self.place)
-        ex, ey, ez = minus(plus(p, turned(R, self.r)), plus(F.p, arm))
-        vx, vy, vz = plus(F.v, cross(F.w, arm))
-        k, c = s.k, s.c
-        f = turned_back(R, (c * vx - k * ex, c * vy - k * ey, c * vz - k * ez))
-        w, x, y, z = product(inverse(product(F.q, self.turn)), q)
-        k_turn = -2.0 * s.k_turn if w >= 0.0 else 2.0 * s.k_turn
-        tx, ty, tz = turned_back(R, F.w)
-        c_turn = s.c_turn
-        return f, (k_turn * x + c_turn * tx, k_turn * y + c_turn * ty, k_turn * z + c_turn * tz)
+        arm = rotate(F.R, self.place)
+        e = subtract(add(p, rotate(R, self.r)), add(F.p, arm))
+        v_F = add(F.v, cross(F.w, arm))
+        f = inverse_rotate(R, add_scaled(scale(s.c, v_F), -s.k, e))
+        w, x, y, z = relative_quaternion(quaternion_multiply(F.q, self.turn), q)
+        theta = scale(2.0 if w >= 0.0 else -2.0, (x, y, z))
+        tau = add_scaled(scale(-s.k_turn, theta), s.c_turn, inverse_rotate(R, F.w))
+        return f, tau
 
-    def give_way(self, F: Frame, p: Triple, q: Quaternion, force_share: float, torque_share: float) -> None:
+    def give_way(self, F: Frame, p: Vector, q: Quaternion, force_share: float, torque_share: float) -> None:
         """Move place and turn towards where the object is, so that these shares of the displacements are left."""
         if force_share < 1.0:
-            there = turned_back(F.R, minus(plus(p, turned(matrix_of(q), self.r)), F.p))
-            self.place = along(self.place, 1.0 - force_share, minus(there, self.place))
+            there = inverse_rotate(F.R, subtract(add(p, rotate(rotation_matrix(q), self.r)), F.p))
+            self.place = lerp(self.place, there, 1.0 - force_share)
         if torque_share < 1.0:
-            self.turn = between(self.turn, product(inverse(F.q), q), 1.0 - torque_share)
+            self.turn = nlerp(self.turn, relative_quaternion(F.q, q), 1.0 - torque_share)

@@ -4,14 +4,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handover.cosim.blocks.plain_rotation import ZERO, Rows, Triple, cross, norm, product, turned, turned_back
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Matrix,
+    Vector,
+    add,
+    add_cross,
+    add_scaled,
+    cross,
+    dot,
+    from_rotation_vector,
+    inverse_rotate,
+    norm,
+    normalize,
+    quaternion_multiply,
+    rotate,
+    rotation_matrix,
+    scale,
+)
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.attachment import Attachment, Frame, Palm
 from handover.plants.free_flyer.rigid_body import RigidBody
-from handover.plants.free_flyer.rotations import along, matrix_of, turn_by, unit
 
 Six = tuple[float, float, float, float, float, float]
-Wrench = tuple[Triple, Triple]
+Wrench = tuple[Vector, Vector]
 Held = Sequence[tuple[Attachment, Frame]]
 Scales = list[tuple[float, float]]
 
@@ -40,13 +56,13 @@ class FloatingObject:
         q: orientation.
     """
 
-    def __init__(self, mass: float, sides: Triple, body: RigidBody | None = None) -> None:
+    def __init__(self, mass: float, sides: Vector, body: RigidBody | None = None) -> None:
         a, b, c = (x * x for x in sides)
         self._moments = (mass * (b + c) / 12.0, mass * (a + c) / 12.0, mass * (a + b) / 12.0)
         self.body = body or RigidBody(mass, np.diag(self._moments), ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
         self._kept: dict[tuple[object, ...], list[list[float]]] = {}
 
-    def advance(self, h: float, held: Held, palm: Palm | None) -> tuple[list[Wrench], Triple]:
+    def advance(self, h: float, held: Held, palm: Palm | None) -> tuple[list[Wrench], Vector]:
         """Advance by h seconds.
 
         Returns:
@@ -56,17 +72,16 @@ class FloatingObject:
         if not held and palm is None:
             body.advance(h, ZERO, ZERO, ZERO, ZERO)
             return [], ZERO
-        R = matrix_of(body.q)
+        R = rotation_matrix(body.q)
         loads = [a.load(F, body.p, body.q, R) for a, F in held]
-        (vx, vy, vz), (lx, ly, lz), m = turned_back(R, body.v), turned_back(R, body.spin), body.mass
-        momentum = (m * vx, m * vy, m * vz, lx, ly, lz)
+        momentum = scale(body.mass, inverse_rotate(R, body.v)), inverse_rotate(R, body.spin)
         nu, push, wrenches = self._balanced(h, held, loads, [(1.0, 1.0)] * len(held), palm, momentum)
         if _too_much(held, wrenches):
             nu, push, wrenches = self._slide(h, held, loads, palm, momentum, wrenches)
         else:
             self._move(h, R, nu)
-        f_palm = ZERO if palm is None else turned(R, along(ZERO, push, palm.n))
-        return [(turned(R, f), turned(R, tau)) for f, tau in wrenches], f_palm
+        f_palm = ZERO if palm is None else rotate(R, scale(push, palm.n))
+        return [(rotate(R, f), rotate(R, tau)) for f, tau in wrenches], f_palm
 
     def _slide(
         self,
@@ -74,7 +89,7 @@ class FloatingObject:
         held: Held,
         loads: Sequence[Wrench],
         palm: Palm | None,
-        momentum: Six,
+        momentum: Wrench,
         wrenches: list[Wrench],
     ) -> tuple[Six, float, list[Wrench]]:
         """Move while attachments keep their limits, and let those give way; return what `_balanced` does."""
@@ -88,7 +103,7 @@ class FloatingObject:
             _, _, wrenches = self._balanced(h, held, loads, scales, palm, momentum)
         nu, push, wrenches = self._balanced(h, held, loads, scales, palm, momentum)
         body = self.body
-        self._move(h, matrix_of(body.q), nu)
+        self._move(h, rotation_matrix(body.q), nu)
         for (a, F), (s, s_turn) in zip(held, scales, strict=True):
             a.give_way(F, body.p, body.q, s, s_turn)
         return nu, push, wrenches
@@ -100,23 +115,20 @@ class FloatingObject:
         loads: Sequence[Wrench],
         scales: Scales,
         palm: Palm | None,
-        momentum: Six,
+        momentum: Wrench,
     ) -> tuple[Six, float, list[Wrench]]:
         """Return nu, the palm's force, and the attachments' wrenches in the object's frame."""
-        y0, y1, y2, y3, y4, y5 = momentum
+        linear, angular = momentum
         for (a, _), (f, tau), (s, s_turn) in zip(held, loads, scales, strict=True):
-            hs, ht = h * s, h * s_turn
-            fx, fy, fz = hs * f[0], hs * f[1], hs * f[2]
-            rx, ry, rz = a.r
-            y0, y1, y2 = y0 + fx, y1 + fy, y2 + fz
-            y3 += ry * fz - rz * fy + ht * tau[0]
-            y4 += rz * fx - rx * fz + ht * tau[1]
-            y5 += rx * fy - ry * fx + ht * tau[2]
+            impulse = scale(h * s, f)
+            linear = add(linear, impulse)
+            angular = add(angular, add_scaled(cross(a.r, impulse), h * s_turn, tau))
         rows = self._inverse(h, held, scales)
-        nu, push = _applied(rows, (y0, y1, y2, y3, y4, y5)), 0.0
+        nu, push = _applied(rows, (*linear, *angular)), 0.0
         if palm is not None:
             nu, push = _pressed(h, rows, nu, palm)
-        return nu, push, [_wrench(h, a, b, s, nu) for (a, _), b, s in zip(held, loads, scales, strict=True)]
+        v, w = nu[:3], nu[3:]
+        return nu, push, [_wrench(h, a, b, s, v, w) for (a, _), b, s in zip(held, loads, scales, strict=True)]
 
     def _inverse(self, h: float, held: Held, scales: Scales) -> list[list[float]]:
         key = (h, *[(a.r, id(a.stiffness), s) for (a, _), s in zip(held, scales, strict=True)])
@@ -131,14 +143,14 @@ class FloatingObject:
             self._kept[key] = np.linalg.inv(masses).tolist()
         return self._kept[key]
 
-    def _move(self, h: float, R: Rows, nu: Six) -> None:
+    def _move(self, h: float, R: Matrix, nu: Six) -> None:
         body = self.body
-        w = nu[3:]
-        body.v = turned(R, nu[:3])
-        body.p = (body.p[0] + h * body.v[0], body.p[1] + h * body.v[1], body.p[2] + h * body.v[2])
-        i, j, k = self._moments
-        body.spin = turned(R, (i * w[0], j * w[1], k * w[2]))
-        body.q = unit(product(body.q, turn_by((h * w[0], h * w[1], h * w[2]))))
+        v, w = nu[:3], nu[3:]
+        body.v = rotate(R, v)
+        body.p = add_scaled(body.p, h, body.v)
+        (I_x, I_y, I_z), (w_x, w_y, w_z) = self._moments, w
+        body.spin = rotate(R, (I_x * w_x, I_y * w_y, I_z * w_z))
+        body.q = normalize(quaternion_multiply(body.q, from_rotation_vector(scale(h, w))))
 
 
 def _pressed(h: float, rows: list[list[float]], nu: Six, palm: Palm) -> tuple[Six, float]:
@@ -158,24 +170,21 @@ def _dot(a: Six, b: Six) -> float:
     return sum(x * y for x, y in zip(a, b, strict=True))
 
 
-def _wrench(h: float, a: Attachment, load: Wrench, scale: tuple[float, float], nu: Six) -> Wrench:
-    """Return force and torque of an attachment on an object that moves with nu, in the object's frame."""
-    (fx, fy, fz), (tx, ty, tz) = load
-    (s, s_turn), (rx, ry, rz), (vx, vy, vz, wx, wy, wz) = scale, a.r, nu
+def _wrench(h: float, a: Attachment, load: Wrench, shares: tuple[float, float], v: Vector, w: Vector) -> Wrench:
+    """Return force and torque of an attachment on an object that moves with v and w, in the object's frame."""
+    (f, tau), (s, s_turn) = load, shares
     g = a.stiffness.k * h + a.stiffness.c
     g_turn = a.stiffness.k_turn * h + a.stiffness.c_turn
-    return (
-        s * (fx - g * (vx + wy * rz - wz * ry)),
-        s * (fy - g * (vy + wz * rx - wx * rz)),
-        s * (fz - g * (vz + wx * ry - wy * rx)),
-    ), (s_turn * (tx - g_turn * wx), s_turn * (ty - g_turn * wy), s_turn * (tz - g_turn * wz))
+    f = add_scaled(f, -g, add_cross(v, w, a.r))
+    tau = add_scaled(tau, -g_turn, w)
+    return scale(s, f), scale(s_turn, tau)
 
 
 def _too_much(held: Held, wrenches: Sequence[Wrench]) -> bool:
     """Return whether a limit is exceeded."""
-    for (a, _), ((fx, fy, fz), (tx, ty, tz)) in zip(held, wrenches, strict=True):
+    for (a, _), (f, tau) in zip(held, wrenches, strict=True):
         s = a.stiffness
-        if fx * fx + fy * fy + fz * fz > s.f_max * s.f_max or tx * tx + ty * ty + tz * tz > s.tau_max * s.tau_max:
+        if dot(f, f) > s.f_max * s.f_max or dot(tau, tau) > s.tau_max * s.tau_max:
             return True
     return False
 
@@ -216,10 +225,10 @@ def _scale(s: float, f: float, s_0: float, f_0: float, f_max: float) -> float:
 
 def _applied(rows: list[list[float]], y: Sequence[float]) -> Six:
     y0, y1, y2, y3, y4, y5 = y
-    a, b, c, d, e, f = [r[0] * y0 + r[1] * y1 + r[2] * y2 + r[3] * y3 + r[4] * y4 + r[5] * y5 for r in rows]
+    a, b, c, d, e, f = [a * y0 + b * y1 + c * y2 + d * y3 + e * y4 + f * y5 for a, b, c, d, e, f in rows]
     return a, b, c, d, e, f
 
 
-def _crossing(a: Triple) -> Floats:
+def _crossing(a: Vector) -> Floats:
     x, y, z = a
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -10,7 +10,15 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.block import Refusal
-from handover.cosim.blocks.plain_rotation import Triple, triple, turned
+from handover.cosim.blocks.plain_rotation import (
+    add,
+    add_cross,
+    perturb,
+    quaternion,
+    rotate,
+    rotation_matrix,
+    vector,
+)
 from handover.cosim.blocks.ports import Matrix3, Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.units import (
     Kilogram,
@@ -25,7 +33,6 @@ from handover.cosim.blocks.units import (
     Second,
 )
 from handover.plants.free_flyer.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
-from handover.plants.free_flyer.rotations import matrix_of, quaternion
 
 _HALF_A_TURN = math.pi
 
@@ -125,7 +132,7 @@ class FreeFlyer:
         params.check()
         self._substep, self._turn = params.substep, params.turn
         q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
-        places = [triple(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
+        places = [vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
         p_BG, p_WB, v_WB, w_WB = places
         self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
         deviations = (params.position_noise, 0.5 * params.attitude_noise, params.velocity_noise, params.rate_noise)
@@ -140,7 +147,7 @@ class FreeFlyer:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
-        wrench = triple(u.f_B), triple(u.tau_B), triple(u.f_G), triple(u.tau_G)
+        wrench = vector(u.f_B), vector(u.tau_B), vector(u.f_G), vector(u.tau_G)
         h = dt / (count := self._substeps(dt))
         advance = self._body.advance
         for _ in range(count):
@@ -170,8 +177,23 @@ class FreeFlyer:
     def _told(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
         b = self._body
-        w = b.w
-        a = np.array([*b.p, *b.q, *b.v, *w, *self._gripper(w), *self._estimate(w)])
+        R = rotation_matrix(b.q)
+        w, r = b.angular_velocity(R), rotate(R, b.p_BG)
+        p_x, p_y, p_z, h_x, h_y, h_z, v_x, v_y, v_z, w_x, w_y, w_z = self._noise
+        a = np.array(
+            [
+                *b.p,
+                *b.q,
+                *b.v,
+                *w,
+                *add(b.p, r),
+                *add_cross(b.v, w, r),
+                *add(b.p, (p_x, p_y, p_z)),
+                *perturb(b.q, (h_x, h_y, h_z)),
+                *add(b.v, (v_x, v_y, v_z)),
+                *add(w, (w_x, w_y, w_z)),
+            ]
+        )
         return Outputs(
             p_WB=a[0:3],
             q_WB=a[3:7],
@@ -185,33 +207,3 @@ class FreeFlyer:
             v_WB_meas=a[26:29],
             w_WB_meas=a[29:32],
         )
-
-    def _gripper(self, w: Triple) -> tuple[float, float, float, float, float, float]:
-        """Return p_WG and v_WG = v_WB + w_WB x p_BG."""
-        b = self._body
-        x, y, z = turned(matrix_of(b.q), b.p_BG)
-        (px, py, pz), (vx, vy, vz), (wx, wy, wz) = b.p, b.v, w
-        return px + x, py + y, pz + z, vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x
-
-    def _estimate(self, w: Triple) -> list[float]:
-        """Return estimated position, orientation, velocity and angular velocity."""
-        b = self._body
-        px, py, pz, hx, hy, hz, vx, vy, vz, wx, wy, wz = self._noise
-        (bpx, bpy, bpz), (bvx, bvy, bvz), (bwx, bwy, bwz) = b.p, b.v, w
-        a, i, j, k = b.q
-        n = 1.0 / math.sqrt(1.0 + hx * hx + hy * hy + hz * hz)  # q (1, half the turn), brought to norm 1
-        return [
-            bpx + px,
-            bpy + py,
-            bpz + pz,
-            n * (a - i * hx - j * hy - k * hz),
-            n * (i + a * hx + j * hz - k * hy),
-            n * (j + a * hy + k * hx - i * hz),
-            n * (k + a * hz + i * hy - j * hx),
-            bvx + vx,
-            bvy + vy,
-            bvz + vz,
-            bwx + wx,
-            bwy + wy,
-            bwz + wz,
-        ]

@@ -6,22 +6,32 @@ The gripper of a free-flyer: two fingers that close along z of G around an objec
 import pickle
 
 from handover.cosim.blocks.plain_rotation import (
+    IDENTITY,
     ZERO,
+    Matrix,
     Quaternion,
-    Rows,
-    Triple,
+    Vector,
+    add,
+    add_scaled,
+    column,
     cross,
-    inverse,
-    norm,
-    product,
-    triple,
-    turned,
-    turned_back,
+    distance,
+    divide,
+    dot,
+    inverse_rotate,
+    nlerp,
+    quaternion_inverse,
+    quaternion_multiply,
+    relative_quaternion,
+    rotate,
+    rotation_matrix,
+    scale,
+    subtract,
+    vector,
 )
 from handover.plants.free_flyer.attachment import Attachment, Frame, Palm, Stiffness
 from handover.plants.free_flyer.parameters import Params
 from handover.plants.free_flyer.rigid_body import RigidBody
-from handover.plants.free_flyer.rotations import IDENTITY, along, between, matrix_of, minus, plus
 from handover.plants.hand_tremor import HandTremor
 
 _SPARE = 0.1
@@ -37,7 +47,7 @@ class FlyerHand:
     damping times depth and speed, at most arm_force_max.
     """
 
-    def __init__(self, params: Params, p: Triple, q: Quaternion) -> None:
+    def __init__(self, params: Params, p: Vector, q: Quaternion) -> None:
         self._p = params
         self._arm = Stiffness(
             params.arm_stiffness,
@@ -57,49 +67,52 @@ class FlyerHand:
         )
         self._shake, self._rest, self._led = ZERO, p, p
         self.p, self.q = p, q
-        self.p_OH, self.q_OH = triple(params.p_OH), IDENTITY
+        self.p_OH, self.q_OH = vector(params.p_OH), IDENTITY
         self.course = Frame(p, q)
         self.hold: Attachment | None = None
 
     @property
-    def calm(self) -> Triple:
+    def calm(self) -> Vector:
         """Where the hand is, without its tremor."""
-        return minus(self.p, self._shake)
+        return subtract(self.p, self._shake)
 
-    def move(self, dt: float, p: Triple, q: Quaternion) -> Frame:
+    def move(self, dt: float, p: Vector, q: Quaternion) -> Frame:
         """Return the course at the end of a step that leads to a pose, without tremor, where nothing is in the way."""
         self._recover(dt)
         self._tremor.advance(dt)
-        self._shake = triple(self._tremor.displacement)
-        led, self._led = self._led, plus(p, self._shake)
+        self._shake = vector(self._tremor.displacement)
+        led, self._led = self._led, add(p, self._shake)
         return _led(dt, led, self._led, q)
 
-    def press(self, dt: float, course: Frame, G: Frame) -> tuple[Frame, Triple, Triple]:
+    def press(self, dt: float, course: Frame, G: Frame) -> tuple[Frame, Vector, Vector]:
         """Return the course of a fist as the palm lets it, its force on the gripper, and where it acts, seen from G."""
         p = self._p
-        arm = minus(course.p, G.p)
-        x, y, z = turned_back(G.R, arm)
+        arm = subtract(course.p, G.p)
+        x, y, z = inverse_rotate(G.R, arm)
         depth, aside = x + p.fist_radius - p.palm_depth, max(abs(y), abs(z))
         if not 0.0 < depth < 2.0 * p.fist_radius + _SPARE or aside > p.palm_width + p.fist_radius:
             return course, ZERO, ZERO
-        n = (G.R[0], G.R[3], G.R[6])
-        v = minus(course.v, plus(G.v, cross(G.w, arm)))
-        push = p.arm_stiffness * depth + p.arm_damping * (v[0] * n[0] + v[1] * n[1] + v[2] * n[2])
+        n = column(G.R, 0)
+        v = subtract(course.v, add(G.v, cross(G.w, arm)))
+        push = p.arm_stiffness * depth + p.arm_damping * dot(v, n)
         push = min(max(push, 0.0), p.arm_force_max)
-        kept_off = _led(dt, self.course.p, along(course.p, -depth, n), course.q)
-        return kept_off, along(ZERO, push, n), along(arm, p.fist_radius - depth, n)
+        kept_off = _led(dt, self.course.p, add_scaled(course.p, -depth, n), course.q)
+        return kept_off, scale(push, n), add_scaled(arm, p.fist_radius - depth, n)
 
     def take_or_leave(self, wants: bool, body: RigidBody) -> None:
         """Take hold of an object where the hand is, or let it go; an arm that is stretched too far loses it."""
         if wants and self.hold is None:
-            R = matrix_of(body.q)
-            self.p_OH = turned_back(R, minus(self.p, body.p))
-            self.q_OH = product(inverse(body.q), self.q)
+            R = rotation_matrix(body.q)
+            self.p_OH = inverse_rotate(R, subtract(self.p, body.p))
+            self.q_OH = relative_quaternion(body.q, self.q)
             F = self.course
-            place, turn = turned_back(F.R, minus(self.p, F.p)), product(inverse(F.q), body.q)
+            place, turn = (
+                inverse_rotate(F.R, subtract(self.p, F.p)),
+                relative_quaternion(F.q, body.q),
+            )
             self.hold = Attachment(self._arm, self.p_OH, place, turn)
         elif self.hold is not None:
-            stretched = norm(minus(self.p, self._rest)) > self._p.arm_reach + _SPARE
+            stretched = distance(self.p, self._rest) > self._p.arm_reach + _SPARE
             if not wants or stretched:
                 self.hold = None
 
@@ -108,8 +121,8 @@ class FlyerHand:
         hold = self.hold
         if hold is not None:
             left = max(0.0, 1.0 - dt / self._p.recovery_time)
-            hold.place = along(ZERO, left, hold.place)
-            hold.turn = between(inverse(self.q_OH), hold.turn, left)
+            hold.place = scale(left, hold.place)
+            hold.turn = nlerp(quaternion_inverse(self.q_OH), hold.turn, left)
 
     def arrive(self, course: Frame, body: RigidBody) -> None:
         """Be where the object is that the hand holds, or on the course."""
@@ -117,8 +130,8 @@ class FlyerHand:
         if self.hold is None:
             self.p, self.q = course.p, course.q
         else:
-            self.p = plus(body.p, turned(matrix_of(body.q), self.p_OH))
-            self.q = product(body.q, self.q_OH)
+            self.p = add(body.p, rotate(rotation_matrix(body.q), self.p_OH))
+            self.q = quaternion_multiply(body.q, self.q_OH)
 
     def get_state(self) -> bytes:
         """Return the complete state."""
@@ -136,8 +149,8 @@ class FlyerHand:
         self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH = places
 
 
-def _led(dt: float, before: Triple, p: Triple, q: Quaternion) -> Frame:
-    return Frame(p, q, ((p[0] - before[0]) / dt, (p[1] - before[1]) / dt, (p[2] - before[2]) / dt))
+def _led(dt: float, before: Vector, p: Vector, q: Quaternion) -> Frame:
+    return Frame(p, q, divide(subtract(p, before), dt))
 
 
 _NEAR = 0.02
@@ -193,19 +206,17 @@ class FlyerGripper:
         p = self._p
         if self.grip is not None or max(abs(a - b) for a, b in zip(body.p, G.p, strict=True)) > 2.0 * self._half:
             return None
-        R = matrix_of(body.q)
+        R = rotation_matrix(body.q)
         s, (x, y, z) = self._nearest(G, body, R)
         depth = x + self._thick - p.palm_depth
         if not -_NEAR < depth < 2.0 * self._thick or abs(y) > p.palm_width or abs(z) > p.palm_width:
             return None
-        n_W = (-G.R[0], -G.R[3], -G.R[6])
-        n = turned_back(R, n_W)
-        t = self._thick
-        r = (-t * n[0], s - t * n[1], -t * n[2])
-        p_GP = (x + t, y, z)
-        v = plus(G.v, cross(G.w, turned(G.R, p_GP)))
-        speed = v[0] * n_W[0] + v[1] * n_W[1] + v[2] * n_W[2]
-        return Palm(r, n, speed, depth, p.palm_stiffness, p.palm_damping)
+        n_W = scale(-1.0, column(G.R, 0))
+        n = inverse_rotate(R, n_W)
+        r = add_scaled((0.0, s, 0.0), -self._thick, n)
+        p_GP = (x + self._thick, y, z)
+        v = add(G.v, cross(G.w, rotate(G.R, p_GP)))
+        return Palm(r, n, dot(v, n_W), depth, p.palm_stiffness, p.palm_damping)
 
     def touches(self, G: Frame, body: RigidBody) -> bool:
         """Return whether an object is in the palm."""
@@ -217,20 +228,19 @@ class FlyerGripper:
         return self.angle < self._angle_object and self._reaches(G, body)
 
     def _reaches(self, G: Frame, body: RigidBody) -> bool:
-        p, (_, (x, y, z)) = self._p, self._nearest(G, body, matrix_of(body.q))
+        p, (_, (x, y, z)) = self._p, self._nearest(G, body, rotation_matrix(body.q))
         return abs(x) <= p.capture_axial and abs(y) <= p.capture_end and abs(z) <= p.capture_lateral
 
     def _grasp(self, G: Frame, body: RigidBody) -> Attachment | None:
         """Return a grip of the object as it is, none if it is out of the fingers' reach."""
         if not self._reaches(G, body):
             return None
-        s, place = self._nearest(G, body, matrix_of(body.q))
-        return Attachment(self.stiffness, (0.0, s, 0.0), place, product(inverse(G.q), body.q))
+        s, place = self._nearest(G, body, rotation_matrix(body.q))
+        return Attachment(self.stiffness, (0.0, s, 0.0), place, relative_quaternion(G.q, body.q))
 
-    def _nearest(self, G: Frame, body: RigidBody, R: Rows) -> tuple[float, Triple]:
+    def _nearest(self, G: Frame, body: RigidBody, R: Matrix) -> tuple[float, Vector]:
         """Return where on the centre line the point nearest to G lies, seen from the centre, and the point in G."""
-        axis = (R[1], R[4], R[7])
-        d = minus(G.p, body.p)
-        s = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
-        s = min(max(s, -self._half), self._half)
-        return s, turned_back(G.R, (s * axis[0] - d[0], s * axis[1] - d[1], s * axis[2] - d[2]))
+        axis = column(R, 1)
+        d = subtract(G.p, body.p)
+        s = min(max(dot(d, axis), -self._half), self._half)
+        return s, inverse_rotate(G.R, subtract(scale(s, axis), d))

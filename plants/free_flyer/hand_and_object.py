@@ -10,7 +10,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.plain_rotation import ZERO, Triple, cross, norm, triple, turned
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Vector,
+    add,
+    cross,
+    distance,
+    lerp,
+    nlerp,
+    normalize,
+    quaternion,
+    rotate,
+    rotation_matrix,
+    scale,
+    subtract,
+    vector,
+)
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector14, output, port
 from handover.cosim.blocks.units import (
     Metre,
@@ -26,7 +41,6 @@ from handover.plants.free_flyer.floating_object import FloatingObject
 from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
 from handover.plants.free_flyer.parameters import Motion, Params, StartHolder, UnusableHand
 from handover.plants.free_flyer.person import Activity, FlyerPerson, Seen, minimum_jerk
-from handover.plants.free_flyer.rotations import along, between, matrix_of, minus, plus, quaternion, unit
 
 __all__ = [
     "Activity",
@@ -123,17 +137,17 @@ class HandAndObject:
         self._person = FlyerPerson(params)
         self._hand = FlyerHand(params, self._person.p, self._person.q)
         self._gripper = FlyerGripper(params)
-        self._object = FloatingObject(params.object_mass, triple(params.object_size))
+        self._object = FloatingObject(params.object_mass, vector(params.object_size))
         self._robot: Frame | None = None
         self._f_G, self._tau_G, self._f_H = ZERO, ZERO, ZERO
         body = self._object.body
         if params.object_with is StartHolder.HAND:
             body.q = self._hand.q
-            body.p = minus(self._hand.p, turned(matrix_of(body.q), self._hand.p_OH))
+            body.p = subtract(self._hand.p, rotate(rotation_matrix(body.q), self._hand.p_OH))
             self._hand.take_or_leave(True, body)
         else:
-            body.p = triple(params.p_WO_0)
-            body.q = unit(quaternion(params.q_WO_0))
+            body.p = vector(params.p_WO_0)
+            body.q = normalize(quaternion(params.q_WO_0))
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where everything is; no time passes."""
@@ -141,7 +155,7 @@ class HandAndObject:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
-        G = Frame(triple(u.p_WG), quaternion(u.q_WG), triple(u.v_WG), triple(u.w_WB))
+        G = Frame(vector(u.p_WG), quaternion(u.q_WG), vector(u.v_WG), vector(u.w_WB))
         if self._robot is None:
             self._refuse_overlap(G)
         before, body, person, hand = self._robot or G, self._object.body, self._person, self._hand
@@ -152,8 +166,8 @@ class HandAndObject:
         if person.pushes_with_fist:
             course, f_fist, p_GF = hand.press(dt, course, G)
         self._meet(dt, before, G, course)
-        self._f_G, self._tau_G = plus(self._f_G, f_fist), plus(self._tau_G, cross(p_GF, f_fist))
-        self._f_H = minus(self._f_H, f_fist)
+        self._f_G, self._tau_G = add(self._f_G, f_fist), add(self._tau_G, cross(p_GF, f_fist))
+        self._f_H = subtract(self._f_H, f_fist)
         hand.arrive(course, body)
         self._robot = G
         return self._told()
@@ -178,7 +192,7 @@ class HandAndObject:
 
     def _refuse_overlap(self, G: Frame) -> None:
         p, faults = self._p, list[str]()
-        apart = norm(minus(self._hand.p, G.p))
+        apart = distance(self._hand.p, G.p)
         if apart < p.fist_radius + p.palm_width:
             faults.append(f"the hand starts in the gripper, {apart:.3g} m from G; p_WH_0 must be farther away")
         if self._gripper.touches(G, self._object.body):
@@ -217,17 +231,17 @@ class HandAndObject:
             arm = course if last else _between(self._hand.course, course, s)
             held = [(a, F) for a, F in ((grip, gripper), (hold, arm)) if a is not None]
             palm = self._gripper.palm(gripper, body)
-            R, p_GO = matrix_of(body.q), minus(body.p, gripper.p)
+            R, p_GO = rotation_matrix(body.q), subtract(body.p, gripper.p)
             wrenches, push = self._object.advance(dt / count, held, palm)
             if palm is not None:
-                f_G, tau_G = _added(f_G, tau_G, push, ZERO, plus(p_GO, turned(R, palm.r)))
+                f_G, tau_G = _added(f_G, tau_G, push, ZERO, add(p_GO, rotate(R, palm.r)))
             for (a, _), (f, tau) in zip(held, wrenches, strict=True):
                 if a is grip:
-                    f_G, tau_G = _added(f_G, tau_G, f, tau, plus(p_GO, turned(R, a.r)))
+                    f_G, tau_G = _added(f_G, tau_G, f, tau, add(p_GO, rotate(R, a.r)))
                 else:
-                    f_H = minus(f_H, f)
+                    f_H = subtract(f_H, f)
         s = 1.0 / count
-        self._f_G, self._tau_G, self._f_H = along(ZERO, s, f_G), along(ZERO, s, tau_G), along(ZERO, s, f_H)
+        self._f_G, self._tau_G, self._f_H = scale(s, f_G), scale(s, tau_G), scale(s, f_H)
 
     def _told(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
@@ -249,11 +263,10 @@ class HandAndObject:
         )
 
 
-def _added(f: Triple, tau: Triple, f_O: Triple, tau_O: Triple, arm: Triple) -> tuple[Triple, Triple]:
+def _added(f: Vector, tau: Vector, f_O: Vector, tau_O: Vector, arm: Vector) -> tuple[Vector, Vector]:
     """Return a wrench on the gripper with the reaction to one on the object added, which acts at `arm` from G."""
-    return minus(f, f_O), minus(minus(tau, tau_O), cross(arm, f_O))
+    return subtract(f, f_O), subtract(subtract(tau, tau_O), cross(arm, f_O))
 
 
 def _between(a: Frame, b: Frame, s: float) -> Frame:
-    p, v, w = (along(x, s, minus(y, x)) for x, y in ((a.p, b.p), (a.v, b.v), (a.w, b.w)))
-    return Frame(p, between(a.q, b.q, s), v, w)
+    return Frame(lerp(a.p, b.p, s), nlerp(a.q, b.q, s), lerp(a.v, b.v, s), lerp(a.w, b.w, s))

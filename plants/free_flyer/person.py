@@ -6,10 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.plain_rotation import Quaternion, Triple, norm, product, triple, turned
+from handover.cosim.blocks.plain_rotation import (
+    Quaternion,
+    Vector,
+    add,
+    add_scaled,
+    column,
+    distance,
+    lerp,
+    nlerp,
+    quaternion,
+    quaternion_multiply,
+    rotate,
+    subtract,
+    vector,
+)
 from handover.plants.free_flyer.attachment import Frame
 from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
-from handover.plants.free_flyer.rotations import along, between, minus, plus, quaternion
 
 _PEAK = 1.875
 """Highest speed of a minimum-jerk course over its mean speed."""
@@ -43,9 +56,9 @@ class Seen:
     O: Frame
     gripped: bool
     held: bool
-    p_WH: Triple
+    p_WH: Vector
     q_WH: Quaternion
-    p_OH: Triple
+    p_OH: Vector
     q_OH: Quaternion
 
 
@@ -65,12 +78,12 @@ class FlyerPerson:
         self._p = params
         self._rng = np.random.default_rng([params.seed, 1])
         pull = np.asarray(params.pull_direction) / np.linalg.norm(params.pull_direction)
-        self._pull = triple(pull)
-        self.rest = triple(params.p_WH_0)
+        self._pull = vector(pull)
+        self.rest = vector(params.p_WH_0)
         q = np.asarray(params.q_WH_0) / np.linalg.norm(params.q_WH_0)
         self._rest_q = quaternion(q)
-        self._end = triple(params.p_OH)
-        self._offered = triple(params.p_OG)
+        self._end = vector(params.p_OH)
+        self._offered = vector(params.p_OG)
         self.activity = Activity.WAIT
         self.p, self.q = self.rest, self._rest_q  # where the arm wants the hand, without tremor
         self.holding = params.object_with is StartHolder.HAND
@@ -142,7 +155,7 @@ class FlyerPerson:
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
             p, _ = goals[activity](seen)
-            self._duration = max(_SHORTEST, _PEAK * norm(minus(p, self.p)) / self._p.reach_speed)
+            self._duration = max(_SHORTEST, _PEAK * distance(p, self.p) / self._p.reach_speed)
 
     def _waits(self, dt: float, seen: Seen) -> None:
         if not self._called:
@@ -163,7 +176,7 @@ class FlyerPerson:
         if self._motion is not Motion.PUSH and takes is self.holding:
             return False
         goal, _ = self._at_object(seen) if takes else self._at_palm(seen)
-        return norm(minus(goal, self.rest)) <= self._p.arm_reach
+        return distance(goal, self.rest) <= self._p.arm_reach
 
     def _reaches(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
         self._follow(*self._at_object(seen))
@@ -188,7 +201,7 @@ class FlyerPerson:
         self._follow(*self._at_palm(seen))
         if self._clock >= self._duration:
             self._begin(Activity.PUSH, seen)
-            self._axis = (seen.G.R[0], seen.G.R[3], seen.G.R[6])
+            self._axis = column(seen.G.R, 0)
 
     def _pushes(self, dt: float, seen: Seen) -> None:
         p = self._p
@@ -222,35 +235,35 @@ class FlyerPerson:
         self._since = self._since + dt if there else 0.0
         return there and self._since >= self._reaction
 
-    def _follow(self, p: Triple, q: Quaternion) -> None:
+    def _follow(self, p: Vector, q: Quaternion) -> None:
         """Go on along a minimum-jerk course to a goal that may move."""
         s = minimum_jerk(self._clock / self._duration)
-        self.p = along(self._from, s, minus(p, self._from))
-        self.q = between(self._from_q, q, s)
+        self.p = lerp(self._from, p, s)
+        self.q = nlerp(self._from_q, q, s)
 
-    def _go(self, dt: float, axis: Triple, speed: float, ramp: float, distance: float) -> None:
+    def _go(self, dt: float, axis: Vector, speed: float, ramp: float, distance: float) -> None:
         """Go on along an axis with a speed that rises smoothly in the time `ramp`, until the distance is done."""
         self._speed = min(1.0, self._speed + dt / ramp)
         x = self._speed
         self._way = min(distance, self._way + dt * speed * x * x * (3.0 - 2.0 * x))
-        self.p = along(self._from, self._way, axis)
+        self.p = add_scaled(self._from, self._way, axis)
 
-    def _at_object(self, seen: Seen) -> tuple[Triple, Quaternion]:
+    def _at_object(self, seen: Seen) -> tuple[Vector, Quaternion]:
         """Return the hand's pose at the object's end: the object's axes."""
-        return plus(seen.O.p, turned(seen.O.R, self._end)), seen.O.q
+        return add(seen.O.p, rotate(seen.O.R, self._end)), seen.O.q
 
-    def _at_palm(self, seen: Seen) -> tuple[Triple, Quaternion]:
+    def _at_palm(self, seen: Seen) -> tuple[Vector, Quaternion]:
         """Return the hand's pose where a push begins: with the object, p_OG in front of the palm; a fist, beside it."""
         p, G = self._p, seen.G
         front = p.palm_depth - p.offer_gap
-        q = product(G.q, seen.q_OH)
+        q = quaternion_multiply(G.q, seen.q_OH)
         if self._motion is Motion.PUSH:
-            return plus(G.p, turned(G.R, (front - p.fist_radius, p.fist_offset, 0.0))), q
-        x, y, z = minus(seen.p_OH, self._offered)
+            return add(G.p, rotate(G.R, (front - p.fist_radius, p.fist_offset, 0.0))), q
+        x, y, z = subtract(seen.p_OH, self._offered)
         place = (front - 0.5 * float(p.object_size[0]) + x, y, z)
-        return plus(G.p, turned(G.R, place)), q
+        return add(G.p, rotate(G.R, place)), q
 
-    def _at_rest(self, seen: Seen) -> tuple[Triple, Quaternion]:  # noqa: ARG002
+    def _at_rest(self, seen: Seen) -> tuple[Vector, Quaternion]:  # noqa: ARG002
         return self.rest, self._rest_q
 
 

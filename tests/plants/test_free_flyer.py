@@ -6,9 +6,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.plain_rotation import quaternion, quaternion_multiply, row_major, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
-from handover.plants.free_flyer.rigid_body import TurnsTooFast
+from handover.plants.free_flyer.rigid_body import TurnsTooFast, momentum_rates
 
 KNOWING = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
 SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])
@@ -88,6 +89,19 @@ def test_a_force_at_the_gripper_gives_momentum_and_its_moment():
     np.testing.assert_allclose(p.mass * y.v_WB, seconds * f, rtol=1e-12)
     np.testing.assert_allclose(L, moment, atol=1e-6)  # about the world's origin; the trapezium rule's error
     assert np.linalg.norm(moment) > 0.04
+
+
+def test_rates_are_newtons_and_eulers_laws():
+    rng = np.random.default_rng(4)
+    m, e, L, (f_B, tau_B, f_G, tau_G) = 9.584, rng.normal(size=3), rng.normal(size=3), rng.normal(size=(4, 3))
+    q = Rotation.random(rng=rng).as_quat(scalar_first=True)
+    I_inverse, R = np.linalg.inv(SKEWED), matrix(q)
+    wrench = vector(f_B), vector(tau_B), vector(f_G), vector(tau_G)
+    a, dL, dq = momentum_rates(1.0 / m, row_major(I_inverse), vector(e), quaternion(q), vector(L), wrench)
+    np.testing.assert_allclose(a, (R @ f_B + f_G) / m, rtol=1e-12)
+    np.testing.assert_allclose(dL, R @ tau_B + np.cross(R @ e, f_G) + tau_G, rtol=1e-12)
+    half_w = vector(0.5 * I_inverse @ np.transpose(R) @ L)
+    np.testing.assert_allclose(dq, quaternion_multiply(quaternion(q), (0.0, *half_w)), rtol=1e-12)
 
 
 def test_propulsion_turns_with_the_robot():
