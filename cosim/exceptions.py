@@ -34,9 +34,9 @@ def last_line(log: Iterable[str]) -> str:
     What is wrong with a source is told with its file and line, which a traceback tells before.
     """
     lines = [line.strip() for line in log_lines(log)]
-    told = _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
+    text = _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
     places = [place for line in lines if (place := _PLACE.search(line))]
-    return f"{told} ({places[-1][1]}, line {places[-1][2]})" if places and _SYNTAX.match(told) else told
+    return f"{text} ({places[-1][1]}, line {places[-1][2]})" if places and _SYNTAX.match(text) else text
 
 
 def one_line(e: BaseException) -> str:
@@ -114,8 +114,8 @@ class UnitFailure(CosimError):
 
     def __init__(self, unit: str, call: str, t: float, status: str, log: Sequence[str] = ()) -> None:
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)
-        told = "".join(f"\n  {line}" for line in log)
-        super().__init__(self.headline + told)
+        text = "".join(f"\n  {line}" for line in log)
+        super().__init__(self.headline + text)
 
     @property
     def headline(self) -> str:
@@ -128,14 +128,14 @@ class UnitFailure(CosimError):
         return f"answered {self.status}"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """The last line of the unit's log, or the status where it logged nothing."""
         return last_line(self.log) or self.status
 
     @property
     def cause(self) -> str:
         """One line: unit, call, time, and the last thing that the unit logged."""
-        return f"{self.unit}: {self.call} at t = {self.t:.6g} s: {self.told}"
+        return f"{self.unit}: {self.call} at t = {self.t:.6g} s: {self.message}"
 
     def as_data(self) -> dict[str, Any]:
         """Return the failure as JSON can hold it."""
@@ -149,15 +149,15 @@ class UnitFailure(CosimError):
         }
 
 
-class UnitRefused(CosimError):
+class InitializationError(CosimError):
     """A unit did not accept its parameters or did not initialise; nothing has run yet."""
 
     def __init__(self, failure: UnitFailure) -> None:
-        super().__init__(f"{failure.unit} does not start: {failure.told}")
+        super().__init__(f"{failure.unit} does not start: {failure.message}")
         self.failure = failure
 
 
-class BadOptions(CosimError, ValueError):
+class InvalidOptions(CosimError, ValueError):
     """Options of a master that make no sense; `faults` lists everything that is wrong with them."""
 
     def __init__(self, faults: Sequence[str]) -> None:

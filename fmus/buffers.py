@@ -16,7 +16,7 @@ ALIGNMENT = 64
 """Bytes: arrays begin at multiples of a cache line in their memory."""
 
 
-class UnfitState(ValueError):
+class InvalidState(ValueError):
     """A saved state does not fit the unit that is to take it."""
 
     is_refusal = True
@@ -105,13 +105,13 @@ class Buffers:
         """
         parts = split(state)
         if len(parts) != 3 + len(self.binaries) + len(self.strings):
-            raise UnfitState
+            raise InvalidState
         numbers, rest = parts[:3], parts[3:]
         used, strings = rest[: len(self.binaries)], rest[len(self.binaries) :]
         arrays = (self.floats, self.integers, self.booleans)
         fit = all(a.nbytes == len(p) for a, p in zip(arrays, numbers, strict=True))
         if not fit or not all(_fits(v, p) for v, p in zip(self.binary_variables, used, strict=True)):
-            raise UnfitState
+            raise InvalidState
         for array, part in zip(arrays, numbers, strict=True):
             array[:] = np.frombuffer(part, dtype=array.dtype)
         for i, part in enumerate(used):
@@ -164,6 +164,6 @@ def split(whole: bytes) -> list[bytes]:
         n = int.from_bytes(whole[at:start], sys.byteorder)
         at = start + n
         if at > len(whole):
-            raise UnfitState
+            raise InvalidState
         parts.append(whole[start:at])
     return parts

@@ -34,7 +34,7 @@ class UnknownVersion(ValueError):
         self.fmi = fmi
 
 
-class UnusableName(ValueError):
+class InvalidName(ValueError):
     """An FMU's name is also that of its library and, in FMI, an identifier of C."""
 
     def __init__(self, name: str) -> None:
@@ -42,7 +42,7 @@ class UnusableName(ValueError):
         self.name = name
 
 
-class UnusableStep(ValueError):
+class InvalidStep(ValueError):
     """A communication step is a positive number of seconds, and exact."""
 
     def __init__(self, step: object) -> None:
@@ -122,7 +122,7 @@ def build(
     form = _form(fmi, scalar=scalar)
     carried = closure(entry.block)
     if not (entry.name.isidentifier() and entry.name.isascii()):
-        raise UnusableName(entry.name)
+        raise InvalidName(entry.name)
     _check_step(entry.step)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     packages = carried.packages()
@@ -151,7 +151,7 @@ def build(
 def _check_step(step: object) -> None:
     exact = Fraction(step) if isinstance(step, Rational) else Fraction(0)
     if not sys.float_info.min <= exact <= sys.float_info.max:
-        raise UnusableStep(step)
+        raise InvalidStep(step)
 
 
 def file_name(name: str, form: Form) -> str:

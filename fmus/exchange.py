@@ -23,13 +23,13 @@ from handover.fmus.parameters import read_value
 NOT_REAL = (Buffer.INT64, Buffer.BOOLEAN, Buffer.STRING, Buffer.BINARY)
 
 
-class UnfitOutput(TypeError):
+class InvalidOutput(TypeError):
     """A block gave an output that is not of the declared type or shape."""
 
     def __init__(self, variable: Variable, value: object) -> None:
         declared = f"array of shape {variable.shape}" if variable.shape else variable.kind.value
         if variable.width and not variable.width.is_real:
-            declared = variable.width.told
+            declared = variable.width.range_text
         if variable.items:
             declared = "one of " + ", ".join(f"{number} {name}" for name, number in variable.items)
         if variable.raster:
@@ -99,14 +99,14 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
             value = getattr(y, variable.name)
             array: NDArray[Any] = np.asarray(value)
             if array.shape != shape or array.dtype.kind not in "fiu":
-                raise UnfitOutput(variable, value)
+                raise InvalidOutput(variable, value)
             view[...] = array
         for variable, put in others:
             value = getattr(y, variable.name)
             try:
                 put(value)
             except (TypeError, ValueError, OverflowError) as error:
-                raise UnfitOutput(variable, value) from error
+                raise InvalidOutput(variable, value) from error
 
     return write
 
@@ -173,7 +173,7 @@ def _blame(scalars: Sequence[Variable], y: Any) -> None:
         try:
             struct.pack("=d", value)
         except struct.error:
-            raise UnfitOutput(variable, value) from None
+            raise InvalidOutput(variable, value) from None
 
 
 def _writer(buffers: Buffers, slot: Slot) -> Callable[[Any], None]:
@@ -230,7 +230,7 @@ def _write_bytes(buffers: Buffers, slot: Slot, value: Any) -> None:
 Derivative = float | NDArray[np.float64]
 
 
-class UnfitDerivative(TypeError):
+class InvalidDerivative(TypeError):
     """A block gave a derivative that is no real output's, or not of that output's shape."""
 
     def __init__(self, name: str, fault: str) -> None:
@@ -255,9 +255,9 @@ def derivative_reader(
         for name, value in dy.items():
             slot = outputs.get(name)
             if slot is None:
-                raise UnfitDerivative(name, f"no such real output; it has {', '.join(outputs)}")
+                raise InvalidDerivative(name, f"no such real output; it has {', '.join(outputs)}")
             if np.shape(value) != slot.variable.shape:
-                raise UnfitDerivative(name, f"shape {np.shape(value)} where {slot.variable.shape} is declared")
+                raise InvalidDerivative(name, f"shape {np.shape(value)} where {slot.variable.shape} is declared")
             vector[slot.offset - span.start : slot.entries.stop - span.start] = np.ravel(value)
         return vector.tobytes()
 

@@ -28,7 +28,7 @@ _PREFIX = re.compile(r"(?<![\w./\\])_fmu_\w+\.(?=\w)")
 """The prefix before a module's name; not a part of a path."""
 
 
-class Refusal(Exception):
+class HostError(Exception):
     """The host or its installation is at fault; the message says all, a traceback would only distract."""
 
     is_refusal = True
@@ -48,7 +48,7 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
         unit = json.load(file)
     if token != unit["token"]:
-        raise Refusal(
+        raise HostError(
             f"the model description's token {token} is not that of the resources, which is {unit['token']}:"
             " they are of two different builds. Cure: unpack the FMU again, into an empty folder, or build it again"
         )
@@ -95,7 +95,7 @@ def _require(unit: dict[str, Any], resources: str) -> None:
     if missing:
         names = ", ".join(f"{p['distribution']} (built with version {p['version']})" for p in missing)
         wanted = " ".join(f"{p['distribution']}=={p['version']}" for p in missing)
-        raise Refusal(
+        raise HostError(
             f"unit {unit['unit']} needs packages that this Python does not have: {names}."
             f" This is Python {sys.version.split()[0]}, prefix {sys.prefix}, executable {sys.executable or 'unknown'}."
             f" Cure: install them into it, for instance with `python -m pip install {wanted}`,"

@@ -33,7 +33,7 @@ class AmbiguousName(ValueError):
         self.what, self.name = what, name
 
 
-class UnusableText(ValueError):
+class InvalidText(ValueError):
     """A text has characters that XML cannot carry."""
 
     def __init__(self, where: str, text: str) -> None:
@@ -74,7 +74,7 @@ def text(root: ET.Element) -> bytes:
     for element in root.iter():
         for name, value in element.attrib.items():
             if _NOT_XML.search(value):
-                raise UnusableText(f"{name} of {element.get('name', element.tag)}", value)
+                raise InvalidText(f"{name} of {element.get('name', element.tag)}", value)
     ET.indent(root)
     return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 

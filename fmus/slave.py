@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from handover.cosim.blocks.block import UnfitAdvance
+from handover.cosim.blocks.block import InvalidAdvance
 from handover.cosim.blocks.description import describe
-from handover.fmus.buffers import Buffers, UnfitState, join, split
+from handover.fmus.buffers import Buffers, InvalidState, join, split
 from handover.fmus.exchange import derivative_reader, input_reader, output_writer
 from handover.fmus.layout import Form, Layout
 from handover.fmus.parameters import read_parameters
@@ -87,7 +87,7 @@ class Slave:
         t, dt = self._clock.tolist()
         reached, y = self._block.advance(t, dt, self._read())
         if not 0.0 <= reached <= dt:
-            raise UnfitAdvance(self._type.__name__, reached, dt)
+            raise InvalidAdvance(self._type.__name__, reached, dt)
         self._write(y)
         self._clock[1] = reached
 
@@ -129,7 +129,7 @@ class Slave:
         """
         parts = split(state)
         if len(parts) not in (1, 2):
-            raise UnfitState
+            raise InvalidState
         before = self._buffers.to_bytes()
         self._buffers.from_bytes(parts[0])
         if len(parts) == 1:

@@ -79,10 +79,12 @@ def is_plant(unit: str) -> bool:
 
 def test_the_table_of_units_has_their_steps_and_standards():
     cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `[A-Z][a-z]\w+`", row)]
-    told = {unit: (step.strip(), fmi.strip()) for units, step, fmi in cells for unit in re.findall(r"`(\w+)`", units)}
-    assert set(told) == set(UNITS)
+    sentence = {
+        unit: (step.strip(), fmi.strip()) for units, step, fmi in cells for unit in re.findall(r"`(\w+)`", units)
+    }
+    assert set(sentence) == set(UNITS)
     for name, entry in UNITS.items():
-        step, fmi = told[name]
+        step, fmi = sentence[name]
         number, unit = step.split()
         assert Fraction(number) * {"ms": Fraction(1, 1000), "s": 1}[unit] == entry.step
         try:

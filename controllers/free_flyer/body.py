@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.free_flyer.sampled_loop import LinearController, LinearPlant, SampledLoop, largest_stable
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats
 
 
@@ -89,10 +89,10 @@ def positive_definite(M: Floats) -> bool:
     return bool(np.all(np.linalg.eigvalsh(M) > 0.0))
 
 
-_LONGEST_DELAY = 0.5  # s, up to which a stable one is looked for
+_MAX_DELAY = 0.5  # s, up to which a stable one is looked for
 
 
-class UnusableController(Refusal):
+class InvalidControllerParameters(InvalidParameters):
     """A controller that cannot work as its parameters have it; `faults` lists all of them."""
 
     def __init__(self, block: str, faults: list[str]) -> None:
@@ -127,8 +127,8 @@ def stability_faults(
         f"its largest pole has |z| = {found:.4f}, which must be less than 1"
     )
     cures: list[str] = []
-    if (most := largest_stable(lambda later: radius(1.0, later), min(delay, _LONGEST_DELAY))) > 0.0:
-        cures.append(f"a delay of at most about {most:.3f} s")
-    if (most := largest_stable(lambda factor: radius(factor, delay), 1.0)) > 0.0:
-        cures.append(f"at most about {most:.3g} times these gains")
+    if (limit := largest_stable(lambda later: radius(1.0, later), min(delay, _MAX_DELAY))) > 0.0:
+        cures.append(f"a delay of at most about {limit:.3f} s")
+    if (limit := largest_stable(lambda factor: radius(factor, delay), 1.0)) > 0.0:
+        cures.append(f"at most about {limit:.3g} times these gains")
     return [fault + ("; it is stable with " + " or with ".join(cures) if cures else "; no cure was found")]

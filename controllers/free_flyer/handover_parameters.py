@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.ports import ARM, Behaviour
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import rotate, vector
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, Second
@@ -17,7 +17,7 @@ NAME = "HandoverStateMachine"
 _VELOCITIES = {Behaviour.RIGID: (0.059, 0.021), Behaviour.COMPLIANT: (0.08, 0.037)}  # release, receive: sec. 4.1.2
 
 
-class UnusableHandover(Refusal):
+class InvalidHandoverParameters(InvalidParameters):
     """A handover that cannot be done as its parameters have it; `faults` lists all of them."""
 
     block = NAME
@@ -112,7 +112,7 @@ class Params:
         """Raise UnusableHandover, with all faults, if this is no handover that can be done."""
         faults = self._place_faults() + self._velocity_faults() + self._time_faults()
         if faults:
-            raise UnusableHandover(faults)
+            raise InvalidHandoverParameters(faults)
 
     def _place_faults(self) -> list[str]:
         faults = [

@@ -9,7 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.free_flyer.handover_parameters import NAME, HandoverTask, Params, UnusableHandover
+from handover.controllers.free_flyer.handover_parameters import (
+    NAME,
+    HandoverTask,
+    InvalidHandoverParameters,
+    Params,
+)
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.plain_rotation import (
@@ -30,9 +35,9 @@ __all__ = [
     "HandoverStateMachine",
     "HandoverTask",
     "Inputs",
+    "InvalidHandoverParameters",
     "Outputs",
     "Params",
-    "UnusableHandover",
 ]
 
 

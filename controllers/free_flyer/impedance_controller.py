@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.free_flyer.body import FlyerBody, UnusableController, stability_faults
+from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Behaviour, Inputs, Outputs
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
@@ -38,7 +38,7 @@ from handover.cosim.blocks.units import (
     Second,
 )
 
-__all__ = ["Behaviour", "ImpedanceController", "Inputs", "Outputs", "Params", "UnusableController"]
+__all__ = ["Behaviour", "ImpedanceController", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
 
 _NAME = "ImpedanceController"
 
@@ -121,7 +121,7 @@ class ImpedanceController:
             body, lambda factor: gains.scaled(factor).law(body), period, params.delay, params.lag
         )
         if faults:
-            raise UnusableController(_NAME, faults)
+            raise InvalidControllerParameters(_NAME, faults)
         self.loop = SampledLoop(body.linear_plant(params.lag), gains.law(body), period, params.delay)
         self._pole_radius = self.loop.pole_radius
         self._damping_ratio, self._pole_frequency = self.loop.least_damped

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.free_flyer.body import FlyerBody, UnusableController, stability_faults
+from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import PidGains, pid_law
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Inputs, Outputs
 from handover.controllers.free_flyer.profile import Bounds, Profile, Reference, profile_between
@@ -52,7 +52,7 @@ from handover.cosim.blocks.units import (
     Second,
 )
 
-__all__ = ["Inputs", "Outputs", "Params", "PoseController", "UnusableController"]
+__all__ = ["Inputs", "InvalidControllerParameters", "Outputs", "Params", "PoseController"]
 
 _NAME = "PoseController"
 
@@ -160,7 +160,7 @@ class PoseController:
             params.lag,
         )
         if faults:
-            raise UnusableController(_NAME, faults)
+            raise InvalidControllerParameters(_NAME, faults)
         self.loop = SampledLoop(
             body.linear_plant(params.lag), pid_law(body, position, attitude, self._T), self._T, params.delay
         )

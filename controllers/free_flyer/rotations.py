@@ -13,7 +13,7 @@ from handover.cosim.blocks.plain_rotation import Matrix, Quaternion, Vector
 from handover.cosim.blocks.ports import Floats
 
 
-class UnusableOrientation(ValueError):
+class InvalidOrientation(ValueError):
     """A quaternion that is zero or not finite, so that it tells of no orientation; nothing has changed."""
 
     is_refusal = True
@@ -32,7 +32,7 @@ def unit_quaternion(q: Floats, block: str, name: str) -> Quaternion:
     w, x, y, z = q.tolist()
     n = w * w + x * x + y * y + z * z
     if not 1e-12 < n < math.inf:
-        raise UnusableOrientation(block, name, q)
+        raise InvalidOrientation(block, name, q)
     if n != 1.0:
         f = 1.0 / math.sqrt(n)
         return w * f, x * f, y * f, z * f

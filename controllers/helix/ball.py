@@ -26,7 +26,7 @@ _SPREAD = (0.12, 0.2, 0.33)  # how far apart, in shares of the outline, three po
 _ON_CIRCLE = 0.45  # px; three standard deviations of a free edge
 _HULL = 48  # points of the hull through which circles are tried
 _TRIED = 120  # points of the outline, about, on which circles are tried
-_LEAST_ARC = 0.22  # share of a circle that must be seen
+_MIN_ARC = 0.22  # share of a circle that must be seen
 _SECTORS = 36
 _FEW = 12  # points; fewer are no outline
 
@@ -150,7 +150,7 @@ def _outline(edge: Floats, centre: Floats, radius: float) -> BallOutline | None:
     d = on - centre
     sector = np.floor((np.arctan2(d[:, 1], d[:, 0]) / (2.0 * np.pi) + 0.5) * _SECTORS).astype(int) % _SECTORS
     arc = len(np.unique(sector)) / _SECTORS
-    if arc < _LEAST_ARC:
+    if arc < _MIN_ARC:
         return None
     outwards = _INSIDE * d / np.linalg.norm(d, axis=1, keepdims=True)
     return BallOutline((on + outwards)[::_ZOOM], centre, radius + _INSIDE, arc)
@@ -161,7 +161,7 @@ def _on_circle(edge: Floats, centre: Floats, radius: float) -> Floats:
 
 
 _ITERATIONS = 6
-_LARGEST_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller
+_MAX_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ class BallFit:
             dx, information = least_squares(J, e)
             p_WO, shift = p_WO + dx[:3], shift + float(dx[3])
         behind = min(float(c.depth(p_WO)) for c in cameras) <= self._radius
-        if not np.isfinite(p_WO).all() or behind or abs(shift - mean) > _LARGEST_SHIFT:
+        if not np.isfinite(p_WO).all() or behind or abs(shift - mean) > _MAX_SHIFT:
             return None
         return BallPosition(p_WO, covariance(information, self._noise)[:3, :3])
 

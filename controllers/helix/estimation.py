@@ -12,7 +12,7 @@ from handover.controllers.helix.constant_curvature import linearise
 from handover.cosim.blocks.ports import Floats
 
 
-class UnusableMeasurement(ValueError):
+class InvalidMeasurement(ValueError):
     """A measurement that is said to be seen holds numbers that are not finite."""
 
     def __init__(self, X_new: Floats) -> None:
@@ -49,7 +49,7 @@ class PositionFilter:
             UnusableMeasurement: X_new is not finite.
         """
         if not np.isfinite(X_new).all():
-            raise UnusableMeasurement(X_new)
+            raise InvalidMeasurement(X_new)
         X, P = self.position, self.covariance
         K = np.transpose(np.linalg.solve(P + (self._R if R is None else R), P))  # P and R are symmetric
         P_new = P - K @ P
@@ -68,7 +68,7 @@ class PositionFilter:
 
 _STEP_TOLERANCE = 1e-7  # rad and m; the constraint is then met to the square of it
 _MAX_ITERATIONS = 60
-_EXTRAPOLATE_EVERY, _LARGEST_RATIO = 5, 0.9
+_EXTRAPOLATE_EVERY, _MAX_RATIO = 5, 0.9
 _MAX_NEWTON_STEPS = 60
 
 
@@ -111,7 +111,7 @@ def optimise_state(
 
 
 def _ratio(step: Floats, last: Floats) -> float:
-    return min(_LARGEST_RATIO, max(-_LARGEST_RATIO, float(step @ last) / float(last @ last)))
+    return min(_MAX_RATIO, max(-_MAX_RATIO, float(step @ last) / float(last @ last)))
 
 
 def _nearest_in_ball(B: Floats, r: Floats, bound: float) -> Floats:

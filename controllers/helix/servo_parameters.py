@@ -5,14 +5,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
 from handover.cosim.blocks.units import Metre, Number, Second, SquareMetre
 
 _ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
 
 
-class UnusableParameters(Refusal):
+class InvalidServoParameters(InvalidParameters):
     """Values with which the visual servo cannot work; `faults` lists all of them."""
 
     block = "VisualServo"
@@ -94,7 +94,7 @@ class Params:
         """Raise UnusableParameters, with all faults, if the servo cannot work with these values."""
         faults = self._value_faults() + self._limit_faults() + self._threshold_faults()
         if faults:
-            raise UnusableParameters(faults)
+            raise InvalidServoParameters(faults)
 
     def _value_faults(self) -> list[str]:
         values = {f.name: getattr(self, f.name) for f in fields(self)}

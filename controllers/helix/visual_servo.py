@@ -13,11 +13,11 @@ import numpy as np
 from handover.controllers.helix.constant_curvature import tendon_lengths
 from handover.controllers.helix.estimation import PositionFilter, optimise_state
 from handover.controllers.helix.jacobian_control import Limits, blend, control_step
-from handover.controllers.helix.servo_parameters import Params, UnusableParameters
+from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
 from handover.cosim.blocks.units import Metre, Number, SquareMetre
 
-__all__ = ["Inputs", "Outputs", "Params", "Phase", "UnusableParameters", "VisualServo"]
+__all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "VisualServo"]
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1), for both points of a pose
 _UP = np.array([0.0, 0.0, 1.0])

@@ -12,29 +12,29 @@ import numpy as np
 
 from handover.controllers.ir_grasp.descent import Descent, Verdict
 from handover.controllers.ir_grasp.moves import Move, Probing, Reading, X
-from handover.controllers.ir_grasp.parameters import Params, Strategy, UnusableReflex
+from handover.controllers.ir_grasp.parameters import InvalidReflexParameters, Params, Strategy
 from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
 from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre, Tick
 
 __all__ = [
     "Inputs",
+    "InvalidReading",
+    "InvalidReflexParameters",
     "IrReflex",
     "Outputs",
     "Params",
     "Phase",
     "Stop",
     "Strategy",
-    "UnusableReading",
-    "UnusableReflex",
     "Visibility",
 ]
 
 _PERIOD = Fraction(3, 200)  # one round of the three sensors, at 5 ms each (assumed)
 
 
-class UnusableReading(Refusal):
+class InvalidReading(InvalidParameters):
     """An input that is no number; `faults` names all of them."""
 
     block = "IrReflex"
@@ -164,7 +164,7 @@ class IrReflex:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Go on with the move under way; when it is over, decide on the next one by its reading."""
-        _refuse(u)
+        _check_inputs(u)
         if self._phase is Phase.SHAKE:
             self._shake()
         elif self._phase is not Phase.DONE:
@@ -320,12 +320,12 @@ class IrReflex:
             part.set_state(saved)
 
 
-def _refuse(u: Inputs) -> None:
+def _check_inputs(u: Inputs) -> None:
     """Raise UnusableReading for what is no number: no move would ever arrive, and no finger would ever see."""
-    told = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
-    wrong = [name for name, values in told.items() if not all(map(math.isfinite, values))]
+    facts = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
+    wrong = [name for name, values in facts.items() if not all(map(math.isfinite, values))]
     if wrong:
-        raise UnusableReading([f"{name} must be finite, not {told[name]}" for name in wrong])
+        raise InvalidReading([f"{name} must be finite, not {facts[name]}" for name in wrong])
 
 
 def _periods(time: float) -> int:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
@@ -54,7 +54,7 @@ class Calibration:
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
 
 
-class UnusableReflex(Refusal):
+class InvalidReflexParameters(InvalidParameters):
     """Values with which the reflex cannot work; `faults` lists all of them."""
 
     block = "IrReflex"
@@ -145,7 +145,7 @@ class Params:
         """Raise UnusableReflex, with all faults, if the reflex cannot work with these values."""
         faults = parameter_faults(self) or [*self.calibration.faults(), *self._input_faults(), *self._range_faults()]
         if faults:
-            raise UnusableReflex(faults)
+            raise InvalidReflexParameters(faults)
 
     def _input_faults(self) -> list[str]:
         faults: list[str] = []

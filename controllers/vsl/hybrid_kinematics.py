@@ -14,11 +14,11 @@ import numpy as np
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import VslModel
-from handover.controllers.vsl.model_text import UnusableModel, parse_model, read_model
+from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
 
-__all__ = ["Elbow", "HybridKinematics", "Inputs", "Method", "Outputs", "Params", "UnusableModel"]
+__all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Method", "Outputs", "Params"]
 
 
 class Method(enum.IntEnum):
@@ -151,11 +151,12 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     """
     model = read_model(Path(p.model)) if p.model else parse_model(DEFAULT_MODEL, "that ships")
     if model.kinematics != kinematics:
-        raise UnusableModel(
-            p.model or "that ships", f"it was trained for {_told(model.kinematics)}, not {_told(kinematics)}"
+        raise InvalidModel(
+            p.model or "that ships",
+            f"it was trained for {_geometry_text(model.kinematics)}, not {_geometry_text(kinematics)}",
         )
     return model
 
 
-def _told(k: VslKinematics) -> str:
+def _geometry_text(k: VslKinematics) -> str:
     return f"L_1, L_2, L_3 = {k.L_1:g}, {k.L_2:g}, {k.L_3:g} m with the elbow {k.elbow.name.lower()}"

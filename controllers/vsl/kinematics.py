@@ -77,8 +77,8 @@ class VslKinematics:
         r_3 = math.hypot(r_1, r_2)
         least, greatest = self.reach
         if not least - 1e-12 <= r_3 <= greatest + 1e-12:
-            told = f"it is {r_3:.4g} m from the shoulder, and the links reach {least:.4g} .. {greatest:.4g} m"
-            raise Unreachable(p_WG, f"out of reach: {told}")
+            text = f"it is {r_3:.4g} m from the shoulder, and the links reach {least:.4g} .. {greatest:.4g} m"
+            raise Unreachable(p_WG, f"out of reach: {text}")
         if r_3 == 0.0:
             raise Unreachable(p_WG, "singular: it is the shoulder itself, where the elbow is folded")
         at_shoulder = (r_3**2 + self.L_2**2 - self.L_3**2) / (2.0 * r_3 * self.L_2)

@@ -132,7 +132,7 @@ class VslModel:
     def tip(self, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> Floats:
         """Return p_WG, shape (3,), m, of the arm as it bends: eq. (10), of q instead of X = f(q)."""
         residual = self.forward.predict(inputs_of(q_meas, p_meas, i_meas))
-        return self.kinematics.forward(q_meas) + turned(residual, float(q_meas[0]))
+        return self.kinematics.forward(q_meas) + rotate_about_z(residual, float(q_meas[0]))
 
     def outside(self, q_ref: Floats, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> bool:
         """Tell whether either residual is asked about what it was not trained on."""
@@ -146,7 +146,7 @@ def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
     return np.concatenate([q, p, i[..., 1:]], axis=-1)
 
 
-def turned(v: Floats, theta_1: float) -> Floats:
+def rotate_about_z(v: Floats, theta_1: float) -> Floats:
     """Return v, shape (3,), turned by theta_1 about z."""
     c, s = math.cos(theta_1), math.sin(theta_1)
     x, y, z = v.tolist()

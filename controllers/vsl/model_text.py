@@ -27,11 +27,11 @@ ANY = -1
 
 _WIDTH = 115
 
-_DEEPEST = 3
+_MAX_DEPTH = 3
 """Lists within lists that are looked into; a matrix has two."""
 
 
-class UnusableModel(ValueError):
+class InvalidModel(ValueError):
     """Text that is no model of this version; `source` says where it came from, `fault` why it cannot be used."""
 
     is_refusal = True
@@ -64,7 +64,7 @@ def read_model(path: Path) -> VslModel:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
-        raise UnusableModel(str(path), f"it cannot be read: {e}") from e
+        raise InvalidModel(str(path), f"it cannot be read: {e}") from e
     return parse_model(text, str(path))
 
 
@@ -77,20 +77,20 @@ def parse_model(text: str, source: str) -> VslModel:
     try:
         content: object = json.loads(text)
     except (ValueError, RecursionError) as e:
-        raise UnusableModel(source, f"it is not JSON: {e}") from e
+        raise InvalidModel(source, f"it is not JSON: {e}") from e
     reader = _Reader(source)
     whole = reader.table(content, "the file")
     if whole.get("format") != FORMAT:
-        raise UnusableModel(source, f"its format is {whole.get('format')!r}, not {FORMAT!r}")
+        raise InvalidModel(source, f"its format is {whole.get('format')!r}, not {FORMAT!r}")
     if whole.get("version") != VERSION:
-        raise UnusableModel(source, f"its version is {whole.get('version')!r}; this program reads version {VERSION}")
+        raise InvalidModel(source, f"its version is {whole.get('version')!r}; this program reads version {VERSION}")
     links = reader.table(reader.entry(whole, "links"), "links")
     L_1, L_2, L_3 = (reader.numbers(links, "links", name, ()).item() for name in ("L_1", "L_2", "L_3"))
     elbow = reader.entry(links, "elbow", "links")
     if elbow not in ("UP", "DOWN"):
-        raise UnusableModel(source, f"links.elbow is {elbow!r}, not 'UP' or 'DOWN'")
+        raise InvalidModel(source, f"links.elbow is {elbow!r}, not 'UP' or 'DOWN'")
     if min(L_2, L_3) <= 0.0:
-        raise UnusableModel(source, "links.L_2 and links.L_3 must be above 0")
+        raise InvalidModel(source, "links.L_2 and links.L_3 must be above 0")
     return VslModel(
         inverse=reader.cubic(whole, "inverse", INVERSE_INPUTS),
         forward=reader.cubic(whole, "forward", FORWARD_INPUTS),
@@ -107,44 +107,44 @@ class _Reader:
 
     def table(self, value: object, name: str) -> dict[str, Any]:
         if not isinstance(value, dict):
-            raise UnusableModel(self._source, f"{name} must be an object, not {type(value).__name__}")
+            raise InvalidModel(self._source, f"{name} must be an object, not {type(value).__name__}")
         return cast("dict[str, Any]", value)
 
     def entry(self, table: dict[str, Any], key: str, of: str = "the file") -> Any:
         if key not in table:
-            raise UnusableModel(self._source, f"{of} has no {key!r}")
+            raise InvalidModel(self._source, f"{of} has no {key!r}")
         return table[key]
 
     def numbers(self, table: dict[str, Any], of: str, key: str, shape: tuple[int, ...]) -> Floats:
         """Return finite numbers of a shape, whose extents may be ANY."""
         value = self.entry(table, key, of)
-        if not _all_numbers(value, _DEEPEST):
-            raise UnusableModel(self._source, f"{of}.{key} must be made of finite numbers")
+        if not _all_numbers(value, _MAX_DEPTH):
+            raise InvalidModel(self._source, f"{of}.{key} must be made of finite numbers")
         try:
             array = np.array(value, dtype=np.float64)
         except ValueError as e:
-            raise UnusableModel(self._source, f"{of}.{key}: its rows differ in length") from e
+            raise InvalidModel(self._source, f"{of}.{key}: its rows differ in length") from e
         if array.ndim != len(shape) or any(w not in (ANY, n) for n, w in zip(array.shape, shape, strict=True)):
             wanted = ", ".join("any" if w == ANY else str(w) for w in shape)
-            raise UnusableModel(self._source, f"{of}.{key} has the shape {list(array.shape)}, not [{wanted}]")
+            raise InvalidModel(self._source, f"{of}.{key} has the shape {list(array.shape)}, not [{wanted}]")
         return array
 
     def cubic(self, whole: dict[str, Any], name: str, inputs: tuple[str, ...]) -> Cubic:
         """Return one of the two learned residuals."""
         table = self.table(self.entry(whole, name), name)
         if (found := self.entry(table, "inputs", name)) != list(inputs):
-            raise UnusableModel(self._source, f"{name}.inputs are {found}, not {list(inputs)}")
+            raise InvalidModel(self._source, f"{name}.inputs are {found}, not {list(inputs)}")
         n = len(inputs)
         powers = np.transpose(self.numbers(table, name, "powers", (n, ANY)))
         if np.any(powers != np.floor(powers)) or np.any(powers < 0.0) or np.any(np.sum(powers, axis=1) > DEGREE):
             fault = f"{name}.powers must be whole numbers from 0, {DEGREE} at most in a column"
-            raise UnusableModel(self._source, fault)
+            raise InvalidModel(self._source, fault)
         scale = self.numbers(table, name, "scale", (n,))
         if np.any(scale <= 0.0):
-            raise UnusableModel(self._source, f"{name}.scale must be above 0")
+            raise InvalidModel(self._source, f"{name}.scale must be above 0")
         hull = self.numbers(table, name, "hull", (len(hull_directions(n)),))
         if np.any(hull[0 : 2 * n : 2] < -hull[1 : 2 * n : 2]):
-            raise UnusableModel(self._source, f"{name}.hull is empty: an upper side lies below its lower one")
+            raise InvalidModel(self._source, f"{name}.hull is empty: an upper side lies below its lower one")
         coefficients = np.transpose(self.numbers(table, name, "coefficients", (VALUES, len(powers))))
         return Cubic(
             mean=self.numbers(table, name, "mean", (n,)),

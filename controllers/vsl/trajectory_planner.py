@@ -12,12 +12,12 @@ import numpy as np
 
 from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics, place
 from handover.controllers.vsl.paths import Path, Segment, segments_of
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
 
-__all__ = ["Elbow", "Inputs", "Outputs", "Params", "Path", "TrajectoryPlanner", "UnusablePath"]
+__all__ = ["Elbow", "Inputs", "InvalidPath", "Outputs", "Params", "Path", "TrajectoryPlanner"]
 
 _MARGIN = 0.001
 """How near to a singularity a path may come, m (assumed): there a joint turns about seven times faster than usual."""
@@ -26,7 +26,7 @@ _PERIOD = Fraction(1, 50)  # s
 _SAME_TIME = 1e-9  # s, what sums of intervals lose
 
 
-class UnusablePath(Refusal):
+class InvalidPath(InvalidParameters):
     """A path that the arm cannot follow; `faults` names the first bad point of each segment."""
 
     block = "TrajectoryPlanner"
@@ -102,7 +102,7 @@ class TrajectoryPlanner:
         segments = segments_of(p.path, p.x_0, p.x_g)
         faults = parameter_faults(p) or _faults(segments, p, self._kinematics)
         if faults:
-            raise UnusablePath(faults)
+            raise InvalidPath(faults)
         self._points: list[Floats] = []
         self._q: list[Floats] = []
         self._qd: list[Floats] = []

@@ -77,11 +77,11 @@ class DifferentiableBlock(Block, Protocol):
         ...
 
 
-MOST_EVENTS = 1000
+MAX_EVENTS = 1000
 """Most events in a row at one instant."""
 
 
-class UnfitAdvance(ValueError):
+class InvalidAdvance(ValueError):
     """A block's `advance` went backwards, or farther than it was to."""
 
     def __init__(self, block: str, reached: float, dt: float) -> None:
@@ -89,11 +89,11 @@ class UnfitAdvance(ValueError):
         self.reached, self.dt = reached, dt
 
 
-class EndlessEvents(RuntimeError):
+class TooManyEvents(RuntimeError):
     """A block has one event after the other without time passing."""
 
     def __init__(self, block: str, t: float) -> None:
-        super().__init__(f"{block} has had {MOST_EVENTS} events at t = {t!r} s; it must come to rest, or get on")
+        super().__init__(f"{block} has had {MAX_EVENTS} events at t = {t!r} s; it must come to rest, or get on")
         self.t = t
 
 
@@ -140,19 +140,19 @@ def step_through_events(block: EventfulBlock, t: float, dt: float, u: Any) -> An
         left = dt - passed
         reached, y = block.advance(t + passed, left, u)
         if not 0.0 <= reached <= left:
-            raise UnfitAdvance(type(block).__name__, reached, left)
+            raise InvalidAdvance(type(block).__name__, reached, left)
         passed += reached
         if reached == left:
             return y
         idle = 0 if reached > 0.0 else idle + 1
-        if idle > MOST_EVENTS:
-            raise EndlessEvents(type(block).__name__, t + passed)
+        if idle > MAX_EVENTS:
+            raise TooManyEvents(type(block).__name__, t + passed)
         y = block.handle_event(t + passed, u)
         if passed >= dt:
             return y
 
 
-class Refusal(ValueError):
+class InvalidParameters(ValueError):
     """Parameters of which a block cannot be made, or inputs that it cannot take; nothing has changed.
 
     An FMU's log tells a refusal in one line, with no traceback. Subclasses name their block.

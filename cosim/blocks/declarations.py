@@ -45,10 +45,10 @@ def start_fault(v: Variable) -> str:
     if v.enumeration is not None:
         first = next(iter(v.enumeration))
         wanted = f"an item of {v.enumeration.__name__}, such as {v.enumeration.__name__}.{first.name}"
-        return "" if isinstance(start, v.enumeration) else f"start {_told(start)} is not {wanted}"
+        return "" if isinstance(start, v.enumeration) else f"start {_text(start)} is not {wanted}"
     types, wanted = _TYPES[v.kind]
     fits = isinstance(start, types) and (v.kind is Kind.BOOLEAN or not isinstance(start, bool))
-    return "" if fits else f"start {_told(start)} is not {wanted}"
+    return "" if fits else f"start {_text(start)} is not {wanted}"
 
 
 def _array_fault(start: Any, shape: tuple[int, ...]) -> str:
@@ -57,7 +57,7 @@ def _array_fault(start: Any, shape: tuple[int, ...]) -> str:
     except (TypeError, ValueError):
         given = None
     if given is None:
-        return f"start {_told(start)} is not an array of numbers, such as np.zeros({shape})"
+        return f"start {_text(start)} is not an array of numbers, such as np.zeros({shape})"
     return f"start has the shape {given} where {shape} is declared" if given != shape else ""
 
 
@@ -66,9 +66,9 @@ def _shape(start: Any) -> tuple[int, ...]:
     return np.shape(start) if getattr(start, "dtype", None) == np.uint8 else np.asarray(start, dtype=np.float64).shape
 
 
-def _told(value: Any) -> str:
-    told = repr(value)
-    return told if len(told) < 80 else told[:77] + "..."
+def _text(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 80 else text[:77] + "..."
 
 
 class DeclarationError(TypeError):
@@ -86,8 +86,8 @@ def declared_variables(owner: type[Any], causality: Causality, block: str = "") 
         DeclarationError: see `describe`.
     """
     hints = typing.get_type_hints(owner, include_extras=True)
-    told = f"{block}: {owner.__name__}" if block else owner.__name__
-    return tuple(_variable(told, f, hints[f.name], causality) for f in dataclasses.fields(owner))
+    text = f"{block}: {owner.__name__}" if block else owner.__name__
+    return tuple(_variable(text, f, hints[f.name], causality) for f in dataclasses.fields(owner))
 
 
 def _variable(owner: str, field: "dataclasses.Field[Any]", hint: Any, causality: Causality) -> Variable:
@@ -142,7 +142,7 @@ def _with_width(owner: str, made: Variable) -> Variable:
             continue
         for entry in np.ravel(value).tolist():
             if not width.holds(entry):
-                raise DeclarationError(owner, made.name, f"{what} {entry!r} does not fit {width.told}")
+                raise DeclarationError(owner, made.name, f"{what} {entry!r} does not fit {width.range_text}")
         rounded[what] = np.float32(value).astype(float) if np.ndim(value) else width.rounded(value)
     return dataclasses.replace(made, width=width, **rounded)
 

@@ -106,7 +106,7 @@ _UNIT_TOLERANCE = 1e-6
 _NEAR = 0.02  # m; what is nearer to the lens, or behind it, has no picture
 
 
-class UnusableCalibration(ValueError):
+class InvalidCalibration(ValueError):
     """A camera's calibration has no meaning: quaternion not of unit length, or focal length not positive."""
 
     def __init__(self, camera: str, quantity: str, value: Floats, wanted: str) -> None:
@@ -135,11 +135,11 @@ class Pinhole:
         quantities = {"p_WC": p_WC, "q_WC": q_WC, "intrinsics": intrinsics, "distortion": distortion}
         for quantity, value in quantities.items():
             if not np.isfinite(value).all():
-                raise UnusableCalibration(name, quantity, value, "finite")
+                raise InvalidCalibration(name, quantity, value, "finite")
         if abs(float(np.linalg.norm(q_WC)) - 1.0) > _UNIT_TOLERANCE:
-            raise UnusableCalibration(name, "q_WC", q_WC, "a quaternion of unit length, scalar first")
+            raise InvalidCalibration(name, "q_WC", q_WC, "a quaternion of unit length, scalar first")
         if min(intrinsics[:2]) <= 0.0:
-            raise UnusableCalibration(name, "intrinsics", intrinsics, "(fx, fy, cx, cy) with fx and fy positive")
+            raise InvalidCalibration(name, "intrinsics", intrinsics, "(fx, fy, cx, cy) with fx and fy positive")
         self.p_WC = np.array(p_WC)
         self.R_WC = rotation_of(q_WC)
         self.R_CW = np.transpose(self.R_WC)

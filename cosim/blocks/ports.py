@@ -58,7 +58,7 @@ class Width(enum.Enum):
         return int(np.iinfo(self.value.lower()).max)
 
     @property
-    def told(self) -> str:
+    def range_text(self) -> str:
         """Name and range, for messages."""
         return f"{self.value} (from {self.lowest!r} to {self.highest!r})"
 

@@ -13,23 +13,23 @@ def fault_of(port: Declared, value: Any) -> str | None:
     """Return what is wrong with a value for a port, saying what would be right, or None."""
     if port.kind in (Kind.STRING, Kind.BINARY):
         wanted = str if port.kind is Kind.STRING else (bytes, bytearray, memoryview)
-        return None if isinstance(value, wanted) else f"{_told(value)} is not a {port.kind.value}"
+        return None if isinstance(value, wanted) else f"{_text(value)} is not a {port.kind.value}"
     if port.kind is Kind.BOOLEAN and not isinstance(value, (bool, np.bool_)):
-        return f"{_told(value)} is neither true nor false"
+        return f"{_text(value)} is neither true nor false"
     if port.kind is Kind.ENUMERATION and isinstance(value, str):
         if value.upper() not in [name.upper() for name, _ in port.items]:
-            return f"{_told(value)} is none of {', '.join(name.lower() for name, _ in port.items)}"
+            return f"{_text(value)} is none of {', '.join(name.lower() for name, _ in port.items)}"
         return None
     try:
         numbers = numbers_of(port, value)
     except (TypeError, ValueError):
-        return f"{_told(value)} is not {_wanted(port)}"
+        return f"{_text(value)} is not {_wanted(port)}"
     if not np.all(np.isfinite(numbers)):
-        return f"{_told(value)} is not finite"
+        return f"{_text(value)} is not finite"
     if port.kind is not Kind.REAL and not np.all(numbers == np.round(numbers)):
-        return f"{_told(value)} is not {_wanted(port)}"
+        return f"{_text(value)} is not {_wanted(port)}"
     if port.kind is Kind.ENUMERATION and int(numbers[0]) not in [v for _, v in port.items]:
-        return f"{_told(value)} is none of {', '.join(f'{v} ({n.lower()})' for n, v in port.items)}"
+        return f"{_text(value)} is none of {', '.join(f'{v} ({n.lower()})' for n, v in port.items)}"
     return _range_fault(port, value, numbers) or _width_fault(port, value, numbers)
 
 
@@ -80,15 +80,15 @@ def _range_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | Non
     low, high = port.minimum, port.maximum
     if (low is None or np.all(numbers >= low)) and (high is None or np.all(numbers <= high)):
         return None
-    return f"{_told(value)} is out of range: {range_of(port)}"
+    return f"{_text(value)} is out of range: {range_of(port)}"
 
 
 def _width_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | None:
     if port.width is None or all(port.width.holds(number) for number in numbers.tolist()):
         return None
-    return f"{_told(value)} does not fit {port.width.told}"
+    return f"{_text(value)} does not fit {port.width.range_text}"
 
 
-def _told(value: Any) -> str:
-    told = repr(value.tolist() if isinstance(value, np.ndarray) else value)
-    return told if len(told) < 80 else told[:77] + "..."
+def _text(value: Any) -> str:
+    text = repr(value.tolist() if isinstance(value, np.ndarray) else value)
+    return text if len(text) < 80 else text[:77] + "..."

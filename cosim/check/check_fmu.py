@@ -21,7 +21,7 @@ from handover.cosim.check.description_checks import (
     variable_findings,
 )
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section, fault, warning
-from handover.cosim.check.isolated_process import watch
+from handover.cosim.check.isolated_process import run_isolated
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
 from handover.cosim.fmu.fmpy_edge import (
@@ -47,18 +47,18 @@ _SETS = re.compile(
 _CURES = {
     "Exactly one independent variable must be defined.": 'one Float64 with causality="independent" is wanted, the time'
 }
-_MOST_NAMES = 20
+_MAX_NAMES = 20
 _OUTPUTS = "ModelStructure/Outputs must have exactly one entry"  # said by structure_checks, which names them
 
 
 def standard_findings(path: Path, own: Sequence[Finding]) -> list[Finding]:
     """Return what FMPy's validation finds in an FMU that may be read; `own` is what has been found without it."""
     problems, stopped = problems_of(path)
-    told = " ".join(f.line for f in own)
+    sentence = " ".join(f.line for f in own)
     findings = [
         _finding(p)
         for p in dict.fromkeys(problems)
-        if not (p.startswith(_OUTPUTS) and "ModelStructure does not list" in told)
+        if not (p.startswith(_OUTPUTS) and "ModelStructure does not list" in sentence)
     ]
     if stopped and not findings and not own:
         findings.append(fault(f"the description cannot be understood: {stopped}", where=DESCRIPTION))
@@ -88,8 +88,8 @@ def _names(text: str) -> set[str]:
 def _listed(names: set[str]) -> str:
     """Return names in the order in which people count, y2 before y10."""
     ordered = sorted(names, key=lambda name: [part.zfill(9) for part in re.split(r"(\d+)", name)])
-    more = f" and {len(ordered) - _MOST_NAMES} more" if len(ordered) > _MOST_NAMES else ""
-    return ", ".join(ordered[:_MOST_NAMES]) + more
+    more = f" and {len(ordered) - _MAX_NAMES} more" if len(ordered) > _MAX_NAMES else ""
+    return ", ".join(ordered[:_MAX_NAMES]) + more
 
 
 def _shortened(text: str) -> str:
@@ -162,7 +162,7 @@ def _format_findings(archive: FmuArchive, library: PurePosixPath, fmi: int, *, h
 _STEP = 0.01  # seconds, where the FMU asks for none
 
 
-class _NotTried(Exception):
+class _Skipped(Exception):
     """A part of a check has nothing to go by; the message says where the reason is told."""
 
 
@@ -172,25 +172,25 @@ def check_fmu(path: Path, timeout: float) -> CheckReport:
     with tempfile.TemporaryDirectory(prefix="handover-check-", ignore_cleanup_errors=True) as scratch:
         check = _Check(path, timeout, Path(scratch))
         reason = ""
-        for name, carry_out in check.parts:
+        for name, run_part in check.parts:
             if reason:
                 sections.append(Section(name, reason, reached=False))
                 continue
-            section = _section(name, carry_out)
+            section = _section(name, run_part)
             sections.append(section)
             if section.level is Level.FAULT and not check.goes_on:
                 reason = f"not reached: see {name}"
     return CheckReport(path, tuple(sections))
 
 
-def _section(name: str, carry_out: Callable[[], tuple[str, list[Finding]]]) -> Section:
+def _section(name: str, run_part: Callable[[], tuple[str, list[Finding]]]) -> Section:
     try:
-        told, findings = carry_out()
-    except _NotTried as e:
+        text, findings = run_part()
+    except _Skipped as e:
         return Section(name, str(e), reached=False)
     except InvalidFmu as e:
-        told, findings = "", [fault(e.fault)]
-    return Section(name, told, tuple(findings))
+        text, findings = "", [fault(e.fault)]
+    return Section(name, text, tuple(findings))
 
 
 class _Check:
@@ -225,10 +225,10 @@ class _Check:
         own = [*variable_findings(self.root, self.fmi, variables), *structure_findings(self.root, self.fmi, variables)]
         self.goes_on = True
         n = len(variables)
-        told = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"
+        text = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"
         findings = [*standard_findings(self.path, own), *own]
         self.is_described = all(f.level is not Level.FAULT for f in findings)
-        return told, findings
+        return text, findings
 
     def _interface(self) -> tuple[str, list[Finding]]:
         findings = list(interface_findings(self.root, self.fmi))
@@ -237,8 +237,8 @@ class _Check:
         self.interface = interface or self.root
         self.identifier = self.interface.get("modelIdentifier")
         step = default_step(self.root)
-        told = f"co-simulation, {'steps of ' + f'{step:g} s' if step else 'no step size given'}"
-        return told if interface else "no co-simulation", findings
+        text = f"co-simulation, {'steps of ' + f'{step:g} s' if step else 'no step size given'}"
+        return text if interface else "no co-simulation", findings
 
     def _binaries(self) -> tuple[str, list[Finding]]:
         findings = list(binary_findings(self.archive, self.fmi, self.identifier))
@@ -251,15 +251,15 @@ class _Check:
         self.archive.unpack(self.folder)
         functions = required_functions(self.fmi)
         task = {"library": str(self.folder / library_path(self.fmi, self.identifier)), "functions": functions}
-        watched = watch("handover.cosim.check.load_probe", task, self.scratch, self.timeout)
-        return f"{len(functions)} functions on {platform_folder(self.fmi)}", watched.findings
+        report = run_isolated("handover.cosim.check.load_probe", task, self.scratch, self.timeout)
+        return f"{len(functions)} functions on {platform_folder(self.fmi)}", report.findings
 
     def _run(self) -> tuple[str, list[Finding]]:
         try:
             read_description(self.path)
         except InvalidFmu as e:
             if not self.is_described:
-                raise _NotTried("not tried: its description cannot be used, see there") from e
+                raise _Skipped("not tried: its description cannot be used, see there") from e
             return "", [fault(e.fault)]
         step = default_step(self.root) or _STEP
         capabilities = dict(_capabilities(self.interface, self.fmi))
@@ -270,12 +270,12 @@ class _Check:
             "step": step,
             **capabilities,
         }
-        watched = watch("handover.cosim.check.smoke_run", task, self.scratch, self.timeout)
-        parts = [f"{watched.facts['steps']} steps of {step:g} s"] if "steps" in watched.facts else []
-        if "ended" in watched.facts:
+        report = run_isolated("handover.cosim.check.smoke_run", task, self.scratch, self.timeout)
+        parts = [f"{report.facts['steps']} steps of {step:g} s"] if "steps" in report.facts else []
+        if "ended" in report.facts:
             done = ("state restored", capabilities["keeps_state"]), ("second instance", capabilities["allows_two"])
             parts += [what for what, was_done in (*done, ("reset", True)) if was_done]
-        return ", ".join(parts) or "stopped", watched.findings
+        return ", ".join(parts) or "stopped", report.findings
 
 
 def _capabilities(interface: XmlElement, fmi: int) -> Iterator[tuple[str, bool]]:

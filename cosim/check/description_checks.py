@@ -30,7 +30,7 @@ def interface_findings(root: XmlElement, fmi: int) -> Iterator[Finding]:
         yield warning(f"a draft of the standard, {version}", cure="its functions may differ from those of FMI 3.0")
     co_simulation = next(root.named("CoSimulation"), None)
     if co_simulation is None:
-        kinds = [told for tag, told in _KINDS.items() if next(root.named(tag), None) is not None]
+        kinds = [value for tag, value in _KINDS.items() if next(root.named(tag), None) is not None]
         yield fault(
             f"an FMU for {' and '.join(kinds) or 'nothing'}, without a co-simulation interface",
             where="modelDescription.xml",
@@ -104,20 +104,22 @@ def structure_findings(root: XmlElement, fmi: int, variables: Sequence[Described
         unknowns = [
             u for group in root.named("ModelStructure") for part in group.children for u in part.named("Unknown")
         ]
-        key, told = "index", f"there are variables 1 to {len(valid)}"
+        key, entries = "index", f"there are variables 1 to {len(valid)}"
     else:
         valid = {v.reference for v in variables}
         unknowns = [u for group in root.named("ModelStructure") for u in group.children if u.tag in _FMI3_UNKNOWNS]
-        key, told = "valueReference", "no variable has it"
+        key, entries = "valueReference", "no variable has it"
     for u in unknowns:
         for name in (key, "dependencies"):
             for missing in (r for r in u.get(name).split() if r not in valid):
                 where = f"ModelStructure (line {u.line})"
-                yield fault(f"{name} {missing} leads to no variable", where=where, cure=told)
+                yield fault(f"{name} {missing} leads to no variable", where=where, cure=entries)
     for v in variables:
         derivative = v.values.get("derivative")
         if derivative and derivative not in valid:
-            yield fault(f"it is the derivative of {derivative}, which leads to no variable", where=v.where, cure=told)
+            yield fault(
+                f"it is the derivative of {derivative}, which leads to no variable", where=v.where, cure=entries
+            )
     yield from _unlisted_outputs(root, fmi, variables)
 
 
@@ -195,8 +197,8 @@ def _start_findings(
         return
     n = math.prod(shape) if shape is not None else None
     if n is not None and len(v.starts) not in (1, n):
-        told = f"{len(v.starts)} start values for {n} entries, shape [{','.join(map(str, shape or ()))}]"
-        yield fault(told, where=v.where, cure="one for each entry, or one for all")
+        line = f"{len(v.starts)} start values for {n} entries, shape [{','.join(map(str, shape or ()))}]"
+        yield fault(line, where=v.where, cure="one for each entry, or one for all")
     low, high = _range(v, declared)
     for text in v.starts:
         try:

@@ -73,7 +73,7 @@ class Section:
     """
 
     name: str
-    told: str
+    summary: str
     findings: tuple[Finding, ...] = ()
     reached: bool = True
 
@@ -113,7 +113,7 @@ class CheckReport:
                 {
                     "name": s.name,
                     "result": s.level.name.lower() if s.reached else "not reached",
-                    "told": s.told,
+                    "told": s.summary,
                     "findings": [
                         {"level": f.level.name.lower(), "where": f.where, "what": f.what, "cure": f.cure, "log": f.log}
                         for f in s.findings

@@ -22,7 +22,7 @@ task = json.loads(sys.argv[1])
 sys.path[:] = task["path"]
 importlib.import_module(task["module"]).main(task)
 """
-_MOST_LINES = 8
+_MAX_LINES = 8
 _MEANINGS = {
     "SIGSEGV": "it used memory that is not its own",
     "SIGBUS": "it used memory that is not there",
@@ -35,7 +35,7 @@ _WINDOWS = {0xC0000005: "SIGSEGV", 0xC000001D: "SIGILL", 0xC0000094: "SIGFPE", 0
 
 
 @dataclass
-class Watched:
+class ProcessReport:
     """What a process told, and how it ended.
 
     Attributes:
@@ -46,10 +46,10 @@ class Watched:
 
     findings: list[Finding] = field(default_factory=list[Finding])
     facts: dict[str, Any] = field(default_factory=dict[str, Any])
-    ended: bool = False
+    finished: bool = False
 
 
-def watch(module: str, task: Mapping[str, Any], folder: Path, timeout: float) -> Watched:
+def run_isolated(module: str, task: Mapping[str, Any], folder: Path, timeout: float) -> ProcessReport:
     """Run a module's `main` with a task in a process of its own, for at most `timeout` seconds; `folder` is scratch."""
     name = module.rpartition(".")[2]
     journal, output = folder / f"{name}.jsonl", folder / f"{name}.txt"
@@ -69,7 +69,7 @@ def watch(module: str, task: Mapping[str, Any], folder: Path, timeout: float) ->
             code = None
         finally:
             _end(process)
-    return _told(journal, output, code, timeout)
+    return _report(journal, output, code, timeout)
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
@@ -81,41 +81,41 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
     process.wait()
 
 
-def _told(journal: Path, output: Path, code: int | None, timeout: float) -> Watched:
-    watched = Watched()
+def _report(journal: Path, output: Path, code: int | None, timeout: float) -> ProcessReport:
+    watched = ProcessReport()
     call, t = "the process's start", None
     logged: list[str] = []
     for line in journal.read_text(encoding="utf-8").splitlines():
         try:
-            told: dict[str, Any] = json.loads(line)
+            data: dict[str, Any] = json.loads(line)
         except ValueError:  # cut off where the process was ended
             continue
-        if "call" in told:
-            call, t = str(told["call"]), told["t"]
-        elif "log of the unit" in told:
-            logged = [*logged, *str(told["log of the unit"]).splitlines()][-_MOST_LINES:]
-        elif "facts" in told:
-            watched.facts.update(told["facts"])
-        elif "end" in told:
-            watched.ended = True
+        if "call" in data:
+            call, t = str(data["call"]), data["t"]
+        elif "log of the unit" in data:
+            logged = [*logged, *str(data["log of the unit"]).splitlines()][-_MAX_LINES:]
+        elif "facts" in data:
+            watched.facts.update(data["facts"])
+        elif "end" in data:
+            watched.finished = True
         else:
-            watched.findings.append(_finding(told))
+            watched.findings.append(_finding(data))
     at = call if t is None else f"{call} at t = {t:.6g} s"
     if code is None:
         cure = "if it only needs longer: --timeout"
         watched.findings.append(
             fault(f"{at} was not done after {timeout:g} s", cure=cure, log=(*logged, *_last_lines(output)))
         )
-    elif not watched.ended:
+    elif not watched.finished:
         watched.findings.append(_end_of_process(at, code, (*logged, *_last_lines(output))))
     elif code != 0:
         watched.findings.append(warning(f"{_how(code)} at the end of its process", cure="after everything was freed"))
     return watched
 
 
-def _finding(told: Mapping[str, Any]) -> Finding:
-    level, log = Level(told["level"]), tuple(told["log"])
-    return Finding(level=level, what=told["what"], where=told["where"], cure=told["cure"], log=log)
+def _finding(data: Mapping[str, Any]) -> Finding:
+    level, log = Level(data["level"]), tuple(data["log"])
+    return Finding(level=level, what=data["what"], where=data["where"], cure=data["cure"], log=log)
 
 
 def _end_of_process(at: str, code: int, lines: tuple[str, ...]) -> Finding:
@@ -143,10 +143,10 @@ def _last_lines(output: Path) -> tuple[str, ...]:
         file.seek(max(0, file.tell() - 8192))
         lines = file.read().decode("utf-8", "replace").splitlines()
     kept = [line.rstrip() for line in lines if line.strip()]
-    return tuple(line[:300] for line in kept[-_MOST_LINES:])
+    return tuple(line[:300] for line in kept[-_MAX_LINES:])
 
 
-_MOST_OF_A_MESSAGE = 2000
+_MAX_MESSAGE_LENGTH = 2000
 
 
 class Journal:
@@ -169,9 +169,9 @@ class Journal:
         """Note what the unit logged; of a unit that logs without end, the beginning."""
         if self._room > 0:
             self._room -= len(message)
-            self._write({"log of the unit": message[:_MOST_OF_A_MESSAGE]})
+            self._write({"log of the unit": message[:_MAX_MESSAGE_LENGTH]})
 
-    def tells(self, **facts: Any) -> None:
+    def record(self, **facts: Any) -> None:
         """Note facts by name."""
         self._write({"facts": facts})
 

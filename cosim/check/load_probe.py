@@ -30,7 +30,7 @@ def main(task: Mapping[str, Any]) -> None:
         missing = [name for name in task["functions"] if not hasattr(loaded, name)]
         for finding in _missing_findings(missing, len(task["functions"])):
             journal.found(finding)
-        journal.tells(loaded=True)
+        journal.record(loaded=True)
     journal.begins("unloading the library")
     journal.ends()
 

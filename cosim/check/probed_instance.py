@@ -113,10 +113,10 @@ class ProbedInstance(Instance):
     def _as_bytes(self, buffer: Any) -> Any:
         return ctypes.cast(buffer, ctypes.POINTER(ctypes.c_char if self._fmi == 2 else ctypes.c_uint8))
 
-    def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
+    def _set_or_get(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:
             self._journal.begins(f"{buffer.name} of {', '.join(list(buffer.views)[:5])}", self.time)
-            super()._carry_out([buffer])
+            super()._set_or_get([buffer])
 
     def _set_one(self, port: FmuPort, value: Any) -> None:
         self._journal.begins(f"setting {port.name}")

@@ -18,7 +18,7 @@ from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 
 STEPS = 10
-_MOST_LINES = 24  # of a unit's log
+_MAX_LINES = 24  # of a unit's log
 _REPEATED = 5  # steps that are done again from a state
 
 
@@ -45,14 +45,14 @@ class SmokeRun:
     keeps_state: bool
     serialises: bool
     allows_two: bool
-    _told: set[str] = field(default_factory=set[str])
+    _reported: set[str] = field(default_factory=set[str])
 
-    def carry_out(self) -> None:
+    def run_all(self) -> None:
         """Do it all, until a call fails; tell the journal what is found."""
         try:
             unit = self._instance("unit")
         except InvalidFmu as e:
-            self.journal.found(fault(e.fault, where="instantiation", log=_told(e.log)))
+            self.journal.found(fault(e.fault, where="instantiation", log=_reported(e.log)))
             return
         try:
             self._run(unit)
@@ -60,19 +60,19 @@ class SmokeRun:
             self.journal.found(failure(e))
         except InvalidFmu as e:
             what = f"a second instance beside the first: {e.fault}"
-            self.journal.found(fault(what, where="instantiation", log=_told(e.log)))
+            self.journal.found(fault(what, where="instantiation", log=_reported(e.log)))
         finally:
             unit.free()
 
     def _run(self, unit: ProbedInstance) -> None:
         unit.start(self.start)
         at_start = unit.seen()
-        self._tell_values(unit)
+        self._check_values(unit)
         for _ in range(STEPS - _REPEATED):
             unit.advance(self.step)
-            self._tell_values(unit)
+            self._check_values(unit)
         steps = self._steps_from_a_state(unit) if self.keeps_state else self._steps(unit)
-        self.journal.tells(steps=STEPS, step=self.step)
+        self.journal.record(steps=STEPS, step=self.step)
         if self.allows_two:
             self._beside(unit, at_start, steps)
         unit.reset()
@@ -85,7 +85,7 @@ class SmokeRun:
         )
         unit.advance(self.step)
         unit.end()
-        self.journal.tells(ended=True)
+        self.journal.record(ended=True)
 
     def _instance(self, name: str) -> ProbedInstance:
         return ProbedInstance(name, self.description, self.folder, self.journal)
@@ -94,7 +94,7 @@ class SmokeRun:
         seen: list[dict[str, bytes]] = []
         for _ in range(_REPEATED):
             unit.advance(self.step)
-            self._tell_values(unit)
+            self._check_values(unit)
             seen.append(unit.seen())
         return seen
 
@@ -129,13 +129,13 @@ class SmokeRun:
         second = self._instance("second")
         try:
             second.start(self.start)
-            told = "a second instance"
-            if not self._compare(at_start, second.seen(), told, "it starts with other outputs than the first"):
+            text = "a second instance"
+            if not self._compare(at_start, second.seen(), text, "it starts with other outputs than the first"):
                 for _ in range(STEPS - _REPEATED):
                     second.advance(self.step)
-                self._compare(steps[-1], self._steps(second)[-1], told, "its outputs differ from the first's")
+                self._compare(steps[-1], self._steps(second)[-1], text, "its outputs differ from the first's")
             unit.get_outputs()
-            self._compare(before, unit.seen(), told, "its steps changed the first one's outputs", tell=fault)
+            self._compare(before, unit.seen(), text, "its steps changed the first one's outputs", tell=fault)
             second.end()
         finally:
             second.free()
@@ -157,24 +157,24 @@ class SmokeRun:
             self.journal.found(tell(f"{what}: {names}", where=where, cure=cure))
         return bool(different)
 
-    def _tell_values(self, unit: ProbedInstance) -> None:
+    def _check_values(self, unit: ProbedInstance) -> None:
         """Tell of outputs with values that cannot be, of each the first time."""
         for name, views in unit.y.items():
             for finding in (
-                () if name in self._told else _value_findings(self.description.outputs[name], views[0], unit.time)
+                () if name in self._reported else _value_findings(self.description.outputs[name], views[0], unit.time)
             ):
-                self._told.add(name)
+                self._reported.add(name)
                 self.journal.found(finding)
 
 
 def failure(e: UnitFailure) -> Finding:
     """Return a failed call as a finding, with the unit's log."""
-    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=_told(e.log))
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=_reported(e.log))
 
 
-def _told(log: Sequence[str]) -> tuple[str, ...]:
+def _reported(log: Sequence[str]) -> tuple[str, ...]:
     """Return the end of a unit's log: of a traceback, where it ended and what was raised."""
-    return tuple(log_lines(log)[-_MOST_LINES:])
+    return tuple(log_lines(log)[-_MAX_LINES:])
 
 
 def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
@@ -205,6 +205,6 @@ def main(task: Mapping[str, Any]) -> None:
         serialises=task["serialises"],
         allows_two=task["allows_two"],
     )
-    run.carry_out()
+    run.run_all()
     journal.begins("unloading the library")
     journal.ends()

@@ -24,10 +24,10 @@ STANDARD_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 _METHODS = (*STANDARD_METHODS, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 _MIB = 1 << 20
-_MOST_FILES = 100_000
-_MOST_BYTES = 16 << 30
+_MAX_FILES = 100_000
+_MAX_BYTES = 16 << 30
 _SUSPECT_BYTES, _SUSPECT_RATIO = 256 * _MIB, 200  # libraries and tables shrink to a tenth, rarely to a hundredth
-_MOST_TOLD = 5
+_MAX_REPORTED = 5
 
 
 def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
@@ -35,7 +35,7 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
     names = [m.orig_filename for m in members]
     plain = {n for n in names if not n.endswith("/")}
     kinds: tuple[tuple[str, Iterable[str]], ...] = (
-        ("paths that lead out of it; they must be relative, with slashes", filter(_leads_out, names)),
+        ("paths that lead out of it; they must be relative, with slashes", filter(_escapes_root, names)),
         ("the same path twice", (n for n, count in Counter(names).items() if count > 1)),
         ("symbolic links or devices; store the files themselves", (m.orig_filename for m in members if _special(m))),
         ("encrypted files; store them without a password", (m.orig_filename for m in members if m.flag_bits & 0x1)),
@@ -53,18 +53,18 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
 
 
 def _size_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
-    if len(members) > _MOST_FILES:
-        return [f"the archive holds {len(members)} files; at most {_MOST_FILES} are unpacked"]
+    if len(members) > _MAX_FILES:
+        return [f"the archive holds {len(members)} files; at most {_MAX_FILES} are unpacked"]
     total = sum(m.file_size for m in members)
-    if total > _MOST_BYTES:
-        return [f"the archive would unpack to {total / 2**30:.0f} GiB; at most {_MOST_BYTES >> 30} GiB are unpacked"]
+    if total > _MAX_BYTES:
+        return [f"the archive would unpack to {total / 2**30:.0f} GiB; at most {_MAX_BYTES >> 30} GiB are unpacked"]
     if total > _SUSPECT_BYTES and total > _SUSPECT_RATIO * size:
-        told = f"{size / _MIB:.1f} MiB would unpack to {total / _MIB:.0f} MiB"
-        return [f"the archive looks like a zip bomb: {told}; at most {_SUSPECT_RATIO} times as much is believed"]
+        text = f"{size / _MIB:.1f} MiB would unpack to {total / _MIB:.0f} MiB"
+        return [f"the archive looks like a zip bomb: {text}; at most {_SUSPECT_RATIO} times as much is believed"]
     return []
 
 
-def _leads_out(name: str) -> bool:
+def _escapes_root(name: str) -> bool:
     windows = "\\" in name or ":" in name  # other systems take these for letters; Windows goes elsewhere
     return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or not name.strip("./")
 
@@ -81,8 +81,8 @@ def _parents(name: str) -> set[str]:
 def listed(names: Iterable[str]) -> str:
     """Return the first of some paths, shortened and without what would steer a terminal."""
     shown = [_shown(n) for n in names]
-    more = f", and {len(shown) - _MOST_TOLD} more" if len(shown) > _MOST_TOLD else ""
-    return ", ".join(shown[:_MOST_TOLD]) + more
+    more = f", and {len(shown) - _MAX_REPORTED} more" if len(shown) > _MAX_REPORTED else ""
+    return ", ".join(shown[:_MAX_REPORTED]) + more
 
 
 def _shown(name: str) -> str:
@@ -95,7 +95,7 @@ NO_FILE_FAULT = "not a regular file"
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError, ValueError)
 
-_MOST_TEXT = 512 * _MIB  # of one XML file
+_MAX_TEXT = 512 * _MIB  # of one XML file
 
 
 class FmuArchive:
@@ -153,7 +153,7 @@ class FmuArchive:
         try:
             with zipfile.ZipFile(self.path) as z:
                 size = z.getinfo(name).file_size
-                if size > _MOST_TEXT:
+                if size > _MAX_TEXT:
                     raise InvalidFmu(self.path, f"{name} is of {size / _MIB:.0f} MiB; at most 512 MiB are read")
                 return z.read(name)
         except _DAMAGE as e:

@@ -204,7 +204,7 @@ def content_of(port: FmuPort, views: Views) -> bytes:
     return views[0].tobytes()
 
 
-class RateBuffer(SignalBuffer):
+class InputDerivatives(SignalBuffer):
     """A buffer for the derivatives of real inputs, per second; calling it sets them all."""
 
     def __init__(self, function: Callable[..., int], component: Any, ports: Sequence[FmuPort]) -> None:

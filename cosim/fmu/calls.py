@@ -118,8 +118,8 @@ def discarded_step(function: Callable[[str], Any], component: Any, t: float, fmi
     reached, ended = ctypes.c_double(t), ctypes.c_int()
     if function("GetRealStatus")(component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) > 1:
         reached.value = t
-    told = function("GetBooleanStatus")(component, _TERMINATED, ctypes.byref(ended))
-    return reached.value, told <= 1 and bool(ended.value)
+    value = function("GetBooleanStatus")(component, _TERMINATED, ctypes.byref(ended))
+    return reached.value, value <= 1 and bool(ended.value)
 
 
 @dataclass(frozen=True)

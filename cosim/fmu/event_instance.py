@@ -12,7 +12,7 @@ from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
 from handover.cosim.fmu.clock_calls import ClockCalls, ClockTimer
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.fmu.failures import UnitEnded
+from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.fmu.loading import load_fmi3
@@ -114,7 +114,7 @@ class EventInstance(Instance):
         again, terminate, _, _, known = self._flags
         self._call("UpdateDiscreteStates", *(ctypes.byref(f) for f in self._flags), ctypes.byref(self._next))
         if terminate.value:
-            raise UnitEnded(self.name, "fmi3UpdateDiscreteStates", t, tuple(self.log))
+            raise UnitTerminated(self.name, "fmi3UpdateDiscreteStates", t, tuple(self.log))
         self.next_event = self._next.value if known.value else None
         for timer in self.timers:
             if timer.clock.name in self.active:
@@ -137,8 +137,8 @@ class EventInstance(Instance):
         self._given = {name: bytes.fromhex(content) for name, content in timing["held"].items()}
         self.next_event, self.in_event_mode = timing["next_event"], timing["in_event_mode"]
         for timer in self.timers:
-            told = timing["ticks"][timer.clock.name]
-            timer.next = None if told is None else Fraction(told)
+            value = timing["ticks"][timer.clock.name]
+            timer.next = None if value is None else Fraction(value)
 
     def _load(self, folder: Path) -> Any:
         d = self.description
@@ -162,19 +162,19 @@ class EventInstance(Instance):
 
     def _set(self, ports: list[FmuPort]) -> None:
         if len(ports) == len(self.u):
-            self._carry_out(self._setters)
+            self._set_or_get(self._setters)
             return
         parts = self._part("Set", ports)
         for part, whole in _pairs(parts, self.u):
             part[:] = whole
-        self._carry_out(parts)
+        self._set_or_get(parts)
 
     def _get(self, ports: list[FmuPort]) -> None:
         if len(ports) == len(self.y):
-            self._carry_out(self._getters)
+            self._set_or_get(self._getters)
             return
         parts = self._part("Get", ports)
-        self._carry_out(parts)
+        self._set_or_get(parts)
         for part, whole in _pairs(parts, self.y):
             whole[:] = part
 

@@ -80,7 +80,7 @@ class NotFinite(UnitFailure):
         return f"gave {self.element} = {self.status}{feeds}"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """Which element has which value; that matters more than what the unit logged."""
         return f"{self.element} = {self.status}"
 
@@ -89,7 +89,7 @@ class NotFinite(UnitFailure):
         return {**super().as_data(), "port": self.port, "element": list(self.index), "value": self.status}
 
 
-class UnitEnded(UnitFailure):
+class UnitTerminated(UnitFailure):
     """The unit asked to end the simulation: FMI 3 `terminateSimulation`, FMI 2 `fmi2Terminated`."""
 
     kind = "ended"
@@ -122,7 +122,7 @@ class UnitHung(UnitFailure):
         return f"did not return within {self.limit:g} s"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """The limit: what the unit logged before has led nowhere."""
         return self.what
 
@@ -138,7 +138,7 @@ class UnitCrashed(UnitFailure):
         return f"unit {self.unit} crashed in {self.call} at t = {self.t:.6g} s: {self.status}"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """How the process ended."""
         return self.status
 
@@ -150,10 +150,10 @@ class UnitCrashed(UnitFailure):
 
 def failure_of(unit: str, call: str, t: float, status: int, log: Sequence[str] = ()) -> UnitFailure:
     """Return the failure that an FMI status above Warning is."""
-    told = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+    found = STATUS[status] if 0 <= status < len(STATUS) else str(status)
     if status == _DISCARD:
         return UnitDiscarded(unit, call, t, log)
-    return (UnitFatal if status == _FATAL else UnitError)(unit, call, t, told, log)
+    return (UnitFatal if status == _FATAL else UnitError)(unit, call, t, found, log)
 
 
 class StepDiscarded(UnitDiscarded):
@@ -174,9 +174,9 @@ class StepDiscarded(UnitDiscarded):
         return f"{super().what}; {self.reason}"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """What the unit logged last, and the reason."""
-        return f"{super().told} ({self.reason})"
+        return f"{super().message} ({self.reason})"
 
 
 class UnsettledEvents(UnitFailure):

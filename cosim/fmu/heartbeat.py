@@ -136,7 +136,7 @@ class Heartbeat:
         self._notes.clear()
         self._notes.append(text)
 
-    def tell_scratch(self, folder: str) -> None:
+    def record_scratch_folder(self, folder: str) -> None:
         """Keep the place of a folder that is to be removed if this process dies."""
         self.tell(scratch=[*self.facts.get("scratch", []), folder])
 
@@ -149,10 +149,10 @@ class Heartbeat:
     def log(self, unit: str, message: str) -> None:
         """Keep what an instance logged; where there is no room, what was logged before is forgotten."""
         for line in message.splitlines():
-            told = f"{unit}\t{line}"
-            if not self._log.append(told):
+            sentence = f"{unit}\t{line}"
+            if not self._log.append(sentence):
                 self._log.clear()
-                self._log.append(told)
+                self._log.append(sentence)
 
     def log_of(self, unit: str) -> tuple[str, ...]:
         """Return the last lines that an instance logged."""
@@ -192,25 +192,25 @@ class _Lines:
         struct.pack_into("<q", self._memory, self._at, 0)
 
 
-class Stillness:
+class StallTimer:
     """Looks at a heartbeat now and then, and adds up the time in which one call did not return.
 
     Of the time between two looks at most `most` seconds count: if more has passed, it was the whole process, or the
     machine, that stood still.
     """
 
-    def __init__(self, heartbeat: Heartbeat, most: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self._heartbeat, self._most, self._clock = heartbeat, most, clock
+    def __init__(self, heartbeat: Heartbeat, max_gap: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._heartbeat, self._max_gap, self._clock = heartbeat, max_gap, clock
         self.beat: tuple[int, int] | None = None
         """The call that was under way at the last look."""
-        self._seconds, self._looked = 0.0, clock()
+        self._seconds, self._checked_at = 0.0, clock()
 
-    def look(self) -> float:
+    def elapsed(self) -> float:
         """Return the seconds for which the call that is under way has been seen; 0 where there is none."""
         now, beat = self._clock(), self._heartbeat.beat
-        passed, self._looked = now - self._looked, now
+        passed, self._checked_at = now - self._checked_at, now
         if beat is None or beat != self.beat:
             self.beat, self._seconds = beat, 0.0
         else:
-            self._seconds += min(passed, self._most)
+            self._seconds += min(passed, self._max_gap)
         return self._seconds

@@ -10,10 +10,10 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from handover.cosim.fmu.buffers import OutputBuffer, RateBuffer, SignalBuffer, Views
+from handover.cosim.fmu.buffers import InputDerivatives, OutputBuffer, SignalBuffer, Views
 from handover.cosim.fmu.calls import NativeStep, State, StateCalls, StepEnd, derivatives_along, discarded_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.fmu.failures import STATUS, StepDiscarded, UnitEnded, failure_of
+from handover.cosim.fmu.failures import STATUS, StepDiscarded, UnitTerminated, failure_of
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
@@ -58,7 +58,7 @@ class Instance:
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
         self.du: dict[str, Views] = {}
         """Time derivatives of inputs that `interpolate` named."""
-        self.goes_back = False
+        self.can_roll_back = False
         """Whether states of times before the current communication point may be restored; the unit is told."""
         self._step_arguments = self._make_step_arguments()
         self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
@@ -85,7 +85,7 @@ class Instance:
 
     def set_inputs(self) -> None:
         """Hand the contents of `u`, and of `du`, to the unit."""
-        self._carry_out(self._setters)
+        self._set_or_get(self._setters)
 
     def set_some_inputs(self, names: Iterable[str]) -> None:
         """Hand the contents of `u` to the unit, but only of these inputs; the others stay as they are."""
@@ -94,18 +94,18 @@ class Instance:
             for name, views in buffer.views.items():
                 for mine, held in zip(views, self.u[name], strict=True):
                     mine[:] = held
-        self._carry_out(setters)
+        self._set_or_get(setters)
 
     def interpolate(self, names: Iterable[str]) -> None:
         """Hand these inputs' time derivatives to the unit too, whenever inputs are set (FMI 2)."""
         ports = [self.description.inputs[n] for n in names]
-        buffer = RateBuffer(self._function("SetRealInputDerivatives"), self._component, ports)
+        buffer = InputDerivatives(self._function("SetRealInputDerivatives"), self._component, ports)
         self._setters.append(buffer)
         self.du = dict(buffer.views)
 
     def get_outputs(self) -> None:
         """Fetch the unit's outputs into `y`."""
-        self._carry_out(self._getters)
+        self._set_or_get(self._getters)
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt.
@@ -115,7 +115,7 @@ class Instance:
         """
         self.time = t
         self._begins(self._step_call)
-        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
+        status = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_arguments)
         self._returned()
         self.judge_step(status)
         self.time = t + dt
@@ -124,7 +124,7 @@ class Instance:
         """Advance from t by dt, or as far as the unit goes; raise as `step`, but for a discard."""
         self.time = t
         self._begins(self._step_call)
-        status = self._do_step(self._component, t, dt, not self.goes_back, *self._step_arguments)
+        status = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_arguments)
         self._returned()
         if status == _DISCARD:
             return StepEnd(self._reached(), early=True, discarded=True)
@@ -151,7 +151,7 @@ class Instance:
             self._function("CancelStep")(self._component)
         self.judge(self._step_call, status)
         if self._fmi == 3 and self._terminate.value:
-            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
+            raise UnitTerminated(self.name, self._step_call, self.time, tuple(self.log))
 
     def judge(self, call: str, status: int) -> None:
         """Look at what a call answered at `time`.
@@ -299,7 +299,7 @@ class Instance:
         """Return how far a step came that was discarded; raise if that was because the unit wants to end."""
         reached, ended = discarded_step(self._function, self._component, self.time, self._fmi)
         if ended:
-            raise UnitEnded(self.name, self._step_call, self.time, tuple(self.log))
+            raise UnitTerminated(self.name, self._step_call, self.time, tuple(self.log))
         return reached
 
     def _make_step_arguments(self) -> tuple[Any, ...]:
@@ -328,7 +328,7 @@ class Instance:
         """Return the buffers but those of inputs that hold addresses of others' outputs, which are copied anew."""
         return [*self._getters, *(b for b in self._setters if not b.name.endswith(("String", "Binary")))]
 
-    def _carry_out(self, buffers: Iterable[SignalBuffer]) -> None:
+    def _set_or_get(self, buffers: Iterable[SignalBuffer]) -> None:
         for buffer in buffers:
             self._begins(buffer.name)
             status = buffer()
@@ -369,7 +369,7 @@ class Instance:
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
-            told = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
-            line = f"[{STATUS[status] if status < len(STATUS) else status}] {told}"
+            found = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
+            line = f"[{STATUS[status] if status < len(STATUS) else status}] {found}"
             self.log.append(line)
             self._heartbeat.log(self.name, line)

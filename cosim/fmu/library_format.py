@@ -40,8 +40,8 @@ def shortage(head: bytes, size: int) -> str:
     promised = max(_ends(head), default=0)
     if promised <= size:
         return ""
-    told = f"it has {size} bytes of at least {promised}"
-    return f"the library is shorter than its headers say ({told}); export or copy the FMU again"
+    text = f"it has {size} bytes of at least {promised}"
+    return f"the library is shorter than its headers say ({text}); export or copy the FMU again"
 
 
 def _ends(head: bytes) -> Iterator[int]:

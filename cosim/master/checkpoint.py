@@ -25,7 +25,7 @@ from handover.cosim.system.system import System
 _FORMAT = 1
 
 
-class BadCheckpoint(CosimError):
+class InvalidCheckpoint(CosimError):
     """A checkpoint cannot be used."""
 
     def __init__(self, path: Path, fault: str) -> None:
@@ -37,8 +37,8 @@ class StateNotSaved(CosimError):
     """Units of a run that should write checkpoints cannot save their states; nothing has started."""
 
     def __init__(self, units: Mapping[str, str]) -> None:
-        told = "; ".join(f"{name}: {reason}" for name, reason in units.items())
-        super().__init__(f"a run with these units cannot write checkpoints, as they do not save their states: {told}")
+        text = "; ".join(f"{name}: {reason}" for name, reason in units.items())
+        super().__init__(f"a run with these units cannot write checkpoints, as they do not save their states: {text}")
         self.units = dict(units)
 
 
@@ -164,7 +164,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         with zipfile.ZipFile(path) as archive:
             head = json.loads(archive.read("checkpoint.json"))
             if head["format"] != _FORMAT:
-                raise BadCheckpoint(path, f"a checkpoint of format {head['format']}; format {_FORMAT} can be read")
+                raise InvalidCheckpoint(path, f"a checkpoint of format {head['format']}; format {_FORMAT} can be read")
             names: list[str] = head["units"]
             return Checkpoint(
                 time=head["time"],
@@ -176,11 +176,11 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 kept=archive.read("kept"),
             )
     except FileNotFoundError as e:
-        raise BadCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
-    except BadCheckpoint:
+        raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
+    except InvalidCheckpoint:
         raise
     except Exception as e:  # whatever the readers of archive, JSON and pickle make of damaged bytes
-        raise BadCheckpoint(path, f"the checkpoint is damaged: {one_line(e)}") from e
+        raise InvalidCheckpoint(path, f"the checkpoint is damaged: {one_line(e)}") from e
 
 
 def _unfinished(path: Path) -> Path:
@@ -234,8 +234,10 @@ class Checkpointer:
         try:
             write_checkpoint(self.path, checkpoint)
         except OSError as e:
-            told = e.strerror or e
-            _log.warning("%s cannot be written at t = %g s, the former one stays: %s", self.path, checkpoint.time, told)
+            value = e.strerror or e
+            _log.warning(
+                "%s cannot be written at t = %g s, the former one stays: %s", self.path, checkpoint.time, value
+            )
 
     def _after(self, t: float) -> float:
         count = math.floor(Fraction(t) / self._every)

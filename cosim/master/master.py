@@ -6,15 +6,15 @@ from fractions import Fraction
 from types import TracebackType
 from typing import TypeVar
 
-from handover.cosim.exceptions import UnitFailure, UnitRefused
+from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.master.method import Method
+from handover.cosim.master.method import StepperFactory
 from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
-from handover.cosim.stepping.ensemble import Endings, Ensemble
+from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.gauss_seidel import GaussSeidel
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import MasterOptions
@@ -47,13 +47,13 @@ class Master:
         system.check()
         self.system = system
         self.options = options
-        self._method = Method(system, options)
-        self.schedule = self._method.schedule
+        self._factory = StepperFactory(system, options)
+        self.schedule = self._factory.schedule
         self.heartbeat = heartbeat or Heartbeat()
         self.pacer = Pacer(options.pace) if options.pace is not None else None
         """What keeps the run in step with the wall clock, if it is to."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
-        self._endings = Endings()
+        self._cleanups = CleanupStack()
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
         self._coupling: Coupling | None = None
@@ -64,13 +64,13 @@ class Master:
             raise RuntimeError("the master is entered already: leave it first, or make another one")
         self._is_left = False
         try:
-            self._watchdog.carry_out(self._start)
+            self._watchdog.run_job(self._start)
         except UnitHung:
             self._end()
             raise
         except UnitFailure as e:
             self._end()
-            raise UnitRefused(e) from e
+            raise InitializationError(e) from e
         except BaseException:
             self._end()
             raise
@@ -86,7 +86,7 @@ class Master:
     @property
     def has_events(self) -> bool:
         """Whether steps may end off the schedule's grid; without, a run is a plain sequence of fixed steps."""
-        return self._method.has_events
+        return self._factory.has_events
 
     @property
     def ensemble(self) -> Ensemble:
@@ -110,7 +110,7 @@ class Master:
     @property
     def iterates(self) -> bool:
         """Whether units go over steps again; the steps of others are plain."""
-        return self._method.iterates
+        return self._factory.iterates
 
     @property
     def steps(self) -> StepStatistics | None:
@@ -129,7 +129,7 @@ class Master:
         With Gauss-Seidel, setting inputs and getting outputs are included.
         """
         if isinstance(self._stepper, PlanStepper):
-            self._stepper.tell_cpu()
+            self._stepper.publish_cpu_times()
         return self.ensemble.cpu
 
     @property
@@ -152,21 +152,21 @@ class Master:
             RuntimeError: the master is left, or a unit failed before.
         """
         self._check_can_run(stop)
-        self.carry_out(lambda: self._run(stop, observers, until))
+        self.call_units(lambda: self._run(stop, observers, until))
 
-    def carry_out(self, job: Callable[[], T]) -> T:
+    def call_units(self, job: Callable[[], T]) -> T:
         """Do something else with the units in the thread that they are called from, with the same time limit.
 
         Raises:
             UnitHung: a unit does not return. Besides, whatever the job raises.
         """
-        return self._watchdog.carry_out(job)
+        return self._watchdog.run_job(job)
 
     def _start(self) -> None:
-        ensemble = self._method.load(self.heartbeat, self._endings)
-        self._method.initialize(ensemble)
-        self._coupling = self._method.couple(ensemble)
-        self._stepper = self._method.stepper(ensemble, self._coupling)
+        ensemble = self._factory.load(self.heartbeat, self._cleanups)
+        self._factory.initialize(ensemble)
+        self._coupling = self._factory.couple(ensemble)
+        self._stepper = self._factory.stepper(ensemble, self._coupling)
         self._ensemble = ensemble
 
     def _end(self) -> UnitHung | None:
@@ -175,7 +175,7 @@ class Master:
         first: UnitHung | None = None
         while True:
             try:
-                self._watchdog.carry_out(self._endings.carry_out)
+                self._watchdog.run_job(self._cleanups.close)
             except UnitHung as e:
                 first = first or e
             else:

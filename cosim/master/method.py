@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from handover.cosim.fmu.heartbeat import Heartbeat
-from handover.cosim.plan.choice import plan_stepper, tell_general_path
+from handover.cosim.plan.choice import log_fallback, plan_stepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
-from handover.cosim.stepping.ensemble import Endings, Ensemble
+from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.event_ensemble import EventEnsemble
-from handover.cosim.stepping.event_stepper import EventStepper, has_events, refuse_off_grid
+from handover.cosim.stepping.event_stepper import EventStepper, check_off_grid, has_events
 from handover.cosim.stepping.gauss_seidel import GaussSeidel
 from handover.cosim.stepping.initial_values import InitialValues
 from handover.cosim.stepping.interface import Interface
@@ -15,12 +15,12 @@ from handover.cosim.stepping.jacobi import Jacobi
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.solvers import FixedPoint, InterfaceNewton, InterfaceSolver
 from handover.cosim.stepping.stepper import Coupling, GridStepper, Stepper
-from handover.cosim.system.loops import Group, groups_of_data_flow, refuse_circles, refuse_loops
+from handover.cosim.system.loops import Group, check_cycles, check_loops, groups_of_data_flow
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import System
 
 
-class Method:
+class StepperFactory:
     """Makes what steps a system; what does not go together is refused before anything is loaded.
 
     Attributes:
@@ -36,9 +36,9 @@ class Method:
         self.schedule = Schedule(system)
         if options.adaptive is not None:
             check_control(system, options.adaptive)
-        refuse_off_grid(system, options)
+        check_off_grid(system, options)
         self._continuous = self._groups()
-        refuse_loops(system, self.schedule.loops, goes_back=options.algorithm is not Algorithm.JACOBI)
+        check_loops(system, self.schedule.loops, rolls_back=options.algorithm is not Algorithm.JACOBI)
 
     @property
     def has_events(self) -> bool:
@@ -49,12 +49,12 @@ class Method:
     def iterates(self) -> bool:
         """Whether units go over steps again."""
         going_back = self._options.algorithm is not Algorithm.JACOBI
-        return going_back and any(g.circle for g in (*self.schedule.sampled_groups, *self._continuous))
+        return going_back and any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
 
-    def load(self, heartbeat: Heartbeat, endings: Endings) -> Ensemble:
+    def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
         """Load the units; whoever gave `endings` carries them out, also if this fails."""
         load = EventEnsemble if self.has_events else Ensemble
-        ensemble = load(self._system, heartbeat, endings)
+        ensemble = load(self._system, heartbeat, cleanups)
         ensemble.measures_cpu = self._options.cpu_times
         return ensemble
 
@@ -74,7 +74,7 @@ class Method:
         """Return what moves initialised units through time, as a compiled plan where that does the same."""
         control = self._options.adaptive
         if isinstance(ensemble, EventEnsemble) or control is not None:
-            tell_general_path("steps may end anywhere")
+            log_fallback("steps may end anywhere")
         if isinstance(ensemble, EventEnsemble):
             return EventStepper(self.schedule, ensemble, coupling)
         if self._options.extrapolation is Extrapolation.LINEAR:
@@ -82,16 +82,16 @@ class Method:
         if control is not None:
             return AdaptiveStepper(self.schedule, coupling, ensemble, control, self._options.order)
         plan = plan_stepper(self.schedule, ensemble, coupling, self._options, iterates=self.iterates)
-        return plan or GridStepper(self.schedule, coupling, ensemble.lines)
+        return plan or GridStepper(self.schedule, coupling, ensemble.extrapolated_inputs)
 
     def _groups(self) -> Sequence[Group]:
         """Return the units that are not sampled, those together that have to agree at each step."""
         if not self._options.algorithm.iterates:
             return self.schedule.continuous_groups
         groups = groups_of_data_flow(self._system, [s.unit for s in self.schedule.continuous], self.schedule.loops)
-        refuse_circles(self._system, groups)
+        check_cycles(self._system, groups)
         return groups
 
     def _solver(self, interface: Interface) -> InterfaceSolver:
         kind = FixedPoint if self._options.algorithm is Algorithm.FIXED_POINT else InterfaceNewton
-        return kind(interface.magnitudes(self._options.tolerance), self._options.most_iterations)
+        return kind(interface.magnitudes(self._options.tolerance), self._options.max_iterations)

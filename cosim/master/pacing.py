@@ -41,9 +41,9 @@ class PaceReport:
         if not self.missed:
             return f"none of {self.deadlines}"
         late = self.largest_lateness
-        told = f"{late * 1000:.3g} ms" if late < 0.1 else f"{late:.2f} s"
+        text = f"{late * 1000:.3g} ms" if late < 0.1 else f"{late:.2f} s"
         share = f"{self.missed} of {self.deadlines} ({self.share:.1%})"
-        return f"{share}, at most {told} late, at t = {self.latest_at:.6g} s"
+        return f"{share}, at most {text} late, at t = {self.latest_at:.6g} s"
 
 
 class Pacer:

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from handover.cosim.fmu.failures import UnitHung
-from handover.cosim.fmu.heartbeat import Call, Heartbeat, Stillness
+from handover.cosim.fmu.heartbeat import Call, Heartbeat, StallTimer
 
 T = TypeVar("T")
 
 _GRACE = 2.0
 """How long an interrupted thread gets to reach the end of its step, and a unit to be freed beside one that hangs, s."""
 
-_SLOWEST_LOOK = 0.25  # s
+_MAX_POLL_INTERVAL = 0.25  # s
 
 
 @dataclass
@@ -44,7 +44,7 @@ class Watchdog:
         self._tasks: queue.SimpleQueue[_Task | None] | None = None
         heartbeat.limit = limit or 0.0
 
-    def carry_out(self, job: Callable[[], T]) -> T:
+    def run_job(self, job: Callable[[], T]) -> T:
         """Do a job and return what it returns.
 
         Raises:
@@ -76,11 +76,11 @@ class Watchdog:
             self._tasks = None
 
     def _watch(self, task: _Task, limit: float) -> None:
-        look = min(limit / 4, _SLOWEST_LOOK)
-        stillness = Stillness(self._heartbeat, 2 * look, self._clock)
+        look = min(limit / 4, _MAX_POLL_INTERVAL)
+        stall_timer = StallTimer(self._heartbeat, 2 * look, self._clock)
         while not task.done.wait(look):
-            if stillness.look() >= limit and stillness.beat is not None:
-                self._give_up(task, stillness.beat, limit)
+            if stall_timer.elapsed() >= limit and stall_timer.beat is not None:
+                self._give_up(task, stall_timer.beat, limit)
 
     def _give_up(self, task: _Task, beat: tuple[int, int], limit: float) -> None:
         """Leave the thread in its call and raise UnitHung, unless the call returns in this very moment."""

@@ -12,7 +12,7 @@ from handover.cosim.system.schedule import Schedule
 
 _log = logging.getLogger(__name__)
 
-_WIDEST = 2**63
+_MAX_TICKS = 2**63
 """Above the numerators and denominators that the loop counts with."""
 
 
@@ -26,13 +26,13 @@ def plan_stepper(
     reason = _obstacle(schedule, options, iterates)
     library = loop() if reason is None else None
     if library is None:
-        tell_general_path(reason or "its library is not compiled for this machine")
+        log_fallback(reason or "its library is not compiled for this machine")
         return None
     made = PlanMaker(ensemble, schedule, options.algorithm, library, clock=options.cpu_times)
     return PlanStepper(schedule, ensemble, coupling, made)
 
 
-def tell_general_path(reason: str) -> None:
+def log_fallback(reason: str) -> None:
     """Say in the log why a system does not run as a plan."""
     _log.info("no compiled plan: %s", reason)
 
@@ -44,6 +44,6 @@ def _obstacle(schedule: Schedule, options: MasterOptions, iterates: bool) -> str
         return f"the coupling is {options.algorithm.value}" if options.algorithm.iterates else "units make a loop"
     if options.extrapolation is not Extrapolation.HOLD:
         return "inputs are extrapolated"
-    if max(schedule.tick.numerator, schedule.tick.denominator) >= _WIDEST:
+    if max(schedule.tick.numerator, schedule.tick.denominator) >= _MAX_TICKS:
         return f"a tick of {schedule.tick} s is too long a fraction"
     return None

@@ -20,7 +20,7 @@ from handover.cosim.plan.memory import KeptMemory, Segment
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.stepping.transfers import FiniteCheck, Narrowing
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.schedule import Schedule, Slot
 
 SIZE = 72
@@ -57,7 +57,7 @@ def copy(unit: int, target: NDArray[Any], source: NDArray[Any]) -> bytes:
     return _packed(_COPY, kind, unit, target.ctypes.data, source.ctypes.data, n, b, a, 1.0, 0.0)
 
 
-def scale(unit: int, target: NDArray[Any], source: NDArray[Any], linear: Linear) -> bytes:
+def scale(unit: int, target: NDArray[Any], source: NDArray[Any], linear: LinearTransformation) -> bytes:
     """Set reals to others times a factor plus an offset, each rounded once."""
     types = _TYPES[target.dtype], _TYPES[source.dtype]
     addresses = target.ctypes.data, source.ctypes.data

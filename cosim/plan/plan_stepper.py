@@ -15,16 +15,16 @@ from handover.cosim.record.tail import RecordBlock
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule
-from handover.cosim.system.signals import FromThenOn, Observer, Signals
+from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 
 _STRETCH = 0.05
 """Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""
-_LONGEST = 4096
+_MAX_STEPS = 4096
 """Communication points at most until then."""
-_ROOM = 2 * _LONGEST
+_ROOM = 2 * _MAX_STEPS
 """CPU times of a unit that the loop can take before they are told."""
 _LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
-_FARTHEST = 2**62
+_MAX_TICKS = 2**62
 
 
 class PlanStepper:
@@ -51,7 +51,7 @@ class PlanStepper:
         self._times = (ctypes.c_double * n)()
         self._spent = (ctypes.c_double * (n * _ROOM if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
-        self._untold = 0  # communication points at which CPU times were taken that the ensemble does not know
+        self._unpublished = 0  # communication points at which CPU times were taken that the ensemble does not know
         self._plan = memory.Plan(
             operations=ctypes.addressof(self._operations),
             arrive=self._arrive,
@@ -68,7 +68,7 @@ class PlanStepper:
             spent_capacity=_ROOM,
             heartbeat=ensemble.heartbeat.address,
         )
-        self._hear_times()
+        self._read_times()
 
     @property
     def time(self) -> float:
@@ -78,7 +78,7 @@ class PlanStepper:
     def arrive(self, last: int) -> bool:
         """Go to the next tick at which a unit is due; see `Stepper`."""
         self._make_room(1)
-        return self._concluded(self._library.plan_arrive(self._plan, min(last, _FARTHEST))) == _LAST_REACHED
+        return self._concluded(self._library.plan_arrive(self._plan, min(last, _MAX_TICKS))) == _LAST_REACHED
 
     def depart(self) -> None:
         """Step what is due at the tick."""
@@ -94,8 +94,8 @@ class PlanStepper:
         else watching, it takes many communication points at once.
         """
         first = observers[0] if observers else None
-        seen = first.t_0 if isinstance(first, FromThenOn) else -math.inf
-        first = first.observe if isinstance(first, FromThenOn) else first
+        seen = first.t_0 if isinstance(first, ObserveAfter) else -math.inf
+        first = first.observe if isinstance(first, ObserveAfter) else first
         recorder = first if isinstance(first, Recorder) else None
         watching = observers if recorder is None else observers[1:]
         rows = None if recorder is None else _rows_of(recorder, signals)
@@ -105,7 +105,7 @@ class PlanStepper:
             self._make_room(points)
             began = time.perf_counter()
             written = rows if leave else None  # whether the first point was seen before is known once it is reached
-            outcome = self._library.plan_run(self._plan, min(last, _FARTHEST), points, leave, written)
+            outcome = self._library.plan_run(self._plan, min(last, _MAX_TICKS), points, leave, written)
             self._concluded(outcome)
             if recorder is not None:
                 if not leave and self.time > seen:
@@ -121,19 +121,19 @@ class PlanStepper:
                 raise Abandoned
             leave = True
             if not watched:
-                points = min(2 * points, _LONGEST) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
+                points = min(2 * points, _MAX_STEPS) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
 
-    def tell_cpu(self) -> None:
+    def publish_cpu_times(self) -> None:
         """Have the ensemble know the CPU times that the loop has taken."""
         for i, unit in enumerate(self._units):
             spent = array.array("d", self._spent[i * _ROOM : i * _ROOM + self._n_spent[i]])
             self._ensemble.cpu[unit].extend(spent)
             self._n_spent[i] = 0
-        self._untold = 0
+        self._unpublished = 0
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks; see `Stepper`."""
-        self._tell_times()
+        self._publish_times()
         grouped = list(zip(self._members, self._groups, strict=True))
         due = {unit: group.due for units, group in grouped for unit in units}
         acted = {unit: group.acted for units, group in grouped for unit in units if group.sampled}
@@ -153,29 +153,29 @@ class PlanStepper:
         self.coupling.set_state(state["coupling"])
         self._plan.tick = state["tick"]
         self._plan.time = self._schedule.time(state["tick"])
-        self._hear_times()
+        self._read_times()
 
     def _make_room(self, points: int) -> None:
         """See to it that the CPU times of so many communication points have a place."""
         if self._clock:
-            if self._untold + points > _ROOM:
-                self.tell_cpu()
-            self._untold += points
+            if self._unpublished + points > _ROOM:
+                self.publish_cpu_times()
+            self._unpublished += points
 
     def _concluded(self, outcome: int) -> int:
         if outcome == _ABANDONED:
             raise Abandoned
         if outcome == _STOPPED:
-            self._tell_times()
+            self._publish_times()
             self._judges[self._plan.stopped_at](self._plan.status, self.time)
             raise RuntimeError(f"operation {self._plan.stopped_at} of the plan stopped it without a reason")
         return outcome
 
-    def _tell_times(self) -> None:
+    def _publish_times(self) -> None:
         for instance, t in zip(self._ensemble.instances.values(), self._times, strict=True):
             instance.time = t
 
-    def _hear_times(self) -> None:
+    def _read_times(self) -> None:
         for i, instance in enumerate(self._ensemble.instances.values()):
             self._times[i] = instance.time
 

@@ -58,14 +58,14 @@ def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArr
     return RecordColumns(pa.schema([time, *(_field(c) for c in columns)]), places), wholes
 
 
-def told_of(schema: "pa.Schema") -> list[tuple[str, dict[str, str]]]:
+def column_metadata(schema: "pa.Schema") -> list[tuple[str, dict[str, str]]]:
     """Return of each column its name and what is told of it: `unit`, `description`, and `items` of an enumeration."""
-    told: list[tuple[str, dict[str, str]]] = []
+    entries: list[tuple[str, dict[str, str]]] = []
     for name in schema.names:
         metadata: dict[bytes, bytes] = schema.field(name).metadata or {}
         known = {"unit": "1", "description": "", "items": ""}
-        told.append((name, known | {k.decode(): v.decode() for k, v in metadata.items()}))
-    return told
+        entries.append((name, known | {k.decode(): v.decode() for k, v in metadata.items()}))
+    return entries
 
 
 def _type_of(c: Column) -> "pa.DataType":

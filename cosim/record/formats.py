@@ -14,7 +14,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from handover.cosim.record.columns import told_of
+from handover.cosim.record.columns import column_metadata
 
 _DOUBLE, _INT32, _TEXT = 0, 20, 51  # type and kind of a matrix, little-endian
 _HEAD = struct.Struct("<5i")  # type, rows, columns, imaginary, bytes of the name
@@ -32,21 +32,21 @@ def write_mat(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch
 
     Source: OpenModelica User's Guide, "Simulation result files"; MATLAB's "MAT-File Format", level 4.
     """
-    told = told_of(schema)
-    info = np.array([[2, i + 1, 0, -1] for i in range(len(told))], dtype="<i4")
+    facts = column_metadata(schema)
+    info = np.array([[2, i + 1, 0, -1] for i in range(len(facts))], dtype="<i4")
     info[0, 0] = 0  # time is in all matrices
     with open(path, "wb") as file:
         rows = [row.ljust(11) for row in ("Atrajectory", "1.1", "", "binTrans")]
         _write_texts(file, "Aclass", ["".join(column) for column in zip(*rows, strict=True)])
-        _write_texts(file, "name", [name for name, _ in told])
-        _write_texts(file, "description", [_description(known) for _, known in told])
-        _write_head(file, "dataInfo", _INT32, (4, len(told)))
+        _write_texts(file, "name", [name for name, _ in facts])
+        _write_texts(file, "description", [_description(known) for _, known in facts])
+        _write_head(file, "dataInfo", _INT32, (4, len(facts)))
         file.write(info.tobytes())
         _write_head(file, "data_1", _DOUBLE, (1, 2))
         limits_at = file.tell()
         file.write(np.zeros(2).tobytes())
         head_at = file.tell()
-        _write_head(file, "data_2", _DOUBLE, (len(told), 0))
+        _write_head(file, "data_2", _DOUBLE, (len(facts), 0))
         count, first, last = 0, 0.0, 0.0
         for batch in batches:
             if not batch.num_rows:
@@ -58,7 +58,7 @@ def write_mat(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch
         file.seek(limits_at)
         file.write(np.array([first, last], dtype="<f8").tobytes())
         file.seek(head_at)
-        _write_head(file, "data_2", _DOUBLE, (len(told), count))
+        _write_head(file, "data_2", _DOUBLE, (len(facts), count))
 
 
 def _doubles(batch: "pa.RecordBatch") -> NDArray[np.float64]:
@@ -70,10 +70,10 @@ def _doubles(batch: "pa.RecordBatch") -> NDArray[np.float64]:
     return values
 
 
-def _description(told: Mapping[str, str]) -> str:
-    unit = "" if told["unit"] in ("", "1") else f"[{told['unit']}]"
-    items = f"({told['items']})" if told["items"] else ""
-    return " ".join(text for text in (told["description"], items, unit) if text)
+def _description(facts: Mapping[str, str]) -> str:
+    unit = "" if facts["unit"] in ("", "1") else f"[{facts['unit']}]"
+    items = f"({facts['items']})" if facts["items"] else ""
+    return " ".join(text for text in (facts["description"], items, unit) if text)
 
 
 def _write_texts(file: IO[bytes], name: str, texts: Sequence[str]) -> None:
@@ -92,7 +92,7 @@ WriteRecord = Callable[[Path, "pa.Schema", Iterable["pa.RecordBatch"]], None]
 """Writes a file with these columns, whose first is `time`, and rows."""
 
 _VALUES = 2**20
-_LEAST_ROWS, _MOST_ROWS = 256, 2**16
+_MIN_ROWS, _MAX_ROWS = 256, 2**16
 
 
 def write_parquet(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> None:
@@ -110,7 +110,11 @@ def write_csv(path: Path, schema: "pa.Schema", batches: Iterable["pa.RecordBatch
 
     Numbers have as many digits as it takes to read the same numbers back; truths are `true` and `false`.
     """
-    titled = schema.empty_table().rename_columns([_title(name, told["unit"]) for name, told in told_of(schema)]).schema
+    titled = (
+        schema.empty_table()
+        .rename_columns([_title(name, value["unit"]) for name, value in column_metadata(schema)])
+        .schema
+    )
     with pyarrow.csv.CSVWriter(path, titled) as file:
         for batch in batches:
             file.write_batch(pa.RecordBatch.from_arrays(batch.columns, schema=titled))
@@ -122,7 +126,7 @@ RECORD_FORMATS: Mapping[str, WriteRecord] = {"parquet": write_parquet, "csv": wr
 
 def _row_groups(schema: "pa.Schema", batches: Iterable["pa.RecordBatch"]) -> Generator["pa.Table", None, None]:
     """Cut rows into groups that depend on the number of columns alone, not on when rows were flushed."""
-    rows = min(max(_VALUES // len(schema), _LEAST_ROWS), _MOST_ROWS)
+    rows = min(max(_VALUES // len(schema), _MIN_ROWS), _MAX_ROWS)
     waiting: list[pa.RecordBatch] = []
     have = 0
     for batch in batches:

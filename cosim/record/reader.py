@@ -58,8 +58,8 @@ class Record:
 
     def items(self, signal: str) -> dict[int, str]:
         """Return the names of an enumeration's values; none for another signal."""
-        told = self._metadata(signal).get(b"items", b"").decode()
-        pairs = (item.partition(" ") for item in told.split(", ") if item)
+        found = self._metadata(signal).get(b"items", b"").decode()
+        pairs = (item.partition(" ") for item in found.split(", ") if item)
         return {int(value): name for value, _, name in pairs}
 
     def _metadata(self, signal: str) -> dict[bytes, bytes]:

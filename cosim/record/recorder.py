@@ -52,7 +52,7 @@ class Recorder:
         finally:
             self._file.close()
             self._block.close()
-        with self._told():
+        with self._disk_errors():
             finish_record(self.path, self._formats, lambda: stream_batches(self.stream))
             self.tail.unlink(missing_ok=True)
 
@@ -71,7 +71,7 @@ class Recorder:
         """
         columns, sources = record_columns(signals.columns())
         about = {"places": columns.places, "formats": self._formats}
-        with self._told(), contextlib.ExitStack() as undo:
+        with self._disk_errors(), contextlib.ExitStack() as undo:
             block = RecordBlock.create(self.tail, sources, about)
             undo.callback(block.close)
             size = rewind_stream(self.path, columns.schema, self._after) if self._after else 0
@@ -106,7 +106,7 @@ class Recorder:
         if self._block is None or self._columns is None or self._file is None or not self._block.filled:
             return
         rows = self._block.rows
-        with self._told():
+        with self._disk_errors():
             self._file.write(self._columns.batch(self._block))
         self._block.clear(rows)
 
@@ -123,7 +123,7 @@ class Recorder:
         return self.rows
 
     @contextlib.contextmanager
-    def _told(self) -> Generator[None, None, None]:
+    def _disk_errors(self) -> Generator[None, None, None]:
         try:
             yield
         except OSError as e:

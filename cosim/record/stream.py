@@ -119,7 +119,7 @@ def complete_record(path: Path) -> int:
     stream = stream_of(path)
     if not stream.exists():
         return _rows_in(path)
-    block = _left_block(tail_of(path))
+    block = _unfinished_block(tail_of(path))
     if block is None:
         return finish_record(path, (), lambda: stream_batches(stream))
     try:
@@ -181,7 +181,7 @@ def rewind_stream(path: Path, schema: "pa.Schema", rows: int) -> int:
     return made.size
 
 
-def _left_block(path: Path) -> RecordBlock | None:
+def _unfinished_block(path: Path) -> RecordBlock | None:
     try:
         return RecordBlock.open(path)
     except (FileNotFoundError, DamagedTail):  # the process died before there was a row in it

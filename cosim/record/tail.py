@@ -16,7 +16,7 @@ _MAGIC = b"HANDOVER"
 _HEAD = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
 _ALIGNMENT = 64
 _BYTES = 2**22
-_LEAST_ROWS, _MOST_ROWS = 16, 4096
+_MIN_ROWS, _MAX_ROWS = 16, 4096
 
 
 class Part(NamedTuple):
@@ -80,7 +80,7 @@ class RecordBlock:
         """
         parts: list[tuple[str, int]] = [(a.dtype.str, len(a)) for a in sources]
         row = 8 + sum(a.itemsize * len(a) for a in sources)
-        capacity = min(max(_BYTES // row, _LEAST_ROWS), _MOST_ROWS)
+        capacity = min(max(_BYTES // row, _MIN_ROWS), _MAX_ROWS)
         layout = json.dumps({**about, "capacity": capacity, "parts": parts}).encode()
         size = _aligned(_aligned(_HEAD.itemsize + len(layout)) + 8 * capacity)
         for a in sources:

@@ -26,7 +26,7 @@ class SspArchive:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with _told_of_the_ssp(path):
+        with _ssp_errors(path):
             self._packed = _Packed(path)
 
     def structure(self) -> bytes:
@@ -35,7 +35,7 @@ class SspArchive:
         Raises:
             InvalidSsp: it is missing or damaged.
         """
-        with _told_of_the_ssp(self.path):
+        with _ssp_errors(self.path):
             return self._packed.description()
 
     def read(self, member: str) -> bytes:
@@ -44,7 +44,7 @@ class SspArchive:
         Raises:
             InvalidSsp: it is damaged.
         """
-        with _told_of_the_ssp(self.path):
+        with _ssp_errors(self.path):
             return self._packed.read(member)
 
     def unpack(self, folder: Path) -> None:
@@ -53,7 +53,7 @@ class SspArchive:
         Raises:
             InvalidSsp: a member is damaged, or the folder does not take it.
         """
-        with _told_of_the_ssp(self.path):
+        with _ssp_errors(self.path):
             self._packed.unpack(folder)
 
     def member(self, uri: str) -> str:
@@ -77,7 +77,7 @@ class SspArchive:
 
 
 @contextmanager
-def _told_of_the_ssp(path: Path) -> Generator[None, None, None]:
+def _ssp_errors(path: Path) -> Generator[None, None, None]:
     try:
         yield
     except InvalidFmu as e:

@@ -15,7 +15,7 @@ from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_na
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.start_values import Given, chained, converted
 from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 
 GIVES = {"output", "calculatedParameter"}
 """Kinds of connector that a component gives values by."""
@@ -88,7 +88,7 @@ class FlatConnection:
 
     source: Node
     target: Node
-    linear: Linear | None
+    linear: LinearTransformation | None
     where: str
 
 
@@ -188,16 +188,16 @@ class _Flattening:
         if len(nodes) < 2:
             return
         gives = [self._gives(end, node) for (end, _), node in zip(ends, nodes, strict=True)]
-        told = f"{connection.where}{connection.start} - {connection.end}: "
+        text = f"{connection.where}{connection.start} - {connection.end}: "
         if None in gives:
             kind = self._connectors[nodes[gives.index(None)]].kind
-            self.flat.faults.append(f"{told}connectors of kind {kind!r} cannot be connected; inputs and outputs can")
+            self.flat.faults.append(f"{text}connectors of kind {kind!r} cannot be connected; inputs and outputs can")
         elif gives[0] == gives[1]:
-            self.flat.faults.append(f"{told}both ends {'give' if gives[0] else 'take'} a value; one of each is right")
+            self.flat.faults.append(f"{text}both ends {'give' if gives[0] else 'take'} a value; one of each is right")
         else:
             source, target = nodes if gives[0] else reversed(nodes)
             if target in self._fed:
-                self.flat.faults.append(f"{told}{_join(*target)} is fed twice")
+                self.flat.faults.append(f"{text}{_join(*target)} is fed twice")
             self._fed[target] = Fed(source, connection)
 
     def _end(self, system: SspNestedSystem, path: str, end: SspEnd, connection: SspConnection) -> Node | None:
@@ -245,9 +245,9 @@ class _Flattening:
         elif node in self._values:
             self.flat.given.setdefault(target[0], {})[target[1]] = Given(self._values[node], self._unit(node), linear)
 
-    def _composed(self, source: Node, hops: list[tuple[SspConnection, Node]]) -> Linear | None:
+    def _composed(self, source: Node, hops: list[tuple[SspConnection, Node]]) -> LinearTransformation | None:
         """Return what a value goes through from its source; None where it is what a master does by itself."""
-        total, unit = Linear(), self._unit(source)
+        total, unit = LinearTransformation(), self._unit(source)
         for connection, node in hops:
             following = self._unit(node)
             change = None if connection.keeps_units else converted(unit, following)
@@ -255,7 +255,7 @@ class _Flattening:
             total = total if connection.linear is None else chained(total, connection.linear)
             unit = unit if following == UNKNOWN else following
         try:
-            by_itself = converted(self._own_unit(source), self._own_unit(hops[-1][1])) or Linear()
+            by_itself = converted(self._own_unit(source), self._own_unit(hops[-1][1])) or LinearTransformation()
         except ValueError:  # a conversion is forbidden that could not be done
             return total
         return None if total == by_itself else total

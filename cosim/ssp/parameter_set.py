@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.fmu.xml import XmlElement
-from handover.cosim.ssp.xml import SspPart, local, told
-from handover.cosim.system.conversion import Linear
+from handover.cosim.ssp.xml import SspPart, local, short_name
+from handover.cosim.system.conversion import LinearTransformation
 
 _LISTS = ("String", "Enumeration", "Binary")
 """Types whose values are not numbers between blanks."""
@@ -28,7 +28,7 @@ class SspValue:
     texts: tuple[str, ...]
     unit: Unit
     where: str
-    linear: Linear | None = None
+    linear: LinearTransformation | None = None
     keeps_units: bool = False
 
 
@@ -37,7 +37,7 @@ class Mapped:
     """Where a mapping sends a parameter."""
 
     target: str
-    linear: Linear | None
+    linear: LinearTransformation | None
     keeps_units: bool
 
 
@@ -112,7 +112,7 @@ def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:
     return mapping
 
 
-def read_linear(part: SspPart, owner: XmlElement) -> Linear | None:
+def read_linear(part: SspPart, owner: XmlElement) -> LinearTransformation | None:
     """Return the transformation of a mapping entry or a connection, None if it has none.
 
     Raises:
@@ -121,9 +121,9 @@ def read_linear(part: SspPart, owner: XmlElement) -> Linear | None:
     for child in owner.children:
         name = local(child.tag)
         if name == "LinearTransformation":
-            return Linear(part.number(child, "factor", 1.0), part.number(child, "offset", 0.0))
+            return LinearTransformation(part.number(child, "factor", 1.0), part.number(child, "offset", 0.0))
         if name.endswith("Transformation"):
-            raise part.fault(child, f"<{told(child.tag)}> is not supported; <ssc:LinearTransformation> is")
+            raise part.fault(child, f"<{short_name(child.tag)}> is not supported; <ssc:LinearTransformation> is")
     return None
 
 

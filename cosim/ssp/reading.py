@@ -24,7 +24,7 @@ from handover.cosim.ssp.structure import (
     SspNestedSystem,
     SspStructure,
 )
-from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, SspPart, local, told
+from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, SspPart, local, short_name
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"
@@ -89,7 +89,7 @@ class _Reader:
             return self.system(e)
         if name == "Component":
             return self._component(e)
-        raise self._part.fault(e, f"<{told(e.tag)}> is not supported; <ssd:Component> and <ssd:System> are")
+        raise self._part.fault(e, f"<{short_name(e.tag)}> is not supported; <ssd:Component> and <ssd:System> are")
 
     def _component(self, e: XmlElement) -> SspComponent:
         part = self._part

@@ -19,12 +19,12 @@ from handover.cosim.ssp.connected_ports import entry_names, find_entry, taken_ap
 from handover.cosim.ssp.flattening import FlatConnection, FlatSystem, Node, components_of, flatten
 from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.start_values import start_values
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
 
-Wire = tuple[PortName, PortName, Linear | None]
+Wire = tuple[PortName, PortName, LinearTransformation | None]
 
-Feeds = dict[int, tuple[PortName, int, Linear | None]]
+Feeds = dict[int, tuple[PortName, int, LinearTransformation | None]]
 """By entry of an input: the output, its entry, and what the value goes through."""
 
 
@@ -52,7 +52,7 @@ class Grouping:
             self._take(c)
         while self._part():
             pass
-        self._refuse_what_cannot_be_parted()
+        self._check_divisible()
         for target, feeds in self._feeds.items():
             self._wire(target, feeds)
 
@@ -109,14 +109,14 @@ class Grouping:
     def _is_apart(self, name: PortName) -> bool:
         return name.port in self.apart.get(name.unit, ())
 
-    def _refuse_what_cannot_be_parted(self) -> None:
+    def _check_divisible(self) -> None:
         for unit, names in self.apart.items():
             d = self._descriptions[unit]
             for name in sorted(names):
                 port = {**d.parameters, **d.inputs, **d.outputs}[name]
                 if len(port.references) == 1:
-                    told = f"{unit}.{name} is one array variable (FMI 3); its entries cannot be connected one by one"
-                    self.faults.append(told)
+                    text = f"{unit}.{name} is one array variable (FMI 3); its entries cannot be connected one by one"
+                    self.faults.append(text)
 
     def _wire(self, target: PortName, feeds: Feeds) -> None:
         if self._is_whole(target, feeds):
@@ -132,7 +132,7 @@ class Grouping:
         return PortName(name.unit, entry_names(self._port(name))[min(k, len(entry_names(self._port(name))) - 1)])
 
 
-_MOST_DENOMINATOR = 10**6
+_MAX_DENOMINATOR = 10**6
 
 
 class SspFile:
@@ -229,5 +229,5 @@ class SspFile:
 
 def _exact(seconds: float) -> Fraction:
     """Return a time as the fraction meant, such as 1/3 for 0.3333333333333333."""
-    near = Fraction(seconds).limit_denominator(_MOST_DENOMINATOR)
+    near = Fraction(seconds).limit_denominator(_MAX_DENOMINATOR)
     return near if float(near) == seconds else Fraction(repr(seconds))

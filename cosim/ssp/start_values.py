@@ -14,20 +14,20 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import Entry, entry_names
 from handover.cosim.ssp.parameter_set import SspValue
-from handover.cosim.system.conversion import Linear, conversion, pass_as_they_are
+from handover.cosim.system.conversion import LinearTransformation, conversion, pass_as_they_are
 
 
-def applied(change: Linear, number: float) -> float:
+def applied(change: LinearTransformation, number: float) -> float:
     """Return a number after a change."""
     return change.factor * number + change.offset
 
 
-def chained(first: Linear, following: Linear) -> Linear:
+def chained(first: LinearTransformation, following: LinearTransformation) -> LinearTransformation:
     """Return the change that makes two, one after the other."""
-    return Linear(following.factor * first.factor, following.factor * first.offset + following.offset)
+    return LinearTransformation(following.factor * first.factor, following.factor * first.offset + following.offset)
 
 
-def converted(source: Unit, target: Unit) -> Linear | None:
+def converted(source: Unit, target: Unit) -> LinearTransformation | None:
     """Return what makes numbers in one unit numbers in another, None where they are alike or one is not told.
 
     Raises:
@@ -37,8 +37,8 @@ def converted(source: Unit, target: Unit) -> Linear | None:
         return None
     if not (source.defined and target.defined):
         undefined = (target if source.defined else source).symbol
-        told = f"{source.symbol!r} cannot be converted to {target.symbol!r}"
-        raise ValueError(f"{told}: the unit {undefined!r} is not defined")
+        text = f"{source.symbol!r} cannot be converted to {target.symbol!r}"
+        raise ValueError(f"{text}: the unit {undefined!r} is not defined")
     if source.base != target.base:
         raise ValueError(f"{source.symbol!r} cannot be converted to {target.symbol!r}: they differ in dimension")
     try:
@@ -60,7 +60,7 @@ class Given:
 
     value: SspValue
     unit: Unit = UNKNOWN
-    then: Linear | None = None
+    then: LinearTransformation | None = None
 
 
 def start_values(given: Mapping[str, tuple[Entry, Given]]) -> tuple[dict[str, Any], set[str], list[str]]:

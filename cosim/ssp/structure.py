@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from handover.cosim.blocks.units import Unit
 from handover.cosim.ssp.parameter_set import SspValue
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class SspConnection:
 
     start: SspEnd
     end: SspEnd
-    linear: Linear | None
+    linear: LinearTransformation | None
     keeps_units: bool
     where: str
 

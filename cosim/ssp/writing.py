@@ -20,7 +20,7 @@ from handover.cosim.fmu.archive import write_archive
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names, ports_of
 from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, document, root_element
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import Connection, PlacedUnit, System, proposed_step
 
 Items = tuple[tuple[str, int], ...]
@@ -222,8 +222,8 @@ class _Structure:
         if (unit.period, unit.sampled) != (proposed_step(d.step), d.sampled):
             annotations = ET.SubElement(component, "ssd:Annotations")
             annotation = ET.SubElement(annotations, "ssc:Annotation", type=STEP_ANNOTATION)
-            told = {"xmlns": "urn:handover:communication", "period": str(unit.period)}
-            ET.SubElement(annotation, "Step", {**told, "sampled": str(unit.sampled).lower()})
+            facts = {"xmlns": "urn:handover:communication", "period": str(unit.period)}
+            ET.SubElement(annotation, "Step", {**facts, "sampled": str(unit.sampled).lower()})
 
     def _add_connections(self, system: ET.Element) -> None:
         connections, clocks = self._system.connections, self._system.clock_connections()
@@ -255,7 +255,7 @@ class _Structure:
         return a.outputs[c.source.port], b.inputs[c.target.port]
 
 
-def _add_connection(parent: ET.Element, ends: dict[str, str], change: Linear | None) -> None:
+def _add_connection(parent: ET.Element, ends: dict[str, str], change: LinearTransformation | None) -> None:
     if change is None:
         ET.SubElement(parent, "ssd:Connection", ends)
         return

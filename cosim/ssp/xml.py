@@ -43,7 +43,7 @@ def tag(name: str) -> str:
     return f"{{{NAMESPACES[prefix]}}}{local}"
 
 
-def told(full: str) -> str:
+def short_name(full: str) -> str:
     """Return an element's short name: `ssd:System` for `{http://...}System`."""
     uri, _, local = full.removeprefix("{").rpartition("}")
     return f"{_PREFIXES[uri]}:{local}" if uri in _PREFIXES else local
@@ -68,7 +68,7 @@ _SCHEMAS = {
     "ssv:ParameterSet": "SystemStructureParameterValues.xsd",
     "ssm:ParameterMapping": "SystemStructureParameterMapping.xsd",
 }
-_MOST_TOLD = 3
+_MAX_REPORTED = 3
 VERSIONS = ("1.0", "2.0")
 
 
@@ -104,7 +104,7 @@ class SspPart:
             InvalidSsp: it is another one.
         """
         if root.tag != tag(wanted):
-            raise self.fault(root, f"<{told(root.tag)[:80]}> where <{wanted}> is right")
+            raise self.fault(root, f"<{short_name(root.tag)[:80]}> where <{wanted}> is right")
         if root.get("version") not in VERSIONS:
             version = root.get("version")[:80] or "none"
             raise self.fault(root, f"the version of <{wanted}> is {version}; {' and '.join(VERSIONS)} can be read")
@@ -128,7 +128,7 @@ class SspPart:
             InvalidSsp: it is not.
         """
         if name not in element.attributes:
-            raise self.fault(element, f"<{told(element.tag)}> has no attribute {name!r}")
+            raise self.fault(element, f"<{short_name(element.tag)}> has no attribute {name!r}")
         return element.attributes[name]
 
     def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
@@ -168,7 +168,7 @@ def _schema(wanted: str) -> Any:
 def _schema_faults(content: bytes, wanted: str) -> list[str]:
     schema = _schema(wanted)
     schema.validate(_etree.fromstring(content, _etree.XMLParser(resolve_entities=False, no_network=True)))
-    return [f"line {entry.line}: {shortened(str(entry.message))}" for entry in schema.error_log][:_MOST_TOLD]
+    return [f"line {entry.line}: {shortened(str(entry.message))}" for entry in schema.error_log][:_MAX_REPORTED]
 
 
 def root_element(name: str, version: str, called: str) -> ET.Element:

@@ -39,10 +39,10 @@ class StepTooSmall(UnitFailure):
     @property
     def what(self) -> str:
         """What happened, to be read after the call."""
-        return f"found none that is short enough: {self.told}"
+        return f"found none that is short enough: {self.message}"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """The signal with the largest error, and what may help."""
         return (
             f"with a step of {self.step:.3g} s the error of {self.signal} is {self.error:.3g} times what is tolerated; "
@@ -92,7 +92,7 @@ class AdaptiveStepper:
         initial = control.initial or min(s.every for s in schedule.continuous) * schedule.tick
         self._wanted = self._within_limits(int(initial / self._grid))
         for unit in self._units:
-            ensemble.instances[unit].goes_back = True
+            ensemble.instances[unit].can_roll_back = True
 
     def arrive(self, last: int) -> bool:
         """Let sampled units act that are due; see `Stepper`."""
@@ -123,7 +123,7 @@ class AdaptiveStepper:
 
     def get_state(self) -> Mapping[str, Any]:
         """Return ticks, the step wanted, and what control and inputs remember; see `Stepper`."""
-        lines = self._ensemble.lines
+        extrapolated_inputs = self._ensemble.extrapolated_inputs
         return {
             "tick": self._tick,
             "due": dict(self._due),
@@ -133,7 +133,7 @@ class AdaptiveStepper:
             "controller": self._controller.get_state(),
             "largest": self._error.get_state(),
             "statistics": dataclasses.asdict(self.statistics),
-            **({} if lines is None else {"lines": lines.get_state()}),
+            **({} if extrapolated_inputs is None else {"lines": extrapolated_inputs.get_state()}),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -145,8 +145,8 @@ class AdaptiveStepper:
         self._controller.set_state(state["controller"])
         self._error.set_state(state["largest"])
         self.statistics = StepStatistics(**state["statistics"])
-        if self._ensemble.lines is not None:
-            self._ensemble.lines.set_state(state["lines"])
+        if self._ensemble.extrapolated_inputs is not None:
+            self._ensemble.extrapolated_inputs.set_state(state["lines"])
 
     def _attempt(self, length: int) -> bool:
         """Try a step from where the units are; return whether it was accepted."""

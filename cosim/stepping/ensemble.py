@@ -20,36 +20,36 @@ from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.stepping.extrapolation import LinearInputs, Memory
+from handover.cosim.stepping.extrapolation import LinearExtrapolation, Memory
 from handover.cosim.stepping.transfers import Feeding, FiniteCheck, feedings, finite_checks
 from handover.cosim.system.schedule import Slot
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 
 
-class Endings:
+class CleanupStack:
     """Things to do at the end, the last one first, each once, whatever becomes of the others."""
 
     def __init__(self) -> None:
-        self._left: collections.deque[Callable[[], object]] = collections.deque()
-        self._first: Exception | None = None
+        self._cleanups: collections.deque[Callable[[], object]] = collections.deque()
+        self._first_error: Exception | None = None
 
-    def add(self, ending: Callable[[], object]) -> None:
+    def add(self, cleanup: Callable[[], object]) -> None:
         """Have something done before all that was added until now."""
-        self._left.append(ending)
+        self._cleanups.append(cleanup)
 
-    def carry_out(self) -> None:
+    def close(self) -> None:
         """Do what is left. Where one thing did not return, another thread may call this again and goes on after it.
 
         Raises:
             Exception: the first that any of it raised, after all was done.
         """
-        while self._left:
+        while self._cleanups:
             try:
-                self._left.pop()()
+                self._cleanups.pop()()
             except Exception as e:
-                self._first = self._first or e
-        first, self._first = self._first, None
+                self._first_error = self._first_error or e
+        first, self._first_error = self._first_error, None
         if first is not None:
             raise first
 
@@ -57,9 +57,9 @@ class Endings:
 class SavedStates(dict[str, State]):
     """Saved states by unit, with what the extrapolation of inputs remembers of these units."""
 
-    def __init__(self, states: Mapping[str, State], lines: Mapping[str, Memory]) -> None:
+    def __init__(self, states: Mapping[str, State], extrapolated_inputs: Mapping[str, Memory]) -> None:
         super().__init__(states)
-        self.lines = lines
+        self.extrapolated_inputs = extrapolated_inputs
 
 
 class Ensemble:
@@ -69,7 +69,9 @@ class Ensemble:
         InvalidFmu: an FMU cannot be used; what was loaded until then is freed.
     """
 
-    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+    def __init__(
+        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None
+    ) -> None:
         """Load the units; with `endings` given, whoever gave them carries them out if this fails."""
         self.system = system
         self.heartbeat = heartbeat or Heartbeat()
@@ -78,23 +80,23 @@ class Ensemble:
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self.measures_cpu = False
         """Whether CPU time is taken of steps."""
-        self.lines: LinearInputs | None = None
+        self.extrapolated_inputs: LinearExtrapolation | None = None
         """What inputs follow that are extrapolated; None where all are held."""
         self._feedings: dict[str, Feeding] = {}
         self._finite: dict[str, FiniteCheck] = {}
-        self._endings = endings or Endings()
+        self._cleanups = cleanups or CleanupStack()
         try:
             self._load()
             self._feedings = feedings(system, self.instances)
             self._finite = finite_checks(system, self.instances)
         except BaseException:
-            if endings is None:
+            if cleanups is None:
                 self.close()
             raise
 
     def close(self) -> None:
         """Terminate and free all units."""
-        self._endings.carry_out()
+        self._cleanups.close()
 
     def signals(self) -> Signals:
         """Return the units' outputs as they are."""
@@ -123,7 +125,7 @@ class Ensemble:
 
     def extrapolate(self, tick: Fraction) -> None:
         """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
-        self.lines = LinearInputs(self.system, self.instances, tick)
+        self.extrapolated_inputs = LinearExtrapolation(self.system, self.instances, tick)
 
     def feed(self, unit: str, t: float, dt: float | None = None) -> None:
         """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
@@ -132,8 +134,8 @@ class Ensemble:
             UnitFailure: the unit does not take them.
         """
         self.gather(unit, t)
-        if self.lines is not None and dt is not None:
-            self.lines.feed(unit, t, dt)
+        if self.extrapolated_inputs is not None and dt is not None:
+            self.extrapolated_inputs.feed(unit, t, dt)
         self.instances[unit].set_inputs()
 
     def feeding(self, unit: str) -> Feeding:
@@ -164,7 +166,7 @@ class Ensemble:
         Raises:
             UnitFailure: a number does not fit its input.
         """
-        self._feedings[unit].carry_out(t)
+        self._feedings[unit].transfer(t)
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Let a unit go from t to t + dt.
@@ -173,8 +175,8 @@ class Ensemble:
             UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
-        if self.lines is not None:
-            self.lines.step(unit)
+        if self.extrapolated_inputs is not None:
+            self.extrapolated_inputs.step(unit)
 
     def publish(self, unit: str) -> None:
         """Fetch a unit's outputs, for observers and for the units that they feed.
@@ -185,8 +187,8 @@ class Ensemble:
         instance = self.instances[unit]
         instance.get_outputs()
         self._finite[unit](instance.time, instance.log)
-        if self.lines is not None:
-            self.lines.publish(unit)
+        if self.extrapolated_inputs is not None:
+            self.extrapolated_inputs.publish(unit)
 
     def save(self, units: Collection[str]) -> SavedStates:
         """Save the states of units, of all or none; `restore` goes back to them, `forget` frees them.
@@ -194,7 +196,7 @@ class Ensemble:
         Raises:
             UnitFailure: a unit does not give its state.
         """
-        states = SavedStates({}, self.lines.save(units) if self.lines is not None else {})
+        states = SavedStates({}, self.extrapolated_inputs.save(units) if self.extrapolated_inputs is not None else {})
         try:
             for name in units:
                 states[name] = self.instances[name].save_state()
@@ -225,8 +227,8 @@ class Ensemble:
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
-        if self.lines is not None and isinstance(states, SavedStates):
-            self.lines.restore(states.lines)
+        if self.extrapolated_inputs is not None and isinstance(states, SavedStates):
+            self.extrapolated_inputs.restore(states.extrapolated_inputs)
         for name, state in states.items():
             self.instances[name].restore_state(state)
             self.publish(name)
@@ -263,9 +265,9 @@ class Ensemble:
 
     def _load(self) -> None:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        self._endings.add(temporary.cleanup)
+        self._cleanups.add(temporary.cleanup)
         folder = Path(temporary.name)
-        self.heartbeat.tell_scratch(temporary.name)
+        self.heartbeat.record_scratch_folder(temporary.name)
         unpacked: dict[Path, Path] = {}
         for name, unit in self.system.units.items():
             d = unit.description
@@ -273,7 +275,7 @@ class Ensemble:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
             instance = self._make(name, unpacked[d.path])
-            self._endings.add(functools.partial(self._free, instance))
+            self._cleanups.add(functools.partial(self._free, instance))
             self.instances[name] = instance
 
     def _make(self, name: str, folder: Path) -> Instance:
@@ -286,7 +288,7 @@ class Ensemble:
                 if not self.is_corrupt(instance):
                     instance.end()
 
-        self._endings.add(end)
+        self._cleanups.add(end)
 
     def _free(self, instance: Instance) -> None:
         if not self.is_corrupt(instance):

@@ -11,13 +11,13 @@ from handover.cosim.fmu.calls import State, StepEnd
 from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.stepping.ensemble import Endings, Ensemble
+from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.system.schedule import Slot
 from handover.cosim.system.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
 
-_SHORTEST = 2.0**-10
+_MIN_STEP = 2.0**-10
 """How much of a discarded step the shortest is that is tried."""
 
 
@@ -28,17 +28,19 @@ class EventEnsemble(Ensemble):
         ends: how the last step of each unit ended.
     """
 
-    def __init__(self, system: System, heartbeat: Heartbeat | None = None, endings: Endings | None = None) -> None:
+    def __init__(
+        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None
+    ) -> None:
         self.ends: dict[str, StepEnd] = {}
         self._begun: dict[str, tuple[float, State]] = {}
-        super().__init__(system, heartbeat, endings)
-        self._staying = [u.name for u in system.units.values() if not u.sampled and not can_go_back(u)]
-        self._told: set[str] = set()
+        super().__init__(system, heartbeat, cleanups)
+        self._staying = [u.name for u in system.units.values() if not u.sampled and not can_roll_back(u)]
+        self._warned: set[str] = set()
 
     def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
         """Take all units through initialisation mode; those with events are in event mode after that."""
         super().initialize(slots, work_out)
-        self._endings.add(self._forget_begins)
+        self._cleanups.add(self._forget_begins)
 
     @property
     def event_units(self) -> dict[str, EventInstance]:
@@ -69,8 +71,8 @@ class EventEnsemble(Ensemble):
             UnitFailure: its call failed, or it does not come as far as before.
         """
         if unit not in self._begun:
-            if unit not in self._told:
-                self._told.add(unit)
+            if unit not in self._warned:
+                self._warned.add(unit)
                 _log.warning("%s cannot go back to the event at t = %.9g s: it stays at the end of its step", unit, t)
             return False
         begin, state = self._begun[unit]
@@ -115,7 +117,7 @@ class EventEnsemble(Ensemble):
         if others := [n for n in self._staying if n != instance.name]:
             raise instance.discarded(end.reached, f"the others would have to go back too, and {_unable(others)}")
         tried = dt
-        while tried > dt * _SHORTEST:
+        while tried > dt * _MIN_STEP:
             came = end.reached - t
             tried = came if 0.0 < came < tried else tried / 2.0
             instance.restore_state(self._begun[instance.name][1])
@@ -145,13 +147,13 @@ class EventEnsemble(Ensemble):
         return make(name, unit.description, folder, self.system.sources_of(name), self.heartbeat)
 
 
-def can_go_back(unit: PlacedUnit) -> bool:
+def can_roll_back(unit: PlacedUnit) -> bool:
     """Whether a unit's step can be taken back and repeated shorter."""
     return unit.description.capabilities.saves_state and unit.description.capabilities.varies_step
 
 
 def _unable(units: Iterable[str]) -> str:
-    told = ", ".join(units)
+    text = ", ".join(units)
     return (
-        f"{told} cannot save its state or vary its step (canGetAndSetFMUstate, canHandleVariableCommunicationStepSize)"
+        f"{text} cannot save its state or vary its step (canGetAndSetFMUstate, canHandleVariableCommunicationStepSize)"
     )

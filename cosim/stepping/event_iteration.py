@@ -8,7 +8,7 @@ from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.failures import UnsettledEvents
 from handover.cosim.stepping.event_ensemble import EventEnsemble
 
-MOST_ITERATIONS = 100
+MAX_ITERATIONS = 100
 """Most iterations at one instant, and most rounds of values within one."""
 
 
@@ -42,7 +42,7 @@ class EventIteration:
         restless = set[str]()
         for unit in flagged:
             self._enter(unit, inside)
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             self._tick_due(t, present, inside)
             self._exchange(t, present, inside)
             restless = {n for n in self._ordered(inside) if self._units[n].update(t)}
@@ -52,9 +52,7 @@ class EventIteration:
             if not restless and not any(self._due(t, n) for n in present):
                 break
         else:
-            raise UnsettledEvents(
-                [n for n in self._units if n in restless] or self._ordered(inside), t, MOST_ITERATIONS
-            )
+            raise UnsettledEvents([n for n in self._units if n in restless] or self._ordered(inside), t, MAX_ITERATIONS)
         for unit in self._ordered(inside):
             self._units[unit].enter_step_mode()
         return inside
@@ -71,24 +69,24 @@ class EventIteration:
 
     def _exchange(self, t: float, present: Collection[str], inside: set[str]) -> None:
         """Let values and ticks go round until none changes."""
-        pending, told = set(inside), set[tuple[str, str]]()
+        pending, entries = set(inside), set[tuple[str, str]]()
         changed = set[str]()
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             joining = self._disturbed(t, present) - inside
             for unit in self._ordered(joining):
                 self._enter(unit, inside)
             pending |= joining
-            changed = {n for n in self._ordered(inside) if self._pass_on(t, n, pending, told, present, inside)}
+            changed = {n for n in self._ordered(inside) if self._pass_on(t, n, pending, entries, present, inside)}
             if not changed:
                 return
-        raise UnsettledEvents(self._ordered(changed), t, MOST_ITERATIONS, "the exchange in event mode")
+        raise UnsettledEvents(self._ordered(changed), t, MAX_ITERATIONS, "the exchange in event mode")
 
     def _pass_on(
         self,
         t: float,
         unit: str,
         pending: set[str],
-        told: set[tuple[str, str]],
+        entries: set[tuple[str, str]],
         present: Collection[str],
         inside: set[str],
     ) -> bool:
@@ -101,7 +99,7 @@ class EventIteration:
             return False
         pending.discard(unit)
         self._ensemble.publish(unit)
-        ticks = {(unit, clock) for clock in instance.ticking()} - told
+        ticks = {(unit, clock) for clock in instance.ticking()} - entries
         if ticks:
             self._ensemble.publish(unit)  # once more, for what can be reached while the clock ticks
         for target, clock in (end for tick in sorted(ticks) for end in self._triggers[tick]):
@@ -109,14 +107,14 @@ class EventIteration:
             self._enter(target, inside)
             self._units[target].tick([clock])
             pending.add(target)
-        told |= ticks
+        entries |= ticks
         return True
 
     def _check_present(self, t: float, unit: str, clock: str, present: Collection[str]) -> None:
         if unit not in present:
             at = self._ensemble.instances[unit].time
-            told = f"that its clock {clock} ticks while it is at t = {at:.9g} s, and it cannot go back"
-            raise UnitFailure(unit, "fmi3SetClock", t, told)
+            entries = f"that its clock {clock} ticks while it is at t = {at:.9g} s, and it cannot go back"
+            raise UnitFailure(unit, "fmi3SetClock", t, entries)
 
     def _disturbed(self, t: float, present: Collection[str]) -> set[str]:
         """Return the units at t whose discrete inputs have changed."""

@@ -12,7 +12,7 @@ from typing import Any
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.failures import UnsettledEvents
 from handover.cosim.stepping.event_ensemble import EventEnsemble
-from handover.cosim.stepping.event_iteration import MOST_ITERATIONS, EventIteration
+from handover.cosim.stepping.event_iteration import MAX_ITERATIONS, EventIteration
 from handover.cosim.stepping.options import Extrapolation, MasterOptions
 from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule, Slot
@@ -88,14 +88,14 @@ class EventStepper:
         for slot in sampled:
             self._due[slot.unit] += self._periods[slot.unit]
         units: list[str] = []
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             stalled = self._continuous()
             if not stalled:
                 return
             units = [slot.unit for slot in stalled]
             self._iteration.settle(self.time, self._flagged(), units)
             self._step([], stalled)
-        raise UnsettledEvents(units, self.time, MOST_ITERATIONS, "fmi3DoStep")
+        raise UnsettledEvents(units, self.time, MAX_ITERATIONS, "fmi3DoStep")
 
     def _step(self, sampled: Sequence[Slot], due: Sequence[Slot]) -> None:
         targets = {slot.unit: self._target(slot.unit) for slot in due}
@@ -190,7 +190,7 @@ def has_events(system: System, options: MasterOptions) -> bool:
     return system.has_events or (options.repeat_discarded and options.adaptive is None)
 
 
-def refuse_off_grid(system: System, options: MasterOptions) -> None:
+def check_off_grid(system: System, options: MasterOptions) -> None:
     """Refuse what is defined for steps on a grid only; `check_control` refuses events where the step follows the error.
 
     Raises:

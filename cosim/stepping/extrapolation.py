@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import Connection, PortName, System
 
 Moments = tuple[int, NDArray[np.float64], int, NDArray[np.float64]]
 """Tick and values before, tick and values last; the arrays are not written to again."""
 
 
-class Trace:
+class SampleHistory:
     """The line through an output's last two points; level while there is one point only.
 
     `values` is where the output's values live.
@@ -76,26 +76,26 @@ class _Line:
     """An input, the trace of its source, and where in the step the input is evaluated, in halves of the step."""
 
     port: str
-    trace: Trace
+    history: SampleHistory
     target: NDArray[Any]
-    change: Linear
+    change: LinearTransformation
     halves: int
     rate: NDArray[Any] | None = None
 
     def follow(self, half_ticks: int, tick: float) -> None:
         factor, offset = self.change.factor, self.change.offset
-        self.target[...] = self.trace.at(half_ticks) * factor + offset
+        self.target[...] = self.history.at(half_ticks) * factor + offset
         if self.rate is not None:
-            self.rate[...] = self.trace.rate(tick) * factor
+            self.rate[...] = self.history.rate(tick) * factor
 
-    def lead_to(self, end: NDArray[np.float64], dt: float) -> None:
-        begin = self.trace.last * self.change.factor + self.change.offset
+    def extrapolate_to(self, end: NDArray[np.float64], dt: float) -> None:
+        begin = self.history.last * self.change.factor + self.change.offset
         self.target[...] = begin + (end - begin) * (self.halves / 2)
         if self.rate is not None:
             self.rate[...] = (end - begin) / dt
 
 
-class LinearInputs:
+class LinearExtrapolation:
     """Sets inputs on the lines through what their sources gave at their last two communication points.
 
     The line is drawn on where the source is not yet as far as the unit, and lies between two values of the source where
@@ -120,7 +120,7 @@ class LinearInputs:
         self._instances = instances
         self._tick = float(tick)
         self._at = dict.fromkeys(instances, 0)
-        self._traces: dict[str, dict[str, Trace]] = {name: {} for name in instances}
+        self._histories: dict[str, dict[str, SampleHistory]] = {name: {} for name in instances}
         self._lines: dict[str, list[_Line]] = {name: [] for name in instances}
         followed = [c for c in system.connections if _is_followed(system, c)]
         ports: dict[str, list[str]] = defaultdict(list)
@@ -129,7 +129,7 @@ class LinearInputs:
         for name, fed in ports.items():
             if instances[name].description.capabilities.interpolates_inputs:
                 instances[name].interpolate(fed)
-        at_once = _acting_at_once(system)
+        at_once = _feedthrough_inputs(system)
         for c in followed:
             self._lines[c.target.unit].append(self._line(system, c, at_once=c.target in at_once))
 
@@ -138,7 +138,7 @@ class LinearInputs:
         at, long = 2 * self._ticks(t), self._ticks(dt)
         for line in self._lines[unit]:
             if line.port in ends:
-                line.lead_to(ends[line.port], dt)
+                line.extrapolate_to(ends[line.port], dt)
             else:
                 line.follow(at + line.halves * long, self._tick)
 
@@ -148,12 +148,12 @@ class LinearInputs:
 
     def publish(self, unit: str) -> None:
         """Take note of a unit's outputs where it is."""
-        for trace in self._traces[unit].values():
-            trace.record(self._at[unit])
+        for history in self._histories[unit].values():
+            history.record(self._at[unit])
 
     def save(self, units: Collection[str]) -> dict[str, Memory]:
         """Return what is remembered of units, for `restore`."""
-        return {u: {"at": self._at[u], "moments": {p: t.moments for p, t in self._traces[u].items()}} for u in units}
+        return {u: {"at": self._at[u], "moments": {p: t.moments for p, t in self._histories[u].items()}} for u in units}
 
     def restore(self, memories: Mapping[str, Memory]) -> None:
         """Go back to what `save` gave."""
@@ -161,29 +161,29 @@ class LinearInputs:
             self._at[unit] = memory["at"]
             moments: Mapping[str, Moments] = memory["moments"]
             for port, then in moments.items():
-                self._traces[unit][port].moments = then
+                self._histories[unit][port].moments = then
 
     def get_state(self) -> dict[str, Any]:
         """Return all that is remembered as JSON can hold it."""
-        traces = {u: {p: t.get_state() for p, t in ts.items()} for u, ts in self._traces.items()}
-        return {"at": dict(self._at), "traces": traces}
+        histories = {u: {p: t.get_state() for p, t in ts.items()} for u, ts in self._histories.items()}
+        return {"at": dict(self._at), "traces": histories}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to what `get_state` gave."""
         self._at = dict(state["at"])
-        for unit, traces in self._traces.items():
-            for port, trace in traces.items():
-                trace.set_state(state["traces"][unit][port])
+        for unit, histories in self._histories.items():
+            for port, history in histories.items():
+                history.set_state(state["traces"][unit][port])
 
     def _line(self, system: System, c: Connection, *, at_once: bool) -> _Line:
-        target, traces = self._instances[c.target.unit], self._traces[c.source.unit]
+        target, histories = self._instances[c.target.unit], self._histories[c.source.unit]
         values = self._instances[c.source.unit].y[c.source.port][0]
         rate = target.du.get(c.target.port)
         return _Line(
             port=c.target.port,
-            trace=traces.setdefault(c.source.port, Trace(values)),
+            history=histories.setdefault(c.source.port, SampleHistory(values)),
             target=target.u[c.target.port][0],
-            change=system.change_by(c) or Linear(),
+            change=system.change_by(c) or LinearTransformation(),
             halves=0 if rate else 2 if at_once else 1,
             rate=rate[0] if rate else None,
         )
@@ -200,7 +200,7 @@ def _is_followed(system: System, c: Connection) -> bool:
     return all(port.is_continuous for port in ends)
 
 
-def _acting_at_once(system: System) -> set[PortName]:
+def _feedthrough_inputs(system: System) -> set[PortName]:
     """Return the inputs that are declared to act at once on an output that feeds a unit."""
     feeding = {c.source for c in system.connections}
     inputs: set[PortName] = set()

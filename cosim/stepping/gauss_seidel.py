@@ -38,8 +38,8 @@ class GroupStepping:
         self._place = {name: (i, j) for i, group in enumerate(groups) for j, name in enumerate(group.units)}
         self._iterated: dict[tuple[str, ...], IteratedStep | None] = {}
         for name, (i, _) in self._place.items():
-            if groups[i].circle:
-                ensemble.instances[name].goes_back = True
+            if groups[i].cycle:
+                ensemble.instances[name].can_roll_back = True
 
     def step(self, t: float, due: Sequence[Slot]) -> None:
         """Step units that are due.
@@ -48,9 +48,9 @@ class GroupStepping:
             UnitFailure: a unit's call failed. NotConverged: a circle did not come to agree.
         """
         in_order = sorted(due, key=lambda slot: self._place[slot.unit])
-        for circle, members in itertools.groupby(in_order, key=self._circle_of):
+        for cycle, members in itertools.groupby(in_order, key=self._cycle_index):
             slots = list(members)
-            iterated = None if circle is None else self._iterated_step(self._groups[circle], slots)
+            iterated = None if cycle is None else self._iterated_step(self._groups[cycle], slots)
             if iterated is None:
                 self._one_after_another(t, slots)
             else:
@@ -69,10 +69,10 @@ class GroupStepping:
                 step.solver.set_state(learnt)
             self._iterated[tuple(units)] = step
 
-    def _circle_of(self, slot: Slot) -> int | None:
+    def _cycle_index(self, slot: Slot) -> int | None:
         """Return the place of the group that a unit iterates with; None for those that step by themselves."""
         i, _ = self._place[slot.unit]
-        return i if self._groups[i].circle else None
+        return i if self._groups[i].cycle else None
 
     def _iterated_step(self, group: Group, slots: Sequence[Slot]) -> IteratedStep | None:
         units = tuple(s.unit for s in slots)
@@ -84,7 +84,7 @@ class GroupStepping:
         interface = Interface(self._ensemble, group.back(units))
         if not len(interface):
             return None
-        return IteratedStep(self._ensemble, interface, self._make_solver(interface), self._count, group.told)
+        return IteratedStep(self._ensemble, interface, self._make_solver(interface), self._count, group.message)
 
     def _one_after_another(self, t: float, due: Sequence[Slot]) -> None:
         with self._ensemble.stopwatch() as charge:

@@ -33,7 +33,7 @@ class ChainedDerivatives:
         back = set(group.back(group.units))
         self._forward: dict[str, list[Connection]] = {name: [] for name in group.units}
         self._outputs: dict[str, list[str]] = {name: [] for name in group.units}
-        real = [c for c in group.circle if self._kind(c) is Kind.REAL]
+        real = [c for c in group.cycle if self._kind(c) is Kind.REAL]
         for c in real:
             if c not in back:
                 self._forward[c.target.unit].append(c)
@@ -112,7 +112,7 @@ class InitialValues:
                     self._ensemble.feed_known(unit, self._known)
                     self._ensemble.publish(unit)
                     self._known.add(unit)
-                if group.circle:
+                if group.cycle:
                     self._solve(group)
 
     def _solve(self, group: Group) -> None:
@@ -134,4 +134,4 @@ class InitialValues:
         try:
             solver.solve(g, interface.read(0.0), jacobian)
         except Unsolved as e:
-            raise not_converged(group.units, 0.0, e, interface, solver.magnitudes, group.told) from e
+            raise not_converged(group.units, 0.0, e, interface, solver.magnitudes, group.message) from e

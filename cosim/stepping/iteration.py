@@ -98,10 +98,10 @@ class NotConverged(UnitFailure):
         return f"came to no solution in {count}: {self.why}"
 
     @property
-    def told(self) -> str:
+    def message(self) -> str:
         """What happened, the signal that moves most, and the loop."""
-        most = [f"{name} still moves by {by:.3g}" for name, by in self.moving[:1]]
-        return "; ".join([self.what, *most, *([f"algebraic loop: {self.loop}"] if self.loop else [])])
+        fastest_moving = [f"{name} still moves by {by:.3g}" for name, by in self.moving[:1]]
+        return "; ".join([self.what, *fastest_moving, *([f"algebraic loop: {self.loop}"] if self.loop else [])])
 
     def as_data(self) -> dict[str, Any]:
         """Return the failure as JSON can hold it."""
@@ -179,8 +179,8 @@ class IteratedStep:
     def _step_one(self, t: float, slot: Slot, x: Floats) -> None:
         self._ensemble.gather(slot.unit, t)
         self._interface.write(slot.unit, x)
-        if self._ensemble.lines is not None:
-            self._ensemble.lines.feed(slot.unit, t, slot.period, self._interface.parts(slot.unit, x))
+        if self._ensemble.extrapolated_inputs is not None:
+            self._ensemble.extrapolated_inputs.feed(slot.unit, t, slot.period, self._interface.parts(slot.unit, x))
         self._ensemble.instances[slot.unit].set_inputs()
         self._ensemble.step(slot.unit, t, slot.period)
         self._ensemble.publish(slot.unit)

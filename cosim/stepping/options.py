@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, fields
 from fractions import Fraction
 from typing import Any
 
-from handover.cosim.exceptions import BadOptions
+from handover.cosim.exceptions import InvalidOptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +51,10 @@ class AdaptiveStep:
         if self.largest is not None and self.largest < self.smallest:
             faults.append(f"the largest step, {float(self.largest):g} s, is below the smallest, {self._least}")
         if self.initial is not None and not self.smallest <= self.initial <= (self.largest or self.initial):
-            most = "" if self.largest is None else f" to {float(self.largest):g} s"
-            faults.append(f"the first step, {float(self.initial):g} s, is out of the range from {self._least}{most}")
+            upper = "" if self.largest is None else f" to {float(self.largest):g} s"
+            faults.append(f"the first step, {float(self.initial):g} s, is out of the range from {self._least}{upper}")
         if faults:
-            raise BadOptions(faults)
+            raise InvalidOptions(faults)
 
     @property
     def _least(self) -> str:
@@ -116,7 +116,7 @@ class MasterOptions:
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
     tolerance: float = 1e-8
-    most_iterations: int = 100
+    max_iterations: int = 100
     extrapolation: Extrapolation = Extrapolation.HOLD
     adaptive: AdaptiveStep | None = None
     cpu_times: bool = False
@@ -131,14 +131,14 @@ class MasterOptions:
             "algorithm": (isinstance(given["algorithm"], Algorithm), f"one of {_names(Algorithm)}"),
             "extrapolation": (isinstance(given["extrapolation"], Extrapolation), f"one of {_names(Extrapolation)}"),
             "adaptive": (isinstance(given["adaptive"], AdaptiveStep | None), "None, or such as AdaptiveStep()"),
-            "most_iterations": (_is_above_0(given["most_iterations"], int), "a whole number from 1 on"),
+            "max_iterations": (_is_above_0(given["max_iterations"], int), "a whole number from 1 on"),
             "tolerance": (_is_above_0(given["tolerance"], int | float), "a finite number above 0"),
             "call_limit": (_is_above_0(given["call_limit"], int | float, None), "None, or a finite number above 0"),
             "pace": (_is_above_0(given["pace"], int | float, None), "None, or a finite number above 0"),
         }
-        faults = [f"{name} = {given[name]!r}: {told} is right" for name, (fits, told) in right.items() if not fits]
+        faults = [f"{name} = {given[name]!r}: {found} is right" for name, (fits, found) in right.items() if not fits]
         if faults:
-            raise BadOptions(faults)
+            raise InvalidOptions(faults)
 
     def as_data(self) -> dict[str, Any]:
         """Return what decides on a run's signals, as JSON can hold it; exact numbers of seconds are texts."""
@@ -148,7 +148,7 @@ class MasterOptions:
         return {
             "algorithm": self.algorithm.value,
             "tolerance": self.tolerance,
-            "iterations": self.most_iterations,
+            "iterations": self.max_iterations,
             "extrapolation": self.extrapolation.value,
             "adaptive": control,
             "repeat_discarded": self.repeat_discarded,

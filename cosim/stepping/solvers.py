@@ -84,9 +84,9 @@ class FixedPoint:
         most_iterations: after so many calls of g, it gives up.
     """
 
-    def __init__(self, magnitudes: Magnitudes, most_iterations: int) -> None:
+    def __init__(self, magnitudes: Magnitudes, max_iterations: int) -> None:
         self.magnitudes = magnitudes
-        self._most = most_iterations
+        self._max_iterations = max_iterations
 
     def solve(self, g: Map, x: Floats, jacobian: Jacobian | None = None) -> Solution:  # noqa: ARG002
         """Iterate; see `InterfaceSolver`."""
@@ -94,7 +94,7 @@ class FixedPoint:
         weight = 1.0
         before: Floats | None = None
         residual = residual_of(g, x, 1)
-        for iteration in range(1, self._most):
+        for iteration in range(1, self._max_iterations):
             if not np.any(self.magnitudes.moving(x, residual)):
                 self.magnitudes.learn(x)
                 return Solution(x, iteration)
@@ -103,9 +103,9 @@ class FixedPoint:
             x, before = x + weight * residual, residual
             residual = residual_of(g, x, iteration + 1)
         if np.any(self.magnitudes.moving(x, residual)):
-            raise Unsolved("values have not settled", self._most, x, residual)
+            raise Unsolved("values have not settled", self._max_iterations, x, residual)
         self.magnitudes.learn(x)
-        return Solution(x, self._most)
+        return Solution(x, self._max_iterations)
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the magnitudes; see `InterfaceSolver`."""
@@ -142,16 +142,16 @@ class InterfaceNewton:
         most_iterations: after so many calls of g, differences not counted, it gives up.
     """
 
-    def __init__(self, magnitudes: Magnitudes, most_iterations: int) -> None:
+    def __init__(self, magnitudes: Magnitudes, max_iterations: int) -> None:
         self.magnitudes = magnitudes
-        self._most = most_iterations
+        self._max_iterations = max_iterations
         self._kept: Floats | None = None
 
     def solve(self, g: Map, x: Floats, jacobian: Jacobian | None = None) -> Solution:
         """Iterate; see `InterfaceSolver`."""
         residual: Floats = residual_of(g, x, 1)
         fresh = False
-        for iteration in range(1, self._most):
+        for iteration in range(1, self._max_iterations):
             if not np.any(self.magnitudes.moving(x, residual)):
                 return self._solved(x, iteration)
             dx = self._step(x, residual)
@@ -168,8 +168,8 @@ class InterfaceNewton:
             x, residual, fresh = moved, after, False
         if np.any(self.magnitudes.moving(x, residual)):
             self._kept = None
-            raise Unsolved("values have not settled", self._most, x, residual)
-        return self._solved(x, self._most)
+            raise Unsolved("values have not settled", self._max_iterations, x, residual)
+        return self._solved(x, self._max_iterations)
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the magnitudes and the Jacobian; see `InterfaceSolver`."""

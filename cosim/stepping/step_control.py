@@ -19,7 +19,7 @@ from handover.cosim.system.signals import Column
 
 _K_I, _K_P = 0.3, 0.4
 _SAFETY = 0.9
-_LEAST, _MOST = 0.2, 5.0
+_MIN_FACTOR, _MAX_FACTOR = 0.2, 5.0
 """How much a step may shrink or grow at once."""
 _FLOOR = 1e-10
 """An error of 0 would ask for an infinite step."""
@@ -48,13 +48,13 @@ class PiController:
         else:
             change = _SAFETY * r ** (-_K_I / self._power) * (self._before / r) ** (_K_P / self._power)
         self._before = r
-        return min(max(change, _LEAST), _MOST)
+        return min(max(change, _MIN_FACTOR), _MAX_FACTOR)
 
     def after_rejection(self, error: float) -> float:
         """Return the next attempt's length over that of a rejected step, which was this erroneous."""
         self._before = None
-        change = _SAFETY * error ** (-1 / self._power) if error < float("inf") else _LEAST
-        return min(max(change, _LEAST), _SAFETY)
+        change = _SAFETY * error ** (-1 / self._power) if error < float("inf") else _MIN_FACTOR
+        return min(max(change, _MIN_FACTOR), _SAFETY)
 
     def get_state(self) -> Mapping[str, Any]:
         """Return what is remembered as JSON can hold it."""

@@ -8,7 +8,7 @@ Fixed steps, each unit at its own rate, on one exact grid.
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from handover.cosim.stepping.extrapolation import LinearInputs
+from handover.cosim.stepping.extrapolation import LinearExtrapolation
 from handover.cosim.system.schedule import Schedule, Slot
 
 
@@ -67,8 +67,10 @@ class GridStepper:
     `lines` is what extrapolated inputs follow, if any are.
     """
 
-    def __init__(self, schedule: Schedule, coupling: Coupling, lines: LinearInputs | None = None) -> None:
-        self._lines = lines
+    def __init__(
+        self, schedule: Schedule, coupling: Coupling, extrapolated_inputs: LinearExtrapolation | None = None
+    ) -> None:
+        self._extrapolated_inputs = extrapolated_inputs
         self.time = 0.0
         self._schedule = schedule
         self._coupling = coupling
@@ -97,15 +99,17 @@ class GridStepper:
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks, what the coupling keeps and what inputs follow; see `Stepper`."""
-        lines = {} if self._lines is None else {"lines": self._lines.get_state()}
+        extrapolated_inputs = (
+            {} if self._extrapolated_inputs is None else {"lines": self._extrapolated_inputs.get_state()}
+        )
         ticks = {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
-        return {**ticks, "coupling": self._coupling.get_state(), **lines}
+        return {**ticks, "coupling": self._coupling.get_state(), **extrapolated_inputs}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go back to ticks that `get_state` gave."""
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self._coupling.set_state(state["coupling"])
-        if self._lines is not None:
-            self._lines.set_state(state["lines"])
+        if self._extrapolated_inputs is not None:
+            self._extrapolated_inputs.set_state(state["lines"])
         self.time = self._schedule.time(self._tick)

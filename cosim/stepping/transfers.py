@@ -22,7 +22,7 @@ from handover.cosim.fmu.buffers import Copy, Views, joined
 from handover.cosim.fmu.description import FmuPort, indices_of
 from handover.cosim.fmu.failures import NotFinite
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
 
 
@@ -50,7 +50,7 @@ class Narrowing:
         """
         for number in self.values.tolist():
             if not self.width.holds(number):
-                fault = f"{self.source} is {number}, which does not fit {self.width.told}"
+                fault = f"{self.source} is {number}, which does not fit {self.width.range_text}"
                 raise UnitFailure(self.unit, f"setting {self.port}", t, "Error", (fault,))
 
 
@@ -72,7 +72,7 @@ class ScaledCopy:
     narrower: whoever does the same in C must keep the compiler from fusing the two operations.
     """
 
-    def __init__(self, target: NDArray[Any], source: NDArray[Any], linear: Linear) -> None:
+    def __init__(self, target: NDArray[Any], source: NDArray[Any], linear: LinearTransformation) -> None:
         self.target, self.source, self.linear = target, source, linear
         self._between: NDArray[np.float64] = np.empty(len(source))
 
@@ -135,7 +135,7 @@ class Feeding(NamedTuple):
     copies: Sequence[Copy]
     scaled: Sequence[ScaledCopy]
 
-    def carry_out(self, t: float) -> None:
+    def transfer(self, t: float) -> None:
         """Fill a unit's buffers at t.
 
         Raises:
@@ -166,7 +166,7 @@ def finite_checks(system: System, instances: Mapping[str, Instance]) -> dict[str
 
 
 def _feeding(
-    system: System, instances: Mapping[str, Instance], name: str, changes: Mapping[PortName, Linear]
+    system: System, instances: Mapping[str, Instance], name: str, changes: Mapping[PortName, LinearTransformation]
 ) -> Feeding:
     instance = instances[name]
     copies: list[Copy] = []

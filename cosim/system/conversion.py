@@ -11,7 +11,7 @@ from handover.cosim.blocks.units import UNKNOWN, Unit
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearTransformation:
     """Value at the input = factor * value at the output + offset: two operations in double precision, each rounded."""
 
     factor: float = 1.0
@@ -20,7 +20,7 @@ class Linear:
     @property
     def is_identity(self) -> bool:
         """Whether it changes nothing."""
-        return self == Linear()
+        return self == LinearTransformation()
 
     @property
     def fault(self) -> str | None:
@@ -38,12 +38,12 @@ class Linear:
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 _LONG = 10**13
 """A decimal fraction of more digits than this has was cut off or rounded somewhere."""
-_LARGEST_DIVISOR = 1000
+_MAX_DIVISOR = 1000
 _ROUNDING = Fraction(1, 10**14)
 """Tools write factors with 15 digits or more."""
 
 
-def conversion(source: Unit, target: Unit) -> Linear:
+def conversion(source: Unit, target: Unit) -> LinearTransformation:
     """Return what converts a value from a unit into another, each of its two numbers rounded once.
 
     From SI = f_s v + o_s = f_t w + o_t follows w = (f_s / f_t) v + (o_s - o_t) / f_t. The units' own numbers are taken
@@ -51,7 +51,7 @@ def conversion(source: Unit, target: Unit) -> Linear:
     nearest to pi/180, and radians in degrees by that nearest to 180/pi.
     """
     f_s, o_s, f_t, o_t = (meant_by(x) for x in (source.factor, source.offset, target.factor, target.offset))
-    return Linear(float(f_s / f_t), float((o_s - o_t) / f_t))
+    return LinearTransformation(float(f_s / f_t), float((o_s - o_t) / f_t))
 
 
 def pass_as_they_are(a: Unit, b: Unit) -> bool:
@@ -69,7 +69,7 @@ def meant_by(number: float) -> Fraction:
     if max(abs(decimal.numerator), decimal.denominator) < _LONG:
         return decimal
     for scale in (Fraction(1), _PI):
-        near = (decimal / scale).limit_denominator(_LARGEST_DIVISOR) * scale
+        near = (decimal / scale).limit_denominator(_MAX_DIVISOR) * scale
         if abs(near - decimal) <= _ROUNDING * abs(decimal):
             return near
     return decimal

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import ScheduleError
-from handover.cosim.system.ordering import Needs, Told, ordered, strongly_connected
+from handover.cosim.system.ordering import DescribeWait, Needs, ordered, strongly_connected
 from handover.cosim.system.system import Connection, PortName, System
 
 
@@ -26,7 +26,7 @@ class AlgebraicLoop:
 
     outputs: tuple[PortName, ...]
     connections: tuple[Connection, ...]
-    told: str
+    message: str
     """A shortest circle, spelled out: `a.y -> b.u, b.u acts on b.y at once, b.y -> a.u, ...`."""
 
     @property
@@ -45,20 +45,20 @@ def algebraic_loops(system: System, units: Collection[str]) -> list[AlgebraicLoo
             ends = [PortName(name, u) for u in d.feedthrough.get(y, ())]
             ways[PortName(name, y)] = [fed[end] for end in ends if end in fed]
     needs = {y: [c.source for c in cs] for y, cs in ways.items()}
-    circles = [c for c in strongly_connected(needs) if len(c) > 1 or c[0] in needs[c[0]]]
-    return [_loop(circle, ways) for circle in circles]
+    cycles = [c for c in strongly_connected(needs) if len(c) > 1 or c[0] in needs[c[0]]]
+    return [_loop(cycle, ways) for cycle in cycles]
 
 
-def _loop(circle: Sequence[PortName], ways: Mapping[PortName, Sequence[Connection]]) -> AlgebraicLoop:
-    inside = set(circle)
-    kept = {y: [c for c in ways[y] if c.source in inside] for y in circle}
+def _loop(cycle: Sequence[PortName], ways: Mapping[PortName, Sequence[Connection]]) -> AlgebraicLoop:
+    inside = set(cycle)
+    kept = {y: [c for c in ways[y] if c.source in inside] for y in cycle}
     connections = tuple(dict.fromkeys(c for cs in kept.values() for c in cs))
-    shortest = _shortest(circle[0], kept)
-    told = ", ".join(f"{c.source} -> {c.target}, {c.target} acts on {y} at once" for c, y in shortest)
+    shortest = _shortest(cycle[0], kept)
+    text = ", ".join(f"{c.source} -> {c.target}, {c.target} acts on {y} at once" for c, y in shortest)
     more = len(connections) - len({c for c, _ in shortest})
     if more:
-        told += f" (and {more} more connection{'s' if more > 1 else ''} between these outputs and inputs)"
-    return AlgebraicLoop(tuple(circle), connections, told)
+        text += f" (and {more} more connection{'s' if more > 1 else ''} between these outputs and inputs)"
+    return AlgebraicLoop(tuple(cycle), connections, text)
 
 
 def _shortest(start: PortName, ways: Mapping[PortName, Sequence[Connection]]) -> list[tuple[Connection, PortName]]:
@@ -92,13 +92,13 @@ class Group:
     """
 
     units: tuple[str, ...]
-    circle: tuple[Connection, ...] = ()
-    told: str = ""
+    cycle: tuple[Connection, ...] = ()
+    message: str = ""
 
     def back(self, units: Collection[str]) -> list[Connection]:
         """Return the circle's connections that lead back when only some of its units step, one after another."""
         place = {name: i for i, name in enumerate(self.units) if name in units}
-        inside = [c for c in self.circle if c.source.unit in place and c.target.unit in place]
+        inside = [c for c in self.cycle if c.source.unit in place and c.target.unit in place]
         return [c for c in inside if place[c.source.unit] >= place[c.target.unit]]
 
 
@@ -122,7 +122,11 @@ def groups_of_data_flow(system: System, units: Sequence[str], loops: Sequence[Al
 
 
 def in_order(
-    groups: Sequence[Group], firm: Needs[str], soft: Needs[str], told_soft: Told[int], told_firm: Told[int]
+    groups: Sequence[Group],
+    firm: Needs[str],
+    soft: Needs[str],
+    describe_soft: DescribeWait[int],
+    describe_firm: DescribeWait[int],
 ) -> list[Group]:
     """Order groups by what their units need of each other's; see `ordered`, which tells of groups by their index."""
     place = {name: i for i, group in enumerate(groups) for name in group.units}
@@ -130,27 +134,27 @@ def in_order(
     def lifted(needs: Needs[str], i: int) -> set[int]:
         names = groups[i].units
         others = {place[n] for name in names for n in needs.get(name, ()) if n in place}
-        return others if len(names) == 1 and not groups[i].circle else others - {i}
+        return others if len(names) == 1 and not groups[i].cycle else others - {i}
 
     firm_groups = {i: lifted(firm, i) - {i} for i in range(len(groups))}
     soft_groups = {i: lifted(soft, i) for i in range(len(groups))}
-    return [groups[i] for i in ordered(firm_groups, soft_groups, told_soft, told_firm)]
+    return [groups[i] for i in ordered(firm_groups, soft_groups, describe_soft, describe_firm)]
 
 
 def _groups(units: Sequence[str], connections: Sequence[Connection], loops: Sequence[AlgebraicLoop]) -> list[Group]:
     needs = _needs(units, connections)
     sets = strongly_connected(needs)
     place = {n: i for i, names in enumerate(sets) for n in names}
-    circles: dict[int, list[Connection]] = {i: [] for i in range(len(sets))}
+    cycles: dict[int, list[Connection]] = {i: [] for i in range(len(sets))}
     for c in connections:
         if place[c.source.unit] == place[c.target.unit]:
-            circles[place[c.source.unit]].append(c)
-    told: dict[int, str] = {}
+            cycles[place[c.source.unit]].append(c)
+    text: dict[int, str] = {}
     for loop in loops:
         i = place.get(loop.units[0], -1)
-        told[i] = f"{told[i]}; {loop.told}" if i in told else loop.told
+        text[i] = f"{text[i]}; {loop.message}" if i in text else loop.message
     orders = [_easily_ordered(names, needs) for names in sets]
-    return [Group(tuple(order), tuple(circles[i]), told.get(i, "")) for i, order in enumerate(orders)]
+    return [Group(tuple(order), tuple(cycles[i]), text.get(i, "")) for i, order in enumerate(orders)]
 
 
 def _easily_ordered(names: Sequence[str], needs: Needs[str]) -> list[str]:
@@ -174,50 +178,50 @@ _CURE = (
 )
 
 
-def refuse_loops(system: System, loops: Sequence[AlgebraicLoop], goes_back: bool) -> None:
+def check_loops(system: System, loops: Sequence[AlgebraicLoop], rolls_back: bool) -> None:
     """Check that algebraic loops can be solved: their signals are real, and units can go over a step again.
 
     Args:
         system: it has no faults of wiring.
         loops: its algebraic loops.
-        goes_back: whether loops are solved at each step, and not at the start alone.
+        rolls_back: whether loops are solved at each step, and not at the start alone.
 
     Raises:
         ScheduleError: with all loops that cannot be solved, each spelled out, and what would help.
     """
-    faults = [(loop, fault) for loop in loops if (fault := _fault(system, loop, goes_back))]
+    faults = [(loop, fault) for loop in loops if (fault := _fault(system, loop, rolls_back))]
     if not faults:
         return
-    told = "".join(f"\n  - {loop.told}: {fault}" for loop, fault in faults)
+    text = "".join(f"\n  - {loop.message}: {fault}" for loop, fault in faults)
     n = f"{len(faults)} algebraic loop{'s' if len(faults) > 1 else ''}"
-    raise ScheduleError(f"{n} cannot be solved (outputs depend on themselves at once):{told}")
+    raise ScheduleError(f"{n} cannot be solved (outputs depend on themselves at once):{text}")
 
 
-def refuse_circles(system: System, groups: Sequence[Group]) -> None:
+def check_cycles(system: System, groups: Sequence[Group]) -> None:
     """Check that all units which are connected in a circle can go over a step again.
 
     Raises:
         ScheduleError: with all that cannot.
     """
-    circles = [group for group in groups if group.circle]
-    faults = [(group, stateless) for group in circles if (stateless := _stateless(system, group.units))]
+    cycles = [group for group in groups if group.cycle]
+    faults = [(group, stateless) for group in cycles if (stateless := _stateless(system, group.units))]
     if not faults:
         return
-    told = "".join(f"\n  - {', '.join(names)} (connected in a circle: {_list(g.units)})" for g, names in faults)
+    text = "".join(f"\n  - {', '.join(names)} (connected in a circle: {_list(g.units)})" for g, names in faults)
     raise ScheduleError(
         "iterating goes over steps again, which takes units that save their state (canGetAndSetFMUState), but these "
-        f"do not:{told}\n  gauss-seidel and jacobi do without"
+        f"do not:{text}\n  gauss-seidel and jacobi do without"
     )
 
 
-def _fault(system: System, loop: AlgebraicLoop, goes_back: bool) -> str | None:
+def _fault(system: System, loop: AlgebraicLoop, rolls_back: bool) -> str | None:
     ends = [(c, system.units[c.source.unit].description.outputs[c.source.port].kind) for c in loop.connections]
     unreal = [f"{c.source} is {kind.value}" for c, kind in ends if kind is not Kind.REAL]
     if unreal:
         return (
             f"only real signals can be iterated, but {', '.join(unreal)}; a unit in between that delays one would help"
         )
-    stateless = _stateless(system, loop.units) if goes_back else []
+    stateless = _stateless(system, loop.units) if rolls_back else []
     if stateless:
         verb = "do not save their states" if len(stateless) > 1 else "does not save its state"
         return f"{', '.join(stateless)} {verb}, so a step cannot be gone over again; {_CURE}"

@@ -14,7 +14,7 @@ T = TypeVar("T", bound=Hashable)
 Needs = Mapping[T, Collection[T]]
 """What each thing needs; things that are no keys are left out of account."""
 
-Told = Callable[[T, set[T]], None]
+DescribeWait = Callable[[T, set[T]], None]
 """Told of a thing that is placed before others that it needs."""
 
 
@@ -34,7 +34,7 @@ def strongly_connected(needs: Needs[T]) -> list[list[T]]:
     return list(sets.values())
 
 
-def ordered(firm: Needs[T], soft: Needs[T], told_soft: Told[T], told_firm: Told[T]) -> list[T]:
+def ordered(firm: Needs[T], soft: Needs[T], describe_soft: DescribeWait[T], describe_firm: DescribeWait[T]) -> list[T]:
     """Order the keys of `firm` so that each follows those that it needs; as given where nothing is said.
 
     Where needs close a circle, a soft one is passed over first, then a firm one of a circle that nothing outside it
@@ -55,10 +55,10 @@ def ordered(firm: Needs[T], soft: Needs[T], told_soft: Told[T], told_firm: Told[
             _, chosen = heapq.heappop(ready)
         elif (free := next((n for n in left if not waits_firm[n]), None)) is not None:
             chosen = free
-            told_soft(chosen, waits_soft[chosen])
+            describe_soft(chosen, waits_soft[chosen])
         else:
-            chosen = _held_up_by_its_circle({n: waits_firm[n] for n in left})
-            told_firm(chosen, waits_firm[chosen])
+            chosen = _blocked_by_its_cycle({n: waits_firm[n] for n in left})
+            describe_firm(chosen, waits_firm[chosen])
         del left[chosen]
         order.append(chosen)
         for n in followers[chosen]:
@@ -69,6 +69,6 @@ def ordered(firm: Needs[T], soft: Needs[T], told_soft: Told[T], told_firm: Told[
     return order
 
 
-def _held_up_by_its_circle(waits: Needs[T]) -> T:
-    circles = strongly_connected(waits)
-    return next(c[0] for c in circles if all(set(waits[n]) <= set(c) for n in c))
+def _blocked_by_its_cycle(waits: Needs[T]) -> T:
+    cycles = strongly_connected(waits)
+    return next(c[0] for c in cycles if all(set(waits[n]) <= set(c) for n in c))

@@ -12,7 +12,7 @@ from handover.cosim.system.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
 
-_FINEST = 10_000
+_MAX_TICKS_PER_STEP = 10_000
 """How many ticks the shortest period may have; more means that the periods do not fit each other."""
 
 
@@ -80,28 +80,28 @@ class Schedule:
         loops = algebraic_loops(system, names)
         self.loops += loops
         sources = {n: {port: source.unit for port, source in system.sources_of(n).items()} for n in names}
-        declared = {u.name: _acting(sources[u.name], u.description.feedthrough) for u in units}
-        presumed = {u.name: _acting(sources[u.name], u.description.presumed_feedthrough) for u in units}
+        declared = {u.name: _feeding_through(sources[u.name], u.description.feedthrough) for u in units}
+        presumed = {u.name: _feeding_through(sources[u.name], u.description.presumed_feedthrough) for u in units}
         groups = groups_of_loops(names, loops)
 
         def units_of(waits: set[int], needed: Mapping[str, set[str]], group: int) -> str:
             needs = {n for name in groups[group].units for n in needed[name]}
             return ", ".join(sorted(n for i in waits for n in groups[i].units if n in needs))
 
-        def told_presumed(group: int, waits: set[int]) -> None:
+        def log_presumed(group: int, waits: set[int]) -> None:
             names, others = ", ".join(groups[group].units), units_of(waits, presumed, group)
             _log.warning("%s does not declare what acts at once; it gets the former values of %s", names, others)
 
-        def told_declared(group: int, waits: set[int]) -> None:
+        def log_declared(group: int, waits: set[int]) -> None:
             late = {n for i in waits for n in groups[i].units}
-            ports = [(n, port) for n in groups[group].units for port in _acting_ports(system.units[n])]
+            ports = [(n, port) for n in groups[group].units for port in _feedthrough_ports(system.units[n])]
             self.initial_passes += sum(sources[n].get(port) in late for n, port in ports)
             names, others = ", ".join(groups[group].units), units_of(waits, declared, group)
             _log.warning(
                 "%s steps first where units wait for each other; it gets the former values of %s", names, others
             )
 
-        return tuple(in_order(groups, declared, presumed, told_presumed, told_declared))
+        return tuple(in_order(groups, declared, presumed, log_presumed, log_declared))
 
     def _slots(self, system: System, groups: Sequence[Group]) -> tuple[Slot, ...]:
         periods = {n: system.units[n].period for group in groups for n in group.units}
@@ -113,17 +113,17 @@ def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
         return Fraction(1)
     denominator = math.lcm(*(u.period.denominator for u in units))
     tick = Fraction(math.gcd(*(int(u.period * denominator) for u in units)), denominator)
-    if tick * _FINEST < min(u.period for u in units):
-        told = ", ".join(f"{u.name} {u.period} s" for u in units)
-        raise ScheduleError(f"the communication steps of these units fit no common grid: {told}")
+    if tick * _MAX_TICKS_PER_STEP < min(u.period for u in units):
+        text = ", ".join(f"{u.name} {u.period} s" for u in units)
+        raise ScheduleError(f"the communication steps of these units fit no common grid: {text}")
     return tick
 
 
-def _acting_ports(unit: PlacedUnit) -> set[str]:
+def _feedthrough_ports(unit: PlacedUnit) -> set[str]:
     return {u for us in unit.description.feedthrough.values() for u in us}
 
 
-def _acting(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:
+def _feeding_through(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:
     """Return the units that feed inputs which act on outputs at once."""
     acting = {u for us in feedthrough.values() for u in us}
     return {unit for port, unit in sources.items() if port in acting}

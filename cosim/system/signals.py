@@ -79,7 +79,7 @@ Observer = Callable[[float, Signals], None]
 
 
 @dataclass(frozen=True)
-class FromThenOn:
+class ObserveAfter:
     """An observer of a run that goes on from t_0 seconds: `observe` saw that point before, and sees what follows."""
 
     t_0: float

@@ -17,7 +17,7 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu.clocks import FmuClock
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
-from handover.cosim.system.conversion import Linear, conversion, pass_as_they_are
+from handover.cosim.system.conversion import LinearTransformation, conversion, pass_as_they_are
 
 
 def clock_mismatch(a: FmuClock | None, b: FmuClock | None) -> str | None:
@@ -37,10 +37,10 @@ def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[
     clocked = sorted(p.name for p in (*d.inputs.values(), *d.outputs.values()) if p.clocks)
     if not clocked:
         return []
-    told = f"{name}: {', '.join(clocked)} can be reached only while a clock ticks, in event mode"
+    text = f"{name}: {', '.join(clocked)} can be reached only while a clock ticks, in event mode"
     if not d.capabilities.event_mode:
-        return [f"{told}, which its FMU does not have (hasEventMode)"]
-    return [f"{told}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
+        return [f"{text}, which its FMU does not have (hasEventMode)"]
+    return [f"{text}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
 
 
 def once_faults(units: Iterable[tuple[str, FmuDescription]]) -> list[str]:
@@ -121,7 +121,7 @@ class Connection:
 
     source: PortName
     target: PortName
-    transformation: Linear | None = None
+    transformation: LinearTransformation | None = None
 
 
 class System:
@@ -158,7 +158,7 @@ class System:
         self.units[name] = unit
         return unit
 
-    def connect(self, source: PortName, target: PortName, transformation: Linear | None = None) -> None:
+    def connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
         """Let an output feed an input.
 
         Real values are converted to the input's unit where both have the same dimension. A `transformation` takes the
@@ -212,7 +212,7 @@ class System:
         unit = self.units.get(end.unit)
         return unit.description.clocks.get(end.port) if unit else None
 
-    def change_by(self, c: Connection) -> Linear | None:
+    def change_by(self, c: Connection) -> LinearTransformation | None:
         """Return how a connection, one without faults, changes values; None where it copies them, or joins clocks."""
         change = c.transformation
         if self._clock(c.target):
@@ -233,8 +233,8 @@ class System:
             raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
         if period is not None and period > 0:
             return Fraction(period)
-        told = "its FMU proposes no communication step" if period is None else f"its communication step is {period} s"
-        self._faults.append(f"{name}: {told}; give one that is above 0 s")
+        text = "its FMU proposes no communication step" if period is None else f"its communication step is {period} s"
+        self._faults.append(f"{name}: {text}; give one that is above 0 s")
         return Fraction(1, 100)
 
     def _connection_faults(self, c: Connection) -> list[str]:
@@ -278,7 +278,7 @@ def _value_faults(unit: PlacedUnit) -> list[str]:
     return faults
 
 
-def mismatch(a: FmuPort, b: FmuPort, transformation: Linear | None = None) -> str | None:
+def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
     """Return why an output cannot feed an input, or None."""
     if a.kind is not b.kind:
         return f"{a.kind.value} cannot feed {b.kind.value}"

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import (
     add,
     add_cross,
@@ -37,7 +37,7 @@ from handover.plants.free_flyer.rigid_body import RigidBody, TurnsTooFast, inert
 _HALF_A_TURN = math.pi
 
 
-class UnusableFlyer(Refusal):
+class InvalidFlyerParameters(InvalidParameters):
     """Parameters that no rigid body has; `faults` lists all of them."""
 
     block = "FreeFlyer"
@@ -79,7 +79,7 @@ class Params:
         """Raise UnusableFlyer, with all faults, if no rigid body has these values."""
         faults = inertia_faults(self.mass, self.I_B) + unit_faults("q_WB_0", self.q_WB_0)
         if faults:
-            raise UnusableFlyer(faults)
+            raise InvalidFlyerParameters(faults)
 
 
 @dataclass(kw_only=True)
@@ -143,7 +143,7 @@ class FreeFlyer:
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where the robot is; no time passes."""
-        return self._told()
+        return self._outputs()
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
@@ -153,7 +153,7 @@ class FreeFlyer:
         for _ in range(count):
             advance(h, *wrench)
         self._draw()
-        return self._told()
+        return self._outputs()
 
     def get_state(self) -> bytes:
         """Return the complete state."""
@@ -174,7 +174,7 @@ class FreeFlyer:
     def _draw(self) -> None:
         self._noise = (self._deviations * self._rng.standard_normal(12)).tolist()
 
-    def _told(self) -> Outputs:
+    def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
         b = self._body
         R = rotation_matrix(b.q)

@@ -187,8 +187,8 @@ class FlyerGripper:
         """Move the fingers for dt towards a closure from 0, open, to 1; take hold or let go."""
         p = self._p
         target = p.angle_open + min(max(closure, 0.0), 1.0) * (p.angle_empty - p.angle_open)
-        before, most = self.angle, p.gripper_rate * dt
-        after = before + min(max(target - before, -most), most)
+        before, max_turn = self.angle, p.gripper_rate * dt
+        after = before + min(max(target - before, -max_turn), max_turn)
         if self.grip is None:
             if after <= self._angle_object < before:
                 self.grip = self._grasp(G, body)

@@ -39,19 +39,19 @@ from handover.cosim.blocks.units import (
 from handover.plants.free_flyer.attachment import Attachment, Frame
 from handover.plants.free_flyer.floating_object import FloatingObject
 from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
-from handover.plants.free_flyer.parameters import Motion, Params, StartHolder, UnusableHand
-from handover.plants.free_flyer.person import Activity, FlyerPerson, Seen, minimum_jerk
+from handover.plants.free_flyer.parameters import InvalidHandParameters, Motion, Params, StartHolder
+from handover.plants.free_flyer.person import Activity, FlyerPerson, Perception, minimum_jerk
 
 __all__ = [
     "Activity",
     "HandAndObject",
     "Holder",
     "Inputs",
+    "InvalidHandParameters",
     "Motion",
     "Outputs",
     "Params",
     "StartHolder",
-    "UnusableHand",
 ]
 
 _THUMB = [1.0, 0.8]
@@ -151,15 +151,15 @@ class HandAndObject:
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where everything is; no time passes."""
-        return self._told()
+        return self._outputs()
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
         G = Frame(vector(u.p_WG), quaternion(u.q_WG), vector(u.v_WG), vector(u.w_WB))
         if self._robot is None:
-            self._refuse_overlap(G)
+            self._check_overlap(G)
         before, body, person, hand = self._robot or G, self._object.body, self._person, self._hand
-        person.act(dt, self._seen(u.light, before))
+        person.act(dt, self._perception(u.light, before))
         self._gripper.act(dt, u.closure, before, body)
         hand.take_or_leave(person.holding, body)
         course, f_fist, p_GF = hand.move(dt, person.p, person.q), ZERO, ZERO
@@ -170,7 +170,7 @@ class HandAndObject:
         self._f_H = subtract(self._f_H, f_fist)
         hand.arrive(course, body)
         self._robot = G
-        return self._told()
+        return self._outputs()
 
     def get_state(self) -> bytes:
         """Return the complete state."""
@@ -190,7 +190,7 @@ class HandAndObject:
         self._gripper.grip = None if held is None else Attachment(self._gripper.stiffness, *held)
         self._robot = None if robot is None else Frame(*robot)
 
-    def _refuse_overlap(self, G: Frame) -> None:
+    def _check_overlap(self, G: Frame) -> None:
         p, faults = self._p, list[str]()
         apart = distance(self._hand.p, G.p)
         if apart < p.fist_radius + p.palm_width:
@@ -203,11 +203,11 @@ class HandAndObject:
                 f"rad; open them to {p.angle_object:.3g} rad at least, or move p_WO_0 or the robot's start"
             )
         if faults:
-            raise UnusableHand(faults)
+            raise InvalidHandParameters(faults)
 
-    def _seen(self, light: bool, G: Frame) -> Seen:
+    def _perception(self, light: bool, G: Frame) -> Perception:
         b, hand = self._object.body, self._hand
-        return Seen(
+        return Perception(
             light=light,
             angle=self._gripper.angle,
             G=G,
@@ -243,7 +243,7 @@ class HandAndObject:
         s = 1.0 / count
         self._f_G, self._tau_G, self._f_H = scale(s, f_G), scale(s, tau_G), scale(s, f_H)
 
-    def _told(self) -> Outputs:
+    def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
         b, hand = self._object.body, self._hand
         a = np.array([*self._f_G, *self._tau_G, *b.p, *b.q, *b.v, *hand.p, *hand.q, *self._f_H])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
 from handover.cosim.blocks.units import (
     Hertz,
@@ -25,11 +25,11 @@ from handover.cosim.blocks.units import (
 )
 from handover.plants.free_flyer.rigid_body import unit_faults
 
-LEAST_ROOM = 0.05
+MIN_ROOM = 0.05
 """Metres that must lie between the gripper's and the hand's place on an object for both to hold it."""
 
 
-class UnusableHand(Refusal):
+class InvalidHandParameters(InvalidParameters):
     """Parameters, or a start, that contradict each other; `faults` lists all of them."""
 
     block = "HandAndObject"
@@ -139,7 +139,7 @@ class Params:
         """Raise UnusableHand, with all faults, if values contradict each other."""
         faults = self._object_faults() + self._gripper_faults() + self._person_faults()
         if faults:
-            raise UnusableHand(faults)
+            raise InvalidHandParameters(faults)
 
     def _object_faults(self) -> list[str]:
         faults: list[str] = []
@@ -148,11 +148,11 @@ class Params:
             faults.append(f"object_size {size.tolist()} m: the second side must be the longest, it is held at its ends")
         for name, place in (("p_OG", self.p_OG), ("p_OH", self.p_OH)):
             if np.any(np.abs(place) > size / 2.0):
-                told, half = np.asarray(place).tolist(), (size / 2.0).tolist()
-                faults.append(f"{name} {told} m must lie inside the object, within {half} m of its centre")
+                entries, half = np.asarray(place).tolist(), (size / 2.0).tolist()
+                faults.append(f"{name} {entries} m must lie inside the object, within {half} m of its centre")
         room = float(np.linalg.norm(np.asarray(self.p_OG) - self.p_OH))
-        if room < LEAST_ROOM:
-            faults.append(f"p_OG and p_OH are {room:g} m apart; gripper and hand need {LEAST_ROOM:g} m")
+        if room < MIN_ROOM:
+            faults.append(f"p_OG and p_OH are {room:g} m apart; gripper and hand need {MIN_ROOM:g} m")
         return faults
 
     def _gripper_faults(self) -> list[str]:

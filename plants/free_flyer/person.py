@@ -26,7 +26,7 @@ from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
 
 _PEAK = 1.875
 """Highest speed of a minimum-jerk course over its mean speed."""
-_SHORTEST = 0.3
+_MIN_DURATION = 0.3
 """Seconds that a reach takes at least."""
 _CLOSING = 0.1
 """Radians by which the gripper's angle must change for a person to see it."""
@@ -47,7 +47,7 @@ class Activity(enum.IntEnum):
 
 
 @dataclass(slots=True)
-class Seen:
+class Perception:
     """What the person sees and feels: the gripper and its light, the object, and the hand with its hold of it."""
 
     light: bool
@@ -93,7 +93,7 @@ class FlyerPerson:
         self._clock = 0.0  # seconds in this activity
         self._since = 0.0  # seconds for which what ends it has been there
         self._way, self._speed, self._axis = 0.0, 0.0, self._pull
-        self._lit, self._called, self._answered = False, False, False
+        self._saw_light, self._called, self._answered = False, False, False
         self._reaction = params.reaction_time
         self._acts = {
             Activity.WAIT: self._waits,
@@ -112,15 +112,15 @@ class FlyerPerson:
         """Whether the hand is to be a fist that may touch the gripper."""
         return self._motion is Motion.PUSH and self.activity in (Activity.OFFER, Activity.PUSH, Activity.WITHDRAW)
 
-    def act(self, dt: float, seen: Seen) -> None:
+    def act(self, dt: float, seen: Perception) -> None:
         """Go on for dt with what is seen at its beginning."""
-        if seen.light and not self._lit:
+        if seen.light and not self._saw_light:
             self._called = True
             spread = self._p.reaction_spread * float(self._rng.standard_normal())
             self._reaction = self._p.reaction_time * max(0.1, 1.0 + spread)
             if self.activity in (Activity.WAIT, Activity.REST):
                 self._since = 0.0
-        self._lit = seen.light
+        self._saw_light = seen.light
         self._clock += dt
         if self.holding and not seen.held:
             self.holding = False
@@ -134,7 +134,7 @@ class FlyerPerson:
     def get_state(self) -> bytes:
         """Return the complete state."""
         where = (self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis)
-        signal = (self._lit, self._called, self._answered, self._reaction)
+        signal = (self._saw_light, self._called, self._answered, self._reaction)
         course = (self.holding, self.fingers, self._duration, self._clock, self._since, self._way, self._speed)
         return pickle.dumps((where, signal, course, self._rng.bit_generator.state))
 
@@ -142,10 +142,10 @@ class FlyerPerson:
         """Go back to a state of this person or of one with equal parameters."""
         where, signal, course, self._rng.bit_generator.state = pickle.loads(state)
         self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis = where
-        self._lit, self._called, self._answered, self._reaction = signal
+        self._saw_light, self._called, self._answered, self._reaction = signal
         self.holding, self.fingers, self._duration, self._clock, self._since, self._way, self._speed = course
 
-    def _begin(self, activity: Activity, seen: Seen) -> None:
+    def _begin(self, activity: Activity, seen: Perception) -> None:
         """Start an activity: courses go from where the hand is, or the arm wants it if it holds something."""
         if activity is Activity.LET_GO or not self.holding:
             self.p, self.q = seen.p_WH, seen.q_WH
@@ -155,9 +155,9 @@ class FlyerPerson:
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
             p, _ = goals[activity](seen)
-            self._duration = max(_SHORTEST, _PEAK * distance(p, self.p) / self._p.reach_speed)
+            self._duration = max(_MIN_DURATION, _PEAK * distance(p, self.p) / self._p.reach_speed)
 
-    def _waits(self, dt: float, seen: Seen) -> None:
+    def _waits(self, dt: float, seen: Perception) -> None:
         if not self._called:
             return
         self._since += dt
@@ -169,7 +169,7 @@ class FlyerPerson:
         if self._motion in starts:
             self._begin(starts[self._motion], seen)
 
-    def _can(self, seen: Seen) -> bool:
+    def _can(self, seen: Perception) -> bool:
         if self._motion is Motion.NONE:
             return True
         takes = self._motion is Motion.TAKE
@@ -178,18 +178,18 @@ class FlyerPerson:
         goal, _ = self._at_object(seen) if takes else self._at_palm(seen)
         return distance(goal, self.rest) <= self._p.arm_reach
 
-    def _reaches(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+    def _reaches(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self._follow(*self._at_object(seen))
         if self._clock >= self._duration:
             self._begin(Activity.GRASP, seen)
 
-    def _grasps(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+    def _grasps(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self.p, self.q = self._at_object(seen)
         if self._clock >= self._p.grasp_time:
             self._begin(Activity.PULL, seen)
             self.holding = True
 
-    def _pulls(self, dt: float, seen: Seen) -> None:
+    def _pulls(self, dt: float, seen: Perception) -> None:
         p = self._p
         self._go(dt, self._pull, p.pull_speed, p.pull_ramp, p.pull_distance)
         if not self.holding or self._clock > p.patience:
@@ -197,13 +197,13 @@ class FlyerPerson:
         elif self._has_seen(not seen.gripped, dt):
             self._begin(Activity.WITHDRAW, seen)
 
-    def _offers(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+    def _offers(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self._follow(*self._at_palm(seen))
         if self._clock >= self._duration:
             self._begin(Activity.PUSH, seen)
             self._axis = column(seen.G.R, 0)
 
-    def _pushes(self, dt: float, seen: Seen) -> None:
+    def _pushes(self, dt: float, seen: Perception) -> None:
         p = self._p
         moved = seen.angle < p.angle_open - _CLOSING
         if not moved:
@@ -217,16 +217,16 @@ class FlyerPerson:
         if self._has_seen(empty if gives else moved, dt) or self._clock > p.patience:
             self._begin(Activity.WITHDRAW, seen)
 
-    def _lets_go(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+    def _lets_go(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         if self._clock >= self._p.grasp_time:
             self._begin(Activity.WITHDRAW, seen)
 
-    def _withdraws(self, dt: float, seen: Seen) -> None:  # noqa: ARG002
+    def _withdraws(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self._follow(*self._at_rest(seen))
         if self._clock >= self._duration:
             self._begin(Activity.REST, seen)
 
-    def _let_go(self, seen: Seen) -> None:
+    def _let_go(self, seen: Perception) -> None:
         self._begin(Activity.LET_GO, seen)
         self.holding = False
 
@@ -248,11 +248,11 @@ class FlyerPerson:
         self._way = min(distance, self._way + dt * speed * x * x * (3.0 - 2.0 * x))
         self.p = add_scaled(self._from, self._way, axis)
 
-    def _at_object(self, seen: Seen) -> tuple[Vector, Quaternion]:
+    def _at_object(self, seen: Perception) -> tuple[Vector, Quaternion]:
         """Return the hand's pose at the object's end: the object's axes."""
         return add(seen.O.p, rotate(seen.O.R, self._end)), seen.O.q
 
-    def _at_palm(self, seen: Seen) -> tuple[Vector, Quaternion]:
+    def _at_palm(self, seen: Perception) -> tuple[Vector, Quaternion]:
         """Return the hand's pose where a push begins: with the object, p_OG in front of the palm; a fist, beside it."""
         p, G = self._p, seen.G
         front = p.palm_depth - p.offer_gap
@@ -263,7 +263,7 @@ class FlyerPerson:
         place = (front - 0.5 * float(p.object_size[0]) + x, y, z)
         return add(G.p, rotate(G.R, place)), q
 
-    def _at_rest(self, seen: Seen) -> tuple[Vector, Quaternion]:  # noqa: ARG002
+    def _at_rest(self, seen: Perception) -> tuple[Vector, Quaternion]:  # noqa: ARG002
         return self.rest, self._rest_q
 
 

@@ -172,11 +172,11 @@ def inertia_faults(mass: float, I_B: Floats) -> list[str]:
     if not np.allclose(I_B, np.transpose(I_B), rtol=0.0, atol=1e-9 * float(np.max(np.abs(I_B)))):
         return [*faults, f"I_B {np.asarray(I_B).tolist()} kg m2 must be symmetric"]
     small, middle, large = sorted(float(a) for a in np.linalg.eigvalsh(I_B))
-    told = f"its principal moments are {small:g}, {middle:g}, {large:g} kg m2"
+    text = f"its principal moments are {small:g}, {middle:g}, {large:g} kg m2"
     if not small > 0.0:
-        faults.append(f"I_B must be positive definite; {told}")
+        faults.append(f"I_B must be positive definite; {text}")
     elif large > (small + middle) * (1.0 + 1e-9):
-        faults.append(f"no body has this I_B: {told}, and the largest may not exceed the sum of the others")
+        faults.append(f"no body has this I_B: {text}, and the largest may not exceed the sum of the others")
     return faults
 
 

@@ -78,7 +78,7 @@ class Thrusters:
         command = _sum(u)
         cut = command if self._ideal else self._cut(command)
         thrust = cut if self._lag == 0.0 and not self._delayed else self._thrust
-        return _told(thrust, cut != command)
+        return _outputs(thrust, cut != command)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
@@ -91,7 +91,7 @@ class Thrusters:
                 total = [a + b for a, b in zip(total, part, strict=True)]
         else:
             total = self._follow(dt, cut)
-        return _told([a / dt for a in total], cut != command)
+        return _outputs([a / dt for a in total], cut != command)
 
     def get_state(self) -> bytes:
         """Return the complete state."""
@@ -138,6 +138,6 @@ def _sum(u: Inputs) -> _Command:
     return [a + d, b + e, c + f, g + j, h + k, i + l]
 
 
-def _told(thrust: _Command, saturated: bool) -> Outputs:
+def _outputs(thrust: _Command, saturated: bool) -> Outputs:
     y = np.array(thrust)
     return Outputs(f_B=y[:3], tau_B=y[3:], saturated=saturated)

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.units import (
@@ -26,7 +26,7 @@ from handover.cosim.blocks.units import (
 from handover.plants.hand_tremor import HandTremor
 
 
-class UnusablePartner(Refusal):
+class InvalidPartnerParameters(InvalidParameters):
     """Parameters that contradict each other; `faults` lists all of them."""
 
     block = "HandoverPartner"
@@ -93,7 +93,7 @@ class Params:
         if not self.floor < self.p_WO_0[2]:
             faults.append(f"floor {self.floor:g} m must lie below the offered ball, {self.p_WO_0[2]:g} m")
         if faults:
-            raise UnusablePartner(faults)
+            raise InvalidPartnerParameters(faults)
 
 
 @dataclass(kw_only=True)

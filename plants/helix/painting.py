@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.shapes import Decal, Pixels, Sketch
+from handover.plants.helix.shapes import Decal, Pixels, PolygonLayer
 
 _WALL = 1.7  # m; x of a wall opposite the cameras
 _FLOOR = -1.35  # m; its z
@@ -140,10 +140,10 @@ class Canvas:
         self._fine = np.asarray(fine, dtype=np.uint8)
         self._size = np.array([plain.shape[1], plain.shape[0]])
 
-    def picture(self, sketches: Sequence[Sketch], decals: Sequence[Decal]) -> Pixels:
+    def picture(self, layers: Sequence[PolygonLayer], decals: Sequence[Decal]) -> Pixels:
         """Return the picture, without noise. What is partly behind the camera is left out."""
         picture = np.array(self._backdrop.seen)
-        outlines = [s.outlines.reshape(len(s.depth), -1, 2) for s in sketches] + [d.corners[None] for d in decals]
+        outlines = [s.outlines.reshape(len(s.depth), -1, 2) for s in layers] + [d.corners[None] for d in decals]
         seen, low, high = zip(*[self._extent(points) for points in outlines], strict=True)
         low, high = np.concatenate(low), np.concatenate(high)
         if not len(low):
@@ -153,10 +153,10 @@ class Canvas:
         fine = np.array(self._fine[_FINE * y0 : _FINE * y1, _FINE * x0 : _FINE * x1])
         corner = np.array([x0, y0])
         things: list[tuple[float, NDArray[np.int32] | Decal, list[list[float]]]] = []
-        for sketch, s in zip(sketches, seen, strict=False):
-            on_canvas = np.rint(_on_canvas(sketch.outlines[s], corner) * (1 << _SHIFT)).astype(np.int32)
-            things += zip(sketch.depth[s].tolist(), on_canvas, sketch.colours[s].tolist(), strict=True)
-        things += [(d.depth, d, []) for d, s in zip(decals, seen[len(sketches) :], strict=True) if s[0]]
+        for layer, s in zip(layers, seen, strict=False):
+            on_canvas = np.rint(_on_canvas(layer.outlines[s], corner) * (1 << _SHIFT)).astype(np.int32)
+            things += zip(layer.depth[s].tolist(), on_canvas, layer.colours[s].tolist(), strict=True)
+        things += [(d.depth, d, []) for d, s in zip(decals, seen[len(layers) :], strict=True) if s[0]]
         for _, thing, colours in sorted(things, key=lambda x: -x[0]):
             if isinstance(thing, Decal):
                 _stick(fine, thing.texture, _on_canvas(thing.corners, corner))

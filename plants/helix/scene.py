@@ -14,7 +14,7 @@ import numpy as np
 
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.shapes import Decal, Light, Pixels, Sketch, gripper, hand, sketched
+from handover.plants.helix.shapes import Decal, Light, Pixels, PolygonLayer, gripper, hand, polygons
 
 _RIB_LENGTH = 0.008  # m; ribs and gaps alternate
 _STRIPS = 7  # across the visible half, each of one shade
@@ -22,7 +22,7 @@ _COLOURS = np.array([[172.0, 166.0, 160.0], [92.0, 86.0, 80.0]])  # of a rib, of
 _THICKNESS = np.array([1.0, 0.86])  # of a rib, of a gap
 
 
-def tube(backbone: Floats, radius: float, cut: float, camera: Pinhole, light: Light) -> Sketch:
+def tube(backbone: Floats, radius: float, cut: float, camera: Pinhole, light: Light) -> PolygonLayer:
     """Return the ribs and gaps of a tube.
 
     Args:
@@ -49,8 +49,8 @@ def tube(backbone: Floats, radius: float, cut: float, camera: Pinhole, light: Li
     normals = np.empty((len(kind), _STRIPS, 3))
     normals[..., :2] = middle[:, None] * across[:-1, None]
     normals[..., 2] = -np.sqrt(1.0 - middle**2)
-    shades = light.seen_from(camera.R_WC).shade(normals)
-    return Sketch(0.5 * (depth[:-1] + depth[1:]), quads, _COLOURS[kind][:, None] * shades[..., None])
+    shades = light.in_camera_frame(camera.R_WC).shade(normals)
+    return PolygonLayer(0.5 * (depth[:-1] + depth[1:]), quads, _COLOURS[kind][:, None] * shades[..., None])
 
 
 def _evenly_spaced(backbone: Floats, cut: float) -> Floats:
@@ -80,7 +80,7 @@ class ShadedBall:
     def __init__(self, radius: float, camera: Pinhole, light: Light) -> None:
         self._radius = radius
         self._camera = camera
-        self._texture = _texture(light.seen_from(camera.R_WC))
+        self._texture = _texture(light.in_camera_frame(camera.R_WC))
 
     def decal(self, p_WO: Floats) -> Decal | None:
         """Return the ball with its centre at p_WO; None when the lens is inside it."""
@@ -145,7 +145,7 @@ class MarkerCollar:
         middle = apothem * self._z_RM[:, None]
         self._corners = np.stack([middle + 0.5 * self.width * square, middle + 0.5 * printed * square])
 
-    def sketched(self, p_WR: Floats, R_WR: Floats, camera: Pinhole, light: Light) -> tuple[Sketch, list[Decal]]:
+    def polygons(self, p_WR: Floats, R_WR: Floats, camera: Pinhole, light: Light) -> tuple[PolygonLayer, list[Decal]]:
         """Return the body with the sides and ends that face the camera, and the prints on these sides."""
         R_RW = np.transpose(R_WR)
         corners = p_WR + self._corners @ R_RW
@@ -160,7 +160,7 @@ class MarkerCollar:
         shades[:2] *= 0.8
         depth = float(camera.depth(p_WR))
         outlines = np.concatenate([ends, quads])[facing]
-        body = Sketch(np.array([depth]), outlines[None], (shades[facing, None] * _PLASTIC)[None])
+        body = PolygonLayer(np.array([depth]), outlines[None], (shades[facing, None] * _PLASTIC)[None])
         lit = np.flatnonzero(facing[2:])
         return body, [Decal(depth - 1e-6, _shaded(self._faces[i], float(shades[2 + i])), prints[i]) for i in lit]
 
@@ -210,11 +210,11 @@ class HandoverScene:
         self._collar = collar
         self._ball = ShadedBall(ball_radius, camera, self._light)
 
-    def seen(self, x: Postures) -> tuple[list[Sketch], list[Decal]]:
+    def project(self, x: Postures) -> tuple[list[PolygonLayer], list[Decal]]:
         """Return what there is to paint, in no order."""
         camera, light = self._camera, self._light
         arm = tube(x.backbone, self._arm_radius, 0.5 * self._collar.width, camera, light)
-        body, prints = self._collar.sketched(x.p_WR, rotation_of(x.q_WR), camera, light)
-        limbs = sketched(gripper(x.p_WR, x.p_WG, rotation_of(x.q_WG), x.grip) + hand(x.p_WH), camera, light)
+        body, prints = self._collar.polygons(x.p_WR, rotation_of(x.q_WR), camera, light)
+        limbs = polygons(gripper(x.p_WR, x.p_WG, rotation_of(x.q_WG), x.grip) + hand(x.p_WH), camera, light)
         ball = self._ball.decal(x.p_WO)
         return [arm, body, limbs], prints if ball is None else [*prints, ball]

@@ -23,7 +23,7 @@ Pixels = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Sketch:
+class PolygonLayer:
     """Things made of convex polygons: m things, each of k polygons with n corners, painted in this order.
 
     Attributes:
@@ -61,7 +61,7 @@ class Light:
         """Return brightness, 0 to 1, of surfaces with unit normals, shape (..., 3): Lambert's law over the ambient."""
         return self.ambient + (1.0 - self.ambient) * np.clip(normals @ self.towards, 0.0, None)
 
-    def seen_from(self, R_WC: Floats) -> "Light":
+    def in_camera_frame(self, R_WC: Floats) -> "Light":
         """Return the light in a camera's frame."""
         return Light(self.towards @ R_WC, self.ambient)
 
@@ -85,7 +85,7 @@ def rod(start: Floats, end: Floats, radii: tuple[float, float], colour: tuple[fl
     return Limb(np.array([start, end, end]), np.array([radii[0], radii[1], radii[1]]), colour)
 
 
-def sketched(limbs: Sequence[Limb], camera: Pinhole, light: Light) -> Sketch:
+def polygons(limbs: Sequence[Limb], camera: Pinhole, light: Light) -> PolygonLayer:
     """Return the limbs, each at the depth of its middle.
 
     A limb is filled several times, each time smaller, brighter and nearer to the light: a cheap, smooth shading.
@@ -94,7 +94,7 @@ def sketched(limbs: Sequence[Limb], camera: Pinhole, light: Light) -> Sketch:
     depth = camera.depth(points)
     with np.errstate(divide="ignore", invalid="ignore"):
         middle, radius = camera.project(points), radii * camera.f[0] / depth  # (m, 3, 2), (m, 3)
-    lit = light.seen_from(camera.R_WC)
+    lit = light.in_camera_frame(camera.R_WC)
     side = lit.towards[:2]
     normals = np.column_stack([_OFFSETS[:, None] * side, np.zeros(len(_OFFSETS))])
     normals[:, 2] = -np.sqrt(1.0 - (normals**2).sum(axis=1))
@@ -103,7 +103,7 @@ def sketched(limbs: Sequence[Limb], camera: Pinhole, light: Light) -> Sketch:
     outlines = _outlines(moved, radius[:, None] * (1.0 - _OFFSETS)[:, None])
     colours = np.minimum(np.array([x.colour for x in limbs])[:, None] * shades[:, None], 255.0)
     m, k = outlines.shape[:2]
-    return Sketch(depth.mean(axis=1), outlines.reshape(m, 2 * k, -1, 2), np.repeat(colours, 2, axis=1))
+    return PolygonLayer(depth.mean(axis=1), outlines.reshape(m, 2 * k, -1, 2), np.repeat(colours, 2, axis=1))
 
 
 def _outlines(points: Floats, radius: Floats) -> Floats:

@@ -74,7 +74,7 @@ _DARK = 5  # level of a picture under a cloth
 _HANGING = np.array([0.0, 1.0, 0.0, 0.0])  # q_WR of the arm at rest: R_WR = diag(1, -1, -1)
 
 
-class BadCover(ValueError):
+class InvalidCover(ValueError):
     """A camera's cover ends before it begins."""
 
     is_refusal = True
@@ -177,7 +177,7 @@ class StereoCamera:
         )
         for camera, start, end in self._covers():
             if end < start:
-                raise BadCover(camera, start, end)
+                raise InvalidCover(camera, start, end)
         self._rng = np.random.default_rng(p.seed)
         self._noise = SensorNoise(p.noise, (_HEIGHT, _WIDTH, 3), self._rng)
         self._offsets = self._draw()
@@ -224,4 +224,4 @@ class _View:
         self._canvas = Canvas(Backdrop(camera, _WIDTH, _HEIGHT, p.blur, p.gradient))
 
     def picture(self, u: Inputs) -> Pixels:
-        return self._canvas.picture(*self._scene.seen(u))
+        return self._canvas.picture(*self._scene.project(u))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
@@ -25,7 +25,7 @@ from handover.cosim.blocks.units import (
 )
 
 
-class UnusableArm(Refusal):
+class InvalidArmParameters(InvalidParameters):
     """Values of which no arm can be built; `faults` lists all of them."""
 
     block = "TendonArm"
@@ -91,7 +91,7 @@ class Params:
         """Raise UnusableArm, with all faults, if a value lies outside its range."""
         faults = parameter_faults(self)
         if faults:
-            raise UnusableArm(faults)
+            raise InvalidArmParameters(faults)
 
 
 _MOTOR_MASS = 1e3  # kg: a servo that a tendon's pull hardly moves (5 N: 8 um)
@@ -196,7 +196,7 @@ class TendonDesign:
         l0 = self.params.natural_length / counts
         tension = ((self.params.natural_length - self.params.tendon_length) * EA / l0 + weights) / counts / 3.0
         if np.any(tension <= 0.0):
-            raise UnusableArm(
+            raise InvalidArmParameters(
                 [
                     f"the tendons of segment {i + 1} would hang slack ({tension[i]:.3g} N): natural_length "
                     f"{self.params.natural_length[i]:g} m must exceed tendon_length {self.params.tendon_length[i]:g} m"
@@ -205,5 +205,5 @@ class TendonDesign:
             )
         lengths = self.natural * (1.0 + (weight - 3.0 * tension[self.segment]) / EA)
         if np.any(lengths <= 0.0):
-            raise UnusableArm(["the arm would be pressed to nothing: natural_length is too long for EA"])
+            raise InvalidArmParameters(["the arm would be pressed to nothing: natural_length is too long for EA"])
         return tension, np.append(0.0, np.cumsum(lengths))

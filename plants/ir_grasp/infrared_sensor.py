@@ -3,12 +3,12 @@
 import math
 from bisect import bisect_left
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 
 _TOP = 4095  # of a 12-bit converter
 
 
-class UnusableSensor(Refusal):
+class InvalidSensorParameters(InvalidParameters):
     """A characteristic that cannot be inverted over the range of the sensor; `faults` lists all that is wrong."""
 
     block = "InfraredSensor"
@@ -103,4 +103,4 @@ class InfraredSensor:
                 f"{self._nearest:g} m to {self._farthest:g} m"
             )
         if faults:
-            raise UnusableSensor(faults)
+            raise InvalidSensorParameters(faults)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
@@ -24,7 +24,7 @@ from handover.cosim.blocks.units import (
     Second,
     Tick,
 )
-from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, UnusableSensor
+from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
 
 SEES_NOTHING = 0.2
@@ -34,7 +34,7 @@ _LIGHTEST = 1e-3
 """Least mass of an object, kg: contacts with much heavier phalanges fling away what is lighter."""
 
 
-class UnusableScene(Refusal):
+class InvalidSceneParameters(InvalidParameters):
     """Values of which no scene can be built; `faults` lists all of them."""
 
     block = "GraspScene"
@@ -128,10 +128,10 @@ class Params:
             faults.extend(self._table_faults())
             try:
                 self.sensor()
-            except UnusableSensor as unusable:
+            except InvalidSensorParameters as unusable:
                 faults.extend(unusable.faults)
         if faults:
-            raise UnusableScene(faults)
+            raise InvalidSceneParameters(faults)
 
     def _table_faults(self) -> list[str]:
         yaw, half = self.solid.yaw + self.yaw_O_0, self.table_size / 2.0

@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.ir_grasp.hand import FINGERS
-from handover.plants.ir_grasp.parameters import SEES_NOTHING, Params, UnusableScene
+from handover.plants.ir_grasp.parameters import SEES_NOTHING, InvalidSceneParameters, Params
 from handover.plants.ir_grasp.world import DT, Command, GraspWorld, beginning
 
 _SLOT = 5  # internal steps for which a sensor is active
@@ -36,7 +36,7 @@ class StepSizeError(ValueError):
         self.dt = dt
 
 
-class UnusableCommand(Refusal):
+class InvalidCommand(InvalidParameters):
     """A command that is no number; `faults` names the inputs."""
 
     block = "GraspScene"
@@ -105,7 +105,7 @@ class GraspScene:
         self._since: list[tuple[int, Command]] = []  # internal steps and their command
         self._replayed = 0  # internal steps since the checkpoint
         self._world = GraspWorld(params, self._checkpoint)
-        _refuse_overlap(self._world)
+        _check_overlap(self._world)
         self._rng = np.random.default_rng(params.seed)
         self._clock = 0  # internal steps into the scan of the sensors
         self._ticks = [self._read(i) for i in range(_SENSORS)]
@@ -174,12 +174,12 @@ class GraspScene:
 
     def _read(self, finger: int) -> float:
         p = self._params
-        met = self._world.look(finger, self._rays, p.farthest)
+        met = self._world.cast_rays(finger, self._rays, p.farthest)
         x = sum(self._sensor.ticks(d, cosine, self._reflectivity) for d, cosine in met) / len(self._rays)
         return self._sensor.reading(x + p.noise * float(self._rng.standard_normal()))
 
     def _range(self, finger: int) -> float:
-        met = self._world.look(finger, _MIDDLE, SEES_NOTHING)
+        met = self._world.cast_rays(finger, _MIDDLE, SEES_NOTHING)
         return max(met[0][0], 0.0) if met else SEES_NOTHING  # contacts overlap a little
 
 
@@ -187,16 +187,16 @@ def _command(u: Inputs) -> Command:
     """Return what is commanded, without negative zeros: equal commands are kept once."""
     x, y, yaw, sigma = *u.p_WH_cmd.tolist(), float(u.yaw_cmd), float(u.sigma_cmd)
     if not all(map(math.isfinite, (x, y, yaw, sigma))):
-        told = {"p_WH_cmd": (x, y), "yaw_cmd": (yaw,), "sigma_cmd": (sigma,)}
-        wrong = {name: values for name, values in told.items() if not all(map(math.isfinite, values))}
-        raise UnusableCommand([f"{name} must be finite, not {list(values)}" for name, values in wrong.items()])
+        facts = {"p_WH_cmd": (x, y), "yaw_cmd": (yaw,), "sigma_cmd": (sigma,)}
+        wrong = {name: values for name, values in facts.items() if not all(map(math.isfinite, values))}
+        raise InvalidCommand([f"{name} must be finite, not {list(values)}" for name, values in wrong.items()])
     return x + 0.0, y + 0.0, yaw + 0.0, min(max(sigma, 0.0), 1.0) + 0.0
 
 
-def _refuse_overlap(world: GraspWorld) -> None:
+def _check_overlap(world: GraspWorld) -> None:
     overlaps = world.overlaps()
     if overlaps:
-        told = ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)
-        raise UnusableScene(
-            [f"the hand would start in the object: {told}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"]
+        facts = ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)
+        raise InvalidSceneParameters(
+            [f"the hand would start in the object: {facts}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"]
         )

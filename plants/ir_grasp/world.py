@@ -52,7 +52,7 @@ _PALM_GEAR = sum(f.flexion * f.pulleys[0] for f in FINGERS)
 _RELAXED = sum(f.flexion * f.pulleys[0] * f.spread for f in FINGERS)
 
 
-def taken_up(angles: list[float], yaw: float) -> float:
+def tendon_excursion(angles: list[float], yaw: float) -> float:
     """Return sum r q in m, by the orientations of the 8 phalanges and of the hand, in rad."""
     return sum(map(mul, GEARS, angles)) - _PALM_GEAR * yaw - _RELAXED
 
@@ -205,7 +205,7 @@ class GraspWorld:
         self._drive(x, y, yaw)
         self._edge.advance(_FIRST, [T * gear for gear in GEARS])
 
-    def look(self, finger: int, rays: Sequence[Ray], reach: float) -> list[tuple[float, float]]:
+    def cast_rays(self, finger: int, rays: Sequence[Ray], reach: float) -> list[tuple[float, float]]:
         """Return what rays from a finger's sensor meet within reach: distance in m, cosine of the angle of incidence.
 
         Args:
@@ -235,7 +235,7 @@ class GraspWorld:
 
     def _tension(self, angles: list[float]) -> float:
         p = self._params
-        slack = taken_up(angles, self._wrist[2]) - self._sigma * p.tendon_travel
+        slack = tendon_excursion(angles, self._wrist[2]) - self._sigma * p.tendon_travel
         return p.tendon_stiffness * max(0.0, -slack)
 
     def _drive(self, x: float, y: float, yaw: float) -> None:

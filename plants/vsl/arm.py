@@ -9,22 +9,29 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
 from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
 from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
-from handover.plants.vsl.parameters import HIGHEST_PRESSURE, TURN, Link, Motion, Params, UnusableVslArm
+from handover.plants.vsl.parameters import (
+    HIGHEST_PRESSURE,
+    TURN,
+    InvalidVslArmParameters,
+    Link,
+    Motion,
+    Params,
+)
 from handover.plants.vsl.statics import NoEquilibrium, VslStatics
 
-__all__ = ["Inputs", "Link", "Motion", "Outputs", "Params", "UnusableInput", "UnusableVslArm", "VslArm"]
+__all__ = ["Inputs", "InvalidInput", "InvalidVslArmParameters", "Link", "Motion", "Outputs", "Params", "VslArm"]
 
 HEAVIEST = 0.5
 """Largest load, kg; the published experiments go to 0.1 kg."""
 
 
-class UnusableInput(Refusal):
+class InvalidInput(InvalidParameters):
     """Inputs that are not numbers, or a load or pressure that there is not; `faults` lists all of them."""
 
     block = "VslArm"
@@ -115,13 +122,13 @@ class VslArm:
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where the arm is, at the start at rest with its load; no time passes."""
         if not self._started:
-            _refuse(u)
+            _check_inputs(u)
             self._rest(u.load)
         return self._seen()
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
-        _refuse(u)
+        _check_inputs(u)
         before = self.get_state()
         try:
             if not self._started:
@@ -217,7 +224,7 @@ class VslArm:
         return p
 
 
-def _refuse(u: Inputs) -> None:
+def _check_inputs(u: Inputs) -> None:
     """Raise UnusableInput for what is no number, or no load or pressure."""
     faults: list[str] = []
     if not np.isfinite((*u.q_cmd, *u.qd_cmd, *u.p_cmd)).all():
@@ -227,4 +234,4 @@ def _refuse(u: Inputs) -> None:
     if not 0.0 <= u.load <= HEAVIEST:
         faults.append(f"load {u.load:g} kg must be from 0 to {HEAVIEST:g} kg")
     if faults:
-        raise UnusableInput(faults)
+        raise InvalidInput(faults)

@@ -13,7 +13,7 @@ from handover.plants.vsl.statics import VslStatics
 
 _TOLERANCE = 1e-10
 _ITERATIONS = 8
-_SHORTEST = 1e-5  # s: a step that fails is halved until it is shorter
+_MIN_STEP = 1e-5  # s: a step that fails is halved until it is shorter
 
 
 class NoConvergence(RuntimeError):
@@ -150,7 +150,7 @@ class VslDynamics:
             droop += yielding * torque
             self._offset = last - droop
             self._take_pose(torque, droop)
-        elif h > _SHORTEST:
+        elif h > _MIN_STEP:
             middle = (first + last) / 2.0
             self._substep(h / 2.0, first, middle, held)
             self._substep(h / 2.0, middle, last, held)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
@@ -32,7 +32,7 @@ HIGHEST_PRESSURE = 3.0e5
 """Pa; the published experiments go to 2 bar."""
 
 
-class UnusableVslArm(Refusal):
+class InvalidVslArmParameters(InvalidParameters):
     """Parameters of which no arm can be built; `faults` lists all of them."""
 
     block = "VslArm"
@@ -125,7 +125,7 @@ class Params:
         """Raise UnusableVslArm, with all faults, if values lie outside their ranges or contradict each other."""
         faults = parameter_faults(self) or self._contradictions()
         if faults:
-            raise UnusableVslArm(faults)
+            raise InvalidVslArmParameters(faults)
 
     def _contradictions(self) -> list[str]:
         faults: list[str] = []

@@ -10,8 +10,8 @@ from handover.plants.vsl.chain import Pose, VslChain
 
 _TOLERANCE = 1e-12
 _ITERATIONS = 12
-_FARTHEST = 0.5  # rad: a Newton step that is longer is cut
-_LARGEST_SHARE, _SMALLEST_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # of gravity, by which it is turned up
+_MAX_NEWTON_STEP = 0.5  # rad: a Newton step that is longer is cut
+_MAX_SHARE, _MIN_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # of gravity, by which it is turned up
 
 
 class NoEquilibrium(RuntimeError):
@@ -69,13 +69,13 @@ class VslStatics:
 
     def settle(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
         """Rest at the angles of J2 and J3 that the servos aim at, rad, wherever the arm was before."""
-        tip, reached, share = theta[0] + theta[1], 0.0, _LARGEST_SHARE
+        tip, reached, share = theta[0] + theta[1], 0.0, _MAX_SHARE
         while reached < 1.0:
             bodies = self._bodies(theta, p, load, min(reached + share, 1.0))
             found = _newton(bodies, tip)
             if found is not None and self._rest(bodies, found):
-                tip, reached, share = found, reached + share, min(2.0 * share, _LARGEST_SHARE)
-            elif share > _SMALLEST_SHARE:
+                tip, reached, share = found, reached + share, min(2.0 * share, _MAX_SHARE)
+            elif share > _MIN_SHARE:
                 share /= 2.0
             else:
                 raise NoEquilibrium(theta, p, load)
@@ -152,7 +152,7 @@ def _newton(bodies: list[_Body], tip: float) -> float | None:
         if dphi <= 0.0:
             return None
         change = phi / dphi
-        tip -= max(-_FARTHEST, min(change, _FARTHEST))
+        tip -= max(-_MAX_NEWTON_STEP, min(change, _MAX_NEWTON_STEP))
         if abs(change) < _TOLERANCE:
             return tip
     return None

@@ -12,15 +12,15 @@ from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
 from handover.scenarios.campaign.plan_check import PreparedPlan
 from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter
-from handover.scenarios.campaign.worker_pool import Crew, OnTally, RunAnswer, RunOrder, Tally
-from handover.scenarios.results.run_folder import told_if_not_written
+from handover.scenarios.campaign.worker_pool import JobResult, OnRunCounts, RunCounts, RunJob, WorkerPool
+from handover.scenarios.results.run_folder import disk_errors_reported
 
 
-def carry_out_campaign(
+def run_campaign(
     ready: PreparedPlan,
     folder: CampaignFolder,
-    crew: Crew,
-    progress: OnTally,
+    pool: WorkerPool,
+    progress: OnRunCounts,
     settling: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
 ) -> CampaignTable:
     """Carry out the runs of a campaign that are not done yet, and return the table of all.
@@ -35,11 +35,11 @@ def carry_out_campaign(
         CrewLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
-    check = _nothing if folder.has_all(ready.plan) else crew.check
+    check = _nothing if folder.has_all(ready.plan) else pool.check
     with folder.opened(ready.plan, ready.fmus, check) as fmus:
         work = _Work(ready.plan, folder, progress)
         try:
-            work.give_to(crew, fmus)
+            work.give_to(pool, fmus)
         finally:
             with settling():
                 work.end()
@@ -53,36 +53,36 @@ def _nothing(_folder: Path) -> None:
 class _Work:
     """A campaign under way."""
 
-    def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: OnTally) -> None:
+    def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: OnRunCounts) -> None:
         self.plan, self.folder, self.progress = plan, folder, progress
         self.table = TableWriter(plan, folder.table)
         self.runs = {run.name: run for run in plan.runs()}
         self._count = Counter[str]()
         self._kept = self._keep(self.runs.values())
-        progress(self.tally)
+        progress(self.counts)
 
-    def give_to(self, crew: Crew, fmus: Mapping[str, Path]) -> None:
+    def give_to(self, pool: WorkerPool, fmus: Mapping[str, Path]) -> None:
         """Have the runs carried out that are not done."""
-        orders = [self._order(run, fmus) for run in self._to_do()]
-        if not orders:
+        jobs = [self._job(run, fmus) for run in self._to_do()]
+        if not jobs:
             return
-        with contextlib.closing(crew.carry_out(orders)) as answers:
-            for answer in answers:
-                self._take(answer)
+        with contextlib.closing(pool.run_jobs(jobs)) as results:
+            for result in results:
+                self._take(result)
 
     def end(self) -> None:
         """Write the table, also of runs that have ended but whose answers have not come, as after an interruption."""
         known = {row.run.name for row in self.table.rows if row.status != "lost"}
         if self._keep([run for run in self.runs.values() if run.name not in known]):
-            self.progress(self.tally)
+            self.progress(self.counts)
         self.table.complete()
 
     @property
-    def tally(self) -> Tally:
+    def counts(self) -> RunCounts:
         """How far it has come."""
         n = self._count
         ended = n["done"] + n["failed"]
-        return Tally(total=len(self.runs), kept=self._kept, ended=ended, failed=n["failed"], lost=n["lost"])
+        return RunCounts(total=len(self.runs), kept=self._kept, ended=ended, failed=n["failed"], lost=n["lost"])
 
     def _keep(self, runs: Iterable[PlannedRun]) -> int:
         """Take the rows of those runs that are done, and remove what cannot be read of a run; return how many."""
@@ -93,7 +93,7 @@ class _Work:
             if row is not None:
                 kept.append(row)
             elif left.exists():
-                with told_if_not_written(self.folder.runs):
+                with disk_errors_reported(self.folder.runs):
                     shutil.rmtree(left)
         self.table.keep(kept)
         self._count = Counter(row.status for row in self.table.rows)
@@ -104,8 +104,8 @@ class _Work:
         left = [run for run in self.runs.values() if not self.folder.is_done(run)]
         return sorted(left, key=lambda run: run.repetition)
 
-    def _order(self, run: PlannedRun, fmus: Mapping[str, Path]) -> RunOrder:
-        return RunOrder(
+    def _job(self, run: PlannedRun, fmus: Mapping[str, Path]) -> RunJob:
+        return RunJob(
             name=run.name,
             scenario=self.plan.scenario,
             parameters=tuple(f"{name}={value}" for name, value in run.parameters.items()),
@@ -115,14 +115,14 @@ class _Work:
             options=self.plan.options,
         )
 
-    def _take(self, answer: RunAnswer) -> None:
-        run = self.runs[answer.name]
-        row = None if answer.lost else row_of(run, self.folder.runs / run.name)
+    def _take(self, result: JobResult) -> None:
+        run = self.runs[result.name]
+        row = None if result.lost else row_of(run, self.folder.runs / run.name)
         if row is None:
-            if answer.no_room:
-                raise RecordNotWritten(self.folder.runs / run.name, answer.no_room)
-            reason = answer.lost or "its folder does not say how it ended"
+            if result.no_room:
+                raise RecordNotWritten(self.folder.runs / run.name, result.no_room)
+            reason = result.lost or "its folder does not say how it ended"
             row = RunRow(run=run, status="lost", success=None, reason=reason)
         self._count[row.status] += 1
-        self.progress(self.tally)
+        self.progress(self.counts)
         self.table.add(row)

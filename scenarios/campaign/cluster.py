@@ -16,15 +16,21 @@ from typing import Any, TypeVar, cast
 from distributed import Client, Future, KilledWorker
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.campaign.worker import carry_out_run, difference, end_runs, fault_of_folder, tell_versions
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
-from handover.scenarios.execution.errors import BadCrew, CrewLost
-from handover.scenarios.results.run_folder import told_if_not_written, versions
+from handover.scenarios.campaign.worker import (
+    difference,
+    end_runs,
+    fault_of_folder,
+    package_versions,
+    run_job_on_worker,
+)
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.scenarios.execution.errors import ClusterLost, PoolError
+from handover.scenarios.results.run_folder import disk_errors_reported, versions
 
-_Answer = TypeVar("_Answer")
+_T = TypeVar("_T")
 
 
-def asked_aside(ask: Callable[[], _Answer], bound: float) -> _Answer:
+def call_with_timeout(ask: Callable[[], _T], bound: float) -> _T:
     """Return what a function returns that is called in a thread of its own.
 
     So it may run an event loop where the caller's thread has one already, as in a notebook.
@@ -36,22 +42,22 @@ def asked_aside(ask: Callable[[], _Answer], bound: float) -> _Answer:
     Raises:
         TimeoutError: it has not returned in time. What it raises itself, besides.
     """
-    told: queue.SimpleQueue[tuple[_Answer] | Exception] = queue.SimpleQueue()
+    value: queue.SimpleQueue[tuple[_T] | Exception] = queue.SimpleQueue()
 
     def wait() -> None:
         try:
-            told.put((ask(),))
+            value.put((ask(),))
         except Exception as e:  # raised where it is waited for
-            told.put(e)
+            value.put(e)
 
     threading.Thread(target=wait, daemon=True).start()
     try:
-        answer = told.get(timeout=bound)
+        result = value.get(timeout=bound)
     except queue.Empty:
         raise TimeoutError(f"no answer within {bound:g} s") from None
-    if isinstance(answer, Exception):
-        raise answer
-    return answer[0]
+    if isinstance(result, Exception):
+        raise result
+    return result[0]
 
 
 _AHEAD = 2
@@ -60,10 +66,10 @@ _AHEAD = 2
 Of many thousand it would hold many thousand, and take their workers' loss for their fault.
 """
 
-_MOST_TOLD = 3
+_MAX_REPORTED = 3
 """Workers that a refusal names."""
 
-_LOOK = 5.0
+_POLL_INTERVAL = 5.0
 """How often it is looked whether there are workers while no run ends, s."""
 
 _WITHOUT = 60.0
@@ -73,7 +79,7 @@ _BOUND = 10.0
 """How long workers get to answer what is asked of all, s."""
 
 
-class ClusterCrew:
+class ClusterPool:
     """The workers of a Dask cluster.
 
     Args:
@@ -98,19 +104,21 @@ class ClusterCrew:
             BadCrew: some do not; the first of them are named.
             RecordNotWritten: this process cannot write there itself.
         """
-        told = self._ask(tell_versions)
-        self._refuse({worker: _difference(self._versions, other) for worker, other in told.items()})
+        value = self._ask(package_versions)
+        self._raise_faults({worker: _difference(self._versions, other) for worker, other in value.items()})
         token = uuid.uuid4().hex
         mark = folder / f".{token}"
-        with told_if_not_written(folder):
+        with disk_errors_reported(folder):
             try:
                 mark.write_text(token, encoding="utf-8")
-                told = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
+                value = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
             finally:
                 mark.unlink(missing_ok=True)
-        self._refuse({w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in told.items()})
+        self._raise_faults(
+            {w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in value.items()}
+        )
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
         """Give each order to a worker; yield the answers as they come.
 
         A worker that is lost is replaced where something watches it (a nanny), and its run begun anew. If the iteration
@@ -119,22 +127,22 @@ class ClusterCrew:
         Raises:
             CrewLost: the scheduler has gone, or no worker has been there for a while.
         """
-        waiting = iter(orders)
-        going: dict[Any, tuple[RunOrder, Future[RunAnswer]]] = {}
-        done: queue.SimpleQueue[Future[RunAnswer]] = queue.SimpleQueue()
+        waiting = iter(jobs)
+        going: dict[Any, tuple[RunJob, Future[JobResult]]] = {}
+        done: queue.SimpleQueue[Future[JobResult]] = queue.SimpleQueue()
 
         def give() -> None:
-            for order in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(going))):
+            for job in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(going))):
                 key = f"run-{uuid.uuid4().hex}"
-                future = self._client.submit(carry_out_run, order, self._batch, self._versions, key=key, pure=False)
-                going[future.key] = order, future
+                future = self._client.submit(run_job_on_worker, job, self._batch, self._versions, key=key, pure=False)
+                going[future.key] = job, future
                 future.add_done_callback(done.put)
 
         try:
             give()
             while going:
-                order, future = going.pop(self._next(done).key)
-                answer = self._answer(order, future)
+                job, future = going.pop(self._next(done).key)
+                answer = self._result(job, future)
                 give()
                 yield answer
         finally:
@@ -149,27 +157,27 @@ class ClusterCrew:
         with contextlib.suppress(Exception):
             self._ask(end_runs, ended)
 
-    def _next(self, done: "queue.SimpleQueue[Future[RunAnswer]]") -> "Future[RunAnswer]":
+    def _next(self, done: "queue.SimpleQueue[Future[JobResult]]") -> "Future[JobResult]":
         """Wait for a run's end."""
         there = time.monotonic()
         while True:
             with contextlib.suppress(queue.Empty):
-                return done.get(timeout=_LOOK)
+                return done.get(timeout=_POLL_INTERVAL)
             if self.workers:
                 there = time.monotonic()
             elif time.monotonic() - there > _WITHOUT:
-                raise CrewLost(f"{self._name} has had no worker for {_WITHOUT:g} s")
+                raise ClusterLost(f"{self._name} has had no worker for {_WITHOUT:g} s")
 
-    def _answer(self, order: RunOrder, future: "Future[RunAnswer]") -> RunAnswer:
+    def _result(self, job: RunJob, future: "Future[JobResult]") -> JobResult:
         if future.cancelled():
-            raise CrewLost(f"the scheduler of {self._name} is gone")
+            raise ClusterLost(f"the scheduler of {self._name} is gone")
         error = cast("BaseException | None", future.exception())
         if error is None:
             return future.result()
         if isinstance(error, KilledWorker):
             times = error.allowed_failures + 1
-            return RunAnswer(name=order.name, lost=f"its worker was lost {times} times: killed, or out of memory")
-        return RunAnswer(name=order.name, lost=f"{type(error).__name__}: {one_line(error)}")
+            return JobResult(name=job.name, lost=f"its worker was lost {times} times: killed, or out of memory")
+        return JobResult(name=job.name, lost=f"{type(error).__name__}: {one_line(error)}")
 
     def _ask(self, function: Callable[..., Any], *arguments: str) -> dict[str, Any]:
         """Return what each worker answers, by its address."""
@@ -178,17 +186,17 @@ class ClusterCrew:
             return cast("dict[str, Any]", self._client.run(function, *arguments, on_error="return"))
 
         try:
-            told = asked_aside(ask, _BOUND)
+            value = call_with_timeout(ask, _BOUND)
         except Exception as e:  # what a cluster's end leads to
-            raise BadCrew(f"the workers of {self._name} do not answer: {one_line(e)}") from e
-        return {f"worker {worker}": answer for worker, answer in told.items()}
+            raise PoolError(f"the workers of {self._name} do not answer: {one_line(e)}") from e
+        return {f"worker {worker}": answer for worker, answer in value.items()}
 
-    def _refuse(self, faults: Mapping[str, str]) -> None:
+    def _raise_faults(self, faults: Mapping[str, str]) -> None:
         """Raise BadCrew if there is a fault."""
         bad = [f"{worker} {fault}" for worker, fault in faults.items() if fault]
         if bad:
-            more = f"; and {len(bad) - _MOST_TOLD} workers more" if len(bad) > _MOST_TOLD else ""
-            raise BadCrew(f"{self._name} cannot be used: {'; '.join(bad[:_MOST_TOLD])}{more}")
+            more = f"; and {len(bad) - _MAX_REPORTED} workers more" if len(bad) > _MAX_REPORTED else ""
+            raise PoolError(f"{self._name} cannot be used: {'; '.join(bad[:_MAX_REPORTED])}{more}")
 
 
 def _difference(here: Mapping[str, str], there: Any) -> str:

@@ -17,12 +17,12 @@ from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.results.run_folder import (
-    BadRunFolder,
+    InvalidRunFolder,
     check_place,
+    disk_errors_reported,
     folder_held,
     read_object,
     sha256_of,
-    told_if_not_written,
     write_whole,
 )
 
@@ -86,10 +86,10 @@ class CampaignFolder:
         if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
             return
         if not (self.path / _FILE).exists():
-            raise BadRunFolder(self.path, f"it is not empty and has no {_FILE}; name a new folder, or a campaign's")
+            raise InvalidRunFolder(self.path, f"it is not empty and has no {_FILE}; name a new folder, or a campaign's")
         differ = differences(self.read(), identity_of(plan, fmus))
         if differ:
-            raise BadRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
+            raise InvalidRunFolder(self.path, f"it is of another campaign: {'; '.join(differ)}")
         self._check_names(plan)
 
     def check_free(self) -> None:
@@ -124,7 +124,7 @@ class CampaignFolder:
                 self.check(plan, fmus)
                 with self._written(plan, fmus):
                     check(self.path)
-            with told_if_not_written(self.path):
+            with disk_errors_reported(self.path):
                 self.runs.mkdir(exist_ok=True)
                 self.fmus.mkdir(exist_ok=True)
                 self._remove_unfinished()
@@ -149,7 +149,7 @@ class CampaignFolder:
 
     def _check_place(self) -> None:
         if self.path.exists() and not self.path.is_dir():
-            raise BadRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
+            raise InvalidRunFolder(self.path, "there is a file of that name; name a new folder, or that of a campaign")
         check_place(self.path)
 
     def _check_names(self, plan: CampaignPlan) -> None:
@@ -158,7 +158,7 @@ class CampaignFolder:
         files = [p for p in (self.runs, *(self.runs / run.name for run in plan.runs())) if p.is_file()]
         if folders or files:
             place, form, right = (folders[0], "folder", "file") if folders else (files[0], "file", "folder")
-            raise BadRunFolder(self.path, f"{place.relative_to(self.path)} is a {form}, not a {right}; remove it")
+            raise InvalidRunFolder(self.path, f"{place.relative_to(self.path)} is a {form}, not a {right}; remove it")
 
     @contextlib.contextmanager
     def _made(self) -> Generator[None, None, None]:
@@ -168,7 +168,7 @@ class CampaignFolder:
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as e:
-            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+            raise InvalidRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
         try:
             yield
         except BaseException:
@@ -207,8 +207,8 @@ class CampaignFolder:
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Write `campaign.json`, before anything else is there: without it, nobody could go on."""
         experiment = SCENARIOS[plan.scenario]
-        told = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
-        content = {**identity_of(plan, fmus), **told}
+        facts = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
+        content = {**identity_of(plan, fmus), **facts}
         if not (self.path / _FILE).exists() or self.read() != content:
             write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
@@ -236,7 +236,7 @@ class CampaignFolder:
 PLACE = Path("campaigns")
 
 
-def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
+def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
     """Return the newest folder of this very campaign in `campaigns/` that lacks runs, else a new one.
 
     So a call that was interrupted goes on where it stopped, and one that came to its end begins anew. The plan is a
@@ -247,7 +247,7 @@ def place_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
         folder = CampaignFolder(path)
         try:
             there = folder.read()
-        except BadRunFolder:
+        except InvalidRunFolder:
             continue
         if all(there.get(key) == value for key, value in wanted.items()):
             return _new(plan) if folder.has_all(plan) else folder

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.scenarios.campaign.plan import MOST_RUNS
+from handover.scenarios.campaign.plan import MAX_RUNS
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import BadParameter, parse_value, text_of, texts_by_name
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_value, text_of, texts_by_name
 
 
 def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[dict[str, str]]:
@@ -29,10 +29,10 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
         axes[name], found = _axis(known[name], values)
         faults += [f"{name}: {fault}" for fault in found]
     points = math.prod(map(len, axes.values()))
-    if points > MOST_RUNS:
-        faults.append(f"the grid has {points:,} points; at most {MOST_RUNS:,} runs can be planned")
+    if points > MAX_RUNS:
+        faults.append(f"the grid has {points:,} points; at most {MAX_RUNS:,} runs can be planned")
     if faults:
-        raise BadParameter(faults)
+        raise InvalidParameter(faults)
     return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
 
 
@@ -52,7 +52,7 @@ def set_parameters(
         if name not in both and _is_list(known[name], text):
             faults.append(f"-p {name} takes one value; to vary it, give it without -p: {name}={text}")
     if faults:
-        raise BadParameter(faults)
+        raise InvalidParameter(faults)
     return fixed
 
 
@@ -107,9 +107,9 @@ def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:
         return [], f"{right}: START and STOP are finite numbers"
     digits = parts[2].lstrip("0") if parts[2].isascii() and parts[2].isdigit() else ""
     if digits in ("", "1"):
-        return [], f"{right}: N is a whole number of values from 2 to {MOST_RUNS:,}"
-    if len(digits) > len(str(MOST_RUNS)) or int(digits) > MOST_RUNS:
-        return [], f"{text!r} has too many values: at most {MOST_RUNS:,} runs can be planned"
+        return [], f"{right}: N is a whole number of values from 2 to {MAX_RUNS:,}"
+    if len(digits) > len(str(MAX_RUNS)) or int(digits) > MAX_RUNS:
+        return [], f"{text!r} has too many values: at most {MAX_RUNS:,} runs can be planned"
     if start == stop:
         return [], f"{text!r} begins where it ends; for one value write {parts[0]!r}"
     between = [f"{x:.12g}" for x in np.linspace(start, stop, int(parts[2])).tolist()]

@@ -7,7 +7,7 @@ from typing import Any, cast
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.results.run_folder import sha256_of, versions
 
-_LONGEST = 60
+_MAX_LENGTH = 60
 """Characters of a value that are told."""
 
 
@@ -34,20 +34,20 @@ def differences(there: Mapping[str, Any], called: Mapping[str, Any]) -> list[str
 
     More repetitions than there are make no other campaign.
     """
-    told: list[str] = []
+    entries: list[str] = []
     for key, value in called.items():
         known = there.get(key)
         if known == value or (key == "repetitions" and isinstance(known, int) and known < value):
             continue
         if key == "repetitions" and isinstance(known, int):
-            told.append(f"{_both(key, known, value)} (a larger number adds runs, a smaller one takes none away)")
+            entries.append(f"{_both(key, known, value)} (a larger number adds runs, a smaller one takes none away)")
         elif key == "points":
-            told += _of_points(known, value)
+            entries += _of_points(known, value)
         elif isinstance(value, dict) and isinstance(known, dict):
-            told += _of_entries(key, cast(dict[str, Any], known), cast(dict[str, Any], value))
+            entries += _of_entries(key, cast(dict[str, Any], known), cast(dict[str, Any], value))
         else:
-            told.append(_both(key, known, value))
-    return told
+            entries.append(_both(key, known, value))
+    return entries
 
 
 def _of_entries(key: str, there: Mapping[str, Any], called: Mapping[str, Any]) -> list[str]:
@@ -77,14 +77,14 @@ def _values(points: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
 
 
 def _both(what: str, there: Any, called: Any) -> str:
-    return f"{what} is {_told(there)} there, {_told(called)} in this call"
+    return f"{what} is {_text(there)} there, {_text(called)} in this call"
 
 
-def _told(value: Any) -> str:
+def _text(value: Any) -> str:
     if value is None or value == "" or value == []:
         return "not given"
     if isinstance(value, dict) and "sha256" in value:
         fmu = cast(dict[str, str], value)
         return f"{fmu['fmu']} (sha256 {fmu['sha256'][:12]})"
-    told = ",".join(map(str, cast(list[Any], value))) if isinstance(value, list) else str(cast(Any, value))
-    return told if len(told) <= _LONGEST else told[: _LONGEST - 3] + "..."
+    entries = ",".join(map(str, cast(list[Any], value))) if isinstance(value, list) else str(cast(Any, value))
+    return entries if len(entries) <= _MAX_LENGTH else entries[: _MAX_LENGTH - 3] + "..."

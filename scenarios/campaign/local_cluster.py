@@ -13,9 +13,9 @@ from dask import config
 from distributed import Client, LocalCluster
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.campaign.cluster import ClusterCrew
+from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.worker_pool import cores
-from handover.scenarios.execution.errors import BadCrew
+from handover.scenarios.execution.errors import PoolError
 
 _SILENT = logging.CRITICAL + 1
 _LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
@@ -41,7 +41,7 @@ _STILL = {
 
 
 @contextlib.contextmanager
-def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
+def local_cluster(workers: int | None) -> Generator[ClusterPool, None, None]:
     """Start workers on this machine, a process each; by default one for each core that this process may use.
 
     They hear of no Ctrl-C, end with this process, however it ends, and listen on the loopback interface alone.
@@ -52,8 +52,8 @@ def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
     with _quiet(), config.set({**_SETTINGS, **_STILL}), contextlib.ExitStack() as opened:
         try:
             with (
-                _told_nothing_of_semaphores(),
-                _deaf_to_ctrl_c(),
+                _quiet_resource_tracker(),
+                _ignore_ctrl_c(),
             ):  # so are the threads that are started here, and what these start
                 cluster = LocalCluster(
                     n_workers=workers or cores(),
@@ -66,14 +66,14 @@ def embedded_crew(workers: int | None) -> Generator[ClusterCrew, None, None]:
                 opened.callback(cluster.close)
                 client = opened.enter_context(Client(cluster, set_as_default=False))
         except (OSError, RuntimeError) as e:
-            raise BadCrew(f"no workers can be started on this machine: {one_line(e)}") from e
-        crew = ClusterCrew(client, "the cluster on this machine")
-        opened.callback(crew.end)
-        yield crew
+            raise PoolError(f"no workers can be started on this machine: {one_line(e)}") from e
+        pool = ClusterPool(client, "the cluster on this machine")
+        opened.callback(pool.end)
+        yield pool
 
 
 @contextlib.contextmanager
-def crew_at(address: str) -> Generator[ClusterCrew, None, None]:
+def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
     """Use the workers of a cluster that the user runs; the address is one that `scheduler_address` has returned.
 
     Raises:
@@ -83,14 +83,14 @@ def crew_at(address: str) -> Generator[ClusterCrew, None, None]:
         try:
             client = opened.enter_context(Client(address, timeout=5, set_as_default=False))
         except (OSError, ValueError) as e:
-            raise BadCrew(f"the scheduler at {address} cannot be used: {one_line(e)}") from e
+            raise PoolError(f"the scheduler at {address} cannot be used: {one_line(e)}") from e
         try:
             client.wait_for_workers(1, timeout=_WORKERS)
         except TimeoutError as e:
-            raise BadCrew(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
-        crew = ClusterCrew(client, f"the cluster at {address}")
-        opened.callback(crew.end)
-        yield crew
+            raise PoolError(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
+        pool = ClusterPool(client, f"the cluster at {address}")
+        opened.callback(pool.end)
+        yield pool
 
 
 @contextlib.contextmanager
@@ -110,7 +110,7 @@ def _quiet() -> Generator[None, None, None]:
 
 
 @contextlib.contextmanager
-def _told_nothing_of_semaphores() -> Generator[None, None, None]:
+def _quiet_resource_tracker() -> Generator[None, None, None]:
     """Let Python's process that cleans up after a killed command do so without telling."""
     name = "PYTHONWARNINGS"
     before = os.environ.get(name)
@@ -125,7 +125,7 @@ def _told_nothing_of_semaphores() -> Generator[None, None, None]:
 
 
 @contextlib.contextmanager
-def _deaf_to_ctrl_c() -> Generator[None, None, None]:
+def _ignore_ctrl_c() -> Generator[None, None, None]:
     """Let threads and processes that are started meanwhile hear of no Ctrl-C, which is for this thread to act on."""
     if sys.platform == "win32":
         yield

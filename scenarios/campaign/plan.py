@@ -8,13 +8,13 @@ import numpy as np
 
 from handover.cosim.stepping.options import MasterOptions
 
-MOST_RUNS = 100_000
+MAX_RUNS = 100_000
 """Runs of a campaign: above it, a slip of the pen is likelier than a wish."""
 
-MOST_REPETITIONS = 10_000
+MAX_REPETITIONS = 10_000
 """Runs of a point; as many have names that sort in their order."""
 
-_LONGEST_NAME = 80
+_MAX_NAME_LENGTH = 80
 _UNSAFE = re.compile(r"[^A-Za-z0-9.,=+_-]")
 
 
@@ -108,7 +108,7 @@ class CampaignPlan:
         values = "_".join(f"{name}={value}" for name, value in self.points[point].items())
         end = f"_r{repetition:04d}"
         begin = _UNSAFE.sub("-", f"{number}_{values}" if values else number)
-        return begin[: _LONGEST_NAME - len(end)] + end
+        return begin[: _MAX_NAME_LENGTH - len(end)] + end
 
 
 def run_seed(campaign: int, point: int | None, repetition: int) -> int:

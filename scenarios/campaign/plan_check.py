@@ -8,12 +8,12 @@ from typing import Any, NoReturn
 
 from handover.cosim.master.master import Master
 from handover.fmus.build import cached
-from handover.scenarios.campaign.plan import MOST_REPETITIONS, MOST_RUNS, CampaignPlan
-from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
+from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan
+from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import BadParameter, parse_parameters, text_of
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 
-_MOST_TOLD = 8
+_MAX_REPORTED = 8
 """Faults that are told; there may be one a point."""
 
 
@@ -54,7 +54,7 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
         BadCall: there is no such scenario.
         BadParameter: it has too many runs or none, values do not fit the scenario, or do not fit each other.
     """
-    experiment = scenario_named(plan.scenario)
+    experiment = find_scenario(plan.scenario)
     _check_size(plan)
     faults: dict[str, None] = {}
     fixed: dict[str, str] = {}
@@ -67,12 +67,12 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
             texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
             points.append({name: texts[name] for name in point})
             fixed = {name: texts[name] for name in plan.fixed}
-        except BadParameter as e:
+        except InvalidParameter as e:
             faults.update(dict.fromkeys(e.faults))
-    if len(faults) > _MOST_TOLD:
-        faults = {**dict.fromkeys(list(faults)[:_MOST_TOLD]), f"and {len(faults) - _MOST_TOLD} faults more": None}
+    if len(faults) > _MAX_REPORTED:
+        faults = {**dict.fromkeys(list(faults)[:_MAX_REPORTED]), f"and {len(faults) - _MAX_REPORTED} faults more": None}
     if faults:
-        raise BadParameter(tuple(faults))
+        raise InvalidParameter(tuple(faults))
     return replace(plan, points=points, fixed=fixed)
 
 
@@ -82,9 +82,9 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
     Raises:
         BadCall: the plan has one for a unit that the scenario does not have, or the catalog's cannot be built.
     """
-    experiment = scenario_named(plan.scenario)
-    others = replacements(experiment, [f"{name}={file}" for name, file in plan.units.items()])
-    return fmus_of(experiment, others, lambda unit: cached(unit, 3))
+    experiment = find_scenario(plan.scenario)
+    others = replacement_fmus(experiment, [f"{name}={file}" for name, file in plan.units.items()])
+    return select_fmus(experiment, others, lambda unit: cached(unit, 3))
 
 
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
@@ -95,7 +95,7 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     Raises:
         InvalidFmu, WiringError, ScheduleError: they do not.
     """
-    experiment = scenario_named(plan.scenario)
+    experiment = find_scenario(plan.scenario)
     given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
     system = experiment().build(parse_parameters(experiment, given), plan.seed, lambda unit: fmus[unit])
     Master(system, plan.options)
@@ -103,12 +103,12 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
 
 def _check_size(plan: CampaignPlan) -> None:
     if not plan.points or plan.repetitions < 1:
-        raise BadParameter(["the campaign has no runs"])
-    if plan.repetitions > MOST_REPETITIONS:
-        raise BadParameter([f"{plan.repetitions:,} repetitions; at most {MOST_REPETITIONS:,} can be planned"])
-    if plan.size > MOST_RUNS:
-        told = f"{len(plan.points):,} points times {plan.repetitions:,} repetitions are {plan.size:,} runs"
-        raise BadParameter([f"{told}; at most {MOST_RUNS:,} can be planned"])
+        raise InvalidParameter(["the campaign has no runs"])
+    if plan.repetitions > MAX_REPETITIONS:
+        raise InvalidParameter([f"{plan.repetitions:,} repetitions; at most {MAX_REPETITIONS:,} can be planned"])
+    if plan.size > MAX_RUNS:
+        text = f"{len(plan.points):,} points times {plan.repetitions:,} repetitions are {plan.size:,} runs"
+        raise InvalidParameter([f"{text}; at most {MAX_RUNS:,} can be planned"])
 
 
 class _AtUnits(Exception):
@@ -124,6 +124,6 @@ def _check_together(experiment: type[Experiment[Any]], parameters: Any, point: M
     try:
         with suppress(_AtUnits):
             experiment().build(parameters, 0, stop)
-    except BadParameter as e:
+    except InvalidParameter as e:
         where = f"at {', '.join(f'{name}={value}' for name, value in point.items())}: " if point else ""
-        raise BadParameter([f"{where}{fault}" for fault in e.faults]) from e
+        raise InvalidParameter([f"{where}{fault}" for fault in e.faults]) from e

@@ -9,11 +9,11 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from handover.scenarios.campaign.worker_pool import Crew, RunAnswer, RunOrder, cores
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
 
 
 @dataclass(frozen=True)
-class Workforce:
+class PoolConfig:
     """Workers that a call asks for; Dask, which takes a while to load, is loaded when they are needed.
 
     Attributes:
@@ -40,15 +40,15 @@ class Workforce:
         if self.scheduler is not None:
             _ = self._address
 
-    def start(self) -> contextlib.AbstractContextManager[Crew]:
+    def start(self) -> contextlib.AbstractContextManager[WorkerPool]:
         """Return the workers; entering starts them.
 
         Raises:
             BadCrew: here or on entering, if they cannot be started or used.
         """
-        from handover.scenarios.campaign.local_cluster import crew_at, embedded_crew
+        from handover.scenarios.campaign.local_cluster import connect_cluster, local_cluster
 
-        return embedded_crew(self.workers) if self.scheduler is None else crew_at(self._address)
+        return local_cluster(self.workers) if self.scheduler is None else connect_cluster(self._address)
 
     @functools.cached_property
     def _address(self) -> str:
@@ -58,7 +58,7 @@ class Workforce:
         return scheduler_address(self.scheduler or "")
 
 
-class LateCrew:
+class LazyPool:
     """Starts a crew when it is checked, or with its first order if it was not: a campaign may seem to need none.
 
     Args:
@@ -67,10 +67,10 @@ class LateCrew:
     """
 
     def __init__(
-        self, start: Callable[[], contextlib.AbstractContextManager[Crew]], opened: contextlib.ExitStack
+        self, start: Callable[[], contextlib.AbstractContextManager[WorkerPool]], opened: contextlib.ExitStack
     ) -> None:
         self._start, self._opened = start, opened
-        self._crew: Crew | None = None
+        self._pool: WorkerPool | None = None
 
     def check(self, folder: Path) -> None:
         """Start the crew and check it.
@@ -78,18 +78,18 @@ class LateCrew:
         Raises:
             BadCrew: it cannot be started or used. RecordNotWritten: as `Crew.check`.
         """
-        self._crew = self._checked(folder)
+        self._pool = self._checked(folder)
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
         """Let the crew carry out orders.
 
         Raises:
             BadCrew, RecordNotWritten: as `check`, if that was not called. CrewLost: it has gone.
         """
-        crew = self._crew or self._checked(Path(orders[0].runs))
-        return crew.carry_out(orders)
+        pool = self._pool or self._checked(Path(jobs[0].runs))
+        return pool.run_jobs(jobs)
 
-    def _checked(self, folder: Path) -> Crew:
-        crew = self._opened.enter_context(self._start())
-        crew.check(folder)
-        return crew
+    def _checked(self, folder: Path) -> WorkerPool:
+        pool = self._opened.enter_context(self._start())
+        pool.check(folder)
+        return pool

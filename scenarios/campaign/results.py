@@ -13,10 +13,10 @@ from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 
-_MOST_METRICS = 4
-_MOST_INTERVALS = 150
+_MAX_METRICS = 4
+_MAX_INTERVALS = 150
 """Medians of a campaign above which they have no intervals: each takes some 20 ms."""
 
 
@@ -57,20 +57,20 @@ class CampaignResults:
         table: the runs that have ended.
     """
 
-    def __init__(self, told: Mapping[str, Any], table: CampaignTable) -> None:
-        self.told, self.table = told, table
-        self._values: list[Mapping[str, str]] = list(told["points"])
+    def __init__(self, facts: Mapping[str, Any], table: CampaignTable) -> None:
+        self.metadata, self.table = facts, table
+        self._values: list[Mapping[str, str]] = list(facts["points"])
         self._intervals: dict[tuple[int, str], Interval | None] = {}
 
     @property
     def scenario(self) -> str:
         """Name of the scenario."""
-        return str(self.told["scenario"])
+        return str(self.metadata["scenario"])
 
     @property
     def planned(self) -> int:
         """Runs that the campaign is to have."""
-        return len(self._values) * int(self.told["repetitions"])
+        return len(self._values) * int(self.metadata["repetitions"])
 
     @cached_property
     def varied(self) -> tuple[str, ...]:
@@ -121,9 +121,9 @@ class CampaignResults:
         return tuple(n for n in columns if n in self.measured and not n.startswith(("cpu_", "pace_")))
 
     @property
-    def told_first(self) -> tuple[str, ...]:
+    def shown_metrics(self) -> tuple[str, ...]:
         """Those of `headline` that tables and figures of points have room for."""
-        return self.headline[:_MOST_METRICS]
+        return self.headline[:_MAX_METRICS]
 
     @cached_property
     def measured(self) -> tuple[str, ...]:
@@ -157,7 +157,7 @@ class CampaignResults:
     @property
     def has_intervals(self) -> bool:
         """Whether medians have intervals, which would take too long for very many points."""
-        return len(self.points) * len(self.told_first) <= _MOST_INTERVALS
+        return len(self.points) * len(self.shown_metrics) <= _MAX_INTERVALS
 
     def median(self, point: PointResults, metric: str) -> float:
         """Return a metric's median over the runs done; NaN if none has it."""
@@ -182,7 +182,7 @@ class CampaignResults:
         if self.is_boolean(parameter):
             return parameter.replace("_", " ") if text.lower() == "true" else f"not {parameter.replace('_', ' ')}"
         if self.is_number(parameter):
-            return shown_unit(self.unit(parameter), float(text)).text(float(text))
+            return display_unit(self.unit(parameter), float(text)).text(float(text))
         return text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:

@@ -11,79 +11,79 @@ from typing import BinaryIO
 
 import click
 
-from handover.cosim.exceptions import CosimError, ScheduleError, UnitFailure, UnitRefused, WiringError, one_line
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
-from handover.scenarios.execution.errors import told_in_one_line
+from handover.cosim.exceptions import CosimError, InitializationError, ScheduleError, UnitFailure, WiringError, one_line
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.scenarios.execution.errors import one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import carry_out
-from handover.scenarios.execution.selection import scenario_named
+from handover.scenarios.execution.runner import run_task
+from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
-from handover.scenarios.results.summary import Spent, refused_run, refused_summary
+from handover.scenarios.results.summary import ElapsedTime, refused_run, refused_summary
 from handover.scenarios.results.task import Task
 
-_REFUSALS = (UnitRefused, UnitFailure, WiringError, ScheduleError)
+_REFUSALS = (InitializationError, UnitFailure, WiringError, ScheduleError)
 """Why a run cannot begin, where that follows from what it is and not from where it is carried out."""
 
 
-def carry_out_order(order: RunOrder, folder: Path) -> None:
+def run_job(job: RunJob, folder: Path) -> None:
     """Run an order into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
         As `carry_out` and `parse_parameters`, but for a refusal of the run. BadCall: there is no such scenario.
     """
-    task, clock = _task(order, folder), Spent().clock()
+    task, clock = _task(job, folder), ElapsedTime().clock()
     try:
-        carry_out(task, lambda _t, _end: None, Interruption())
+        run_task(task, lambda _t, _end: None, Interruption())
     except _REFUSALS as e:  # it would end so each time
         _refuse(task, e, clock())
 
 
-def refuse_order(order: RunOrder, folder: Path, failure: UnitFailure, spent: Spent) -> None:
+def record_failed_job(job: RunJob, folder: Path, failure: UnitFailure, spent: ElapsedTime) -> None:
     """Write the folder of a run whose process ended as a unit was loaded or initialised."""
-    _refuse(_task(order, folder), failure, spent)
+    _refuse(_task(job, folder), failure, spent)
 
 
-def _refuse(task: Task, refusal: CosimError, spent: Spent) -> None:
+def _refuse(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
     task.folder.make()
     task.folder.write_run(refused_run(task, refusal))
     task.folder.write_summary(refused_summary(task, refusal, spent))
 
 
-def _task(order: RunOrder, folder: Path) -> Task:
-    experiment = scenario_named(order.scenario)
+def _task(job: RunJob, folder: Path) -> Task:
+    experiment = find_scenario(job.scenario)
     return Task(
         experiment=experiment(),
-        parameters=parse_parameters(experiment, order.parameters),
-        seed=order.seed,
-        fmus={name: Path(path) for name, path in order.fmus.items()},
+        parameters=parse_parameters(experiment, job.parameters),
+        seed=job.seed,
+        fmus={name: Path(path) for name, path in job.fmus.items()},
         folder=RunFolder(folder),
-        options=order.options,
+        options=job.options,
         presented=False,
     )
 
 
-def answer_of(order: RunOrder, work: Callable[[], object]) -> RunAnswer:
+def job_result(job: RunJob, work: Callable[[], object]) -> JobResult:
     """Do something for an order; answer why it could not be done, if it could not."""
     try:
-        with told_in_one_line():
+        with one_line_errors():
             work()
     except click.ClickException as e:
-        return lost_by(e, order, e.message)
+        return lost_by(e, job, e.message)
     except BaseException as e:  # a run may raise what it likes: the campaign goes on
         traceback.print_exc()
-        return lost_by(e, order, f"{type(e).__name__}: {one_line(e)}")
-    return RunAnswer(name=order.name)
+        return lost_by(e, job, f"{type(e).__name__}: {one_line(e)}")
+    return JobResult(name=job.name)
 
 
-def lost_by(error: BaseException, order: RunOrder, told: str) -> RunAnswer:
+def lost_by(error: BaseException, job: RunJob, text: str) -> JobResult:
     """Answer that a run is lost by an exception, with what is told of it."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and is_full(cause):
-            return RunAnswer(name=order.name, lost=told, no_room=cause.strerror or one_line(cause))
+            return JobResult(name=job.name, lost=text, no_room=cause.strerror or one_line(cause))
         cause = cause.__cause__
-    return RunAnswer(name=order.name, lost=told)
+    return JobResult(name=job.name, lost=text)
 
 
 @contextlib.contextmanager
@@ -101,14 +101,14 @@ def printing_to(log: BinaryIO):
             os.close(before[number - 1])
 
 
-def finish(order: RunOrder, folder: Path, log: BinaryIO) -> RunAnswer:
+def finish(job: RunJob, folder: Path, log: BinaryIO) -> JobResult:
     """Name the folder of a run that has ended as the order says; answer why it cannot be, if it cannot.
 
     What the run printed goes into its `log.txt`. A folder without a summary is left as it is.
     """
-    named = Path(order.runs, order.name)
+    named = Path(job.runs, job.name)
     if not (folder / "summary.json").exists():
-        return RunAnswer(name=order.name, lost="it ended without a summary")
+        return JobResult(name=job.name, lost="it ended without a summary")
     with contextlib.suppress(OSError):  # a full disk: the run itself is complete
         log.seek(0)
         if printed := log.read():
@@ -117,6 +117,6 @@ def finish(order: RunOrder, folder: Path, log: BinaryIO) -> RunAnswer:
         os.rename(folder, named)
     except OSError as e:
         if not (named / "summary.json").exists():  # else it was carried out twice, as when a worker was taken for lost
-            return lost_by(e, order, f"its folder cannot be named {named}: {e.strerror}")
+            return lost_by(e, job, f"its folder cannot be named {named}: {e.strerror}")
         shutil.rmtree(folder, ignore_errors=True)
-    return RunAnswer(name=order.name)
+    return JobResult(name=job.name)

@@ -24,19 +24,19 @@ from typing import BinaryIO, NoReturn
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.fmus.catalog import UNITS, import_block
 from handover.scenarios.campaign.run_job import (
-    answer_of,
-    carry_out_order,
     finish,
+    job_result,
     lost_by,
     printing_to,
-    refuse_order,
+    record_failed_job,
+    run_job,
 )
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
-from handover.scenarios.execution.crash import Death
-from handover.scenarios.results.summary import Spent
+from handover.scenarios.execution.crash import Crash
+from handover.scenarios.results.summary import ElapsedTime
 
 IDLE = 60.0
 """Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""
@@ -50,8 +50,8 @@ class RunServer:
         answers: where the answers go.
     """
 
-    def __init__(self, orders: BinaryIO, answers: BinaryIO) -> None:
-        self._orders, self._answers = orders, answers
+    def __init__(self, jobs: BinaryIO, results: BinaryIO) -> None:
+        self._jobs, self._results = jobs, results
         self._loaded: set[str] = set()
         self._forks = supervisor.can_supervise()
 
@@ -59,16 +59,16 @@ class RunServer:
         """Carry out orders until there are no more."""
         while self._comes():
             try:
-                order, folder = pickle.load(self._orders)
+                job, folder = pickle.load(self._jobs)
             except (EOFError, pickle.UnpicklingError):  # the worker has ended, maybe amid an order
                 return
-            self._load(order.scenario)
-            pickle.dump(self._carry_out(order, folder), self._answers)
-            self._answers.flush()
+            self._load(job.scenario)
+            pickle.dump(self._run_job(job, folder), self._results)
+            self._results.flush()
 
     def _comes(self) -> bool:
         """Wait for an order, or the end of them."""
-        return not self._forks or bool(select.select([self._orders], [], [], IDLE)[0])
+        return not self._forks or bool(select.select([self._jobs], [], [], IDLE)[0])
 
     def _load(self, scenario: str) -> None:
         """Load what the units of a scenario import, once for all its runs."""
@@ -83,59 +83,59 @@ class RunServer:
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
 
-    def _carry_out(self, order: RunOrder, folder: Path) -> RunAnswer:
+    def _run_job(self, job: RunJob, folder: Path) -> JobResult:
         try:
-            log = tempfile.TemporaryFile(dir=order.runs)  # noqa: SIM115 (closed below)
+            log = tempfile.TemporaryFile(dir=job.runs)  # noqa: SIM115 (closed below)
         except OSError as e:
-            return lost_by(e, order, f"{order.runs} cannot be written: {e.strerror}")
+            return lost_by(e, job, f"{job.runs} cannot be written: {e.strerror}")
         with log:
             if self._forks:
-                answer = self._fork(order, folder, log)
+                result = self._fork(job, folder, log)
             else:
                 with printing_to(log):
-                    answer = answer_of(order, lambda: carry_out_order(order, folder))
-            answer = answer if answer.lost else finish(order, folder, log)
-        if answer.lost:
+                    result = job_result(job, lambda: run_job(job, folder))
+            result = result if result.lost else finish(job, folder, log)
+        if result.lost:
             shutil.rmtree(folder, ignore_errors=True)
-        return answer
+        return result
 
-    def _fork(self, order: RunOrder, folder: Path, log: BinaryIO) -> RunAnswer:
+    def _fork(self, job: RunJob, folder: Path, log: BinaryIO) -> JobResult:
         """Carry out a run in a child; if that dies of a unit, another child tells of it in the folder."""
         began = time.monotonic()
-        end, heartbeat = self._in_child(lambda: answer_of(order, lambda: carry_out_order(order, folder)), folder, log)
+        end, heartbeat = self._in_child(lambda: job_result(job, lambda: run_job(job, folder)), folder, log)
         if heartbeat.status is not None:
-            return _answer(order, heartbeat, "")
-        death = Death(heartbeat, end, time.monotonic() - began)
+            return _result(job, heartbeat, "")
+        death = Crash(heartbeat, end, time.monotonic() - began)
         if death.was_killed or end.signal in supervisor.ORDERS:
-            return RunAnswer(name=order.name, lost=death.told)
-        left, failure, spent = death.folder, death.failure, Spent(time.monotonic() - began, end.cpu)
+            return JobResult(name=job.name, lost=death.message)
+        left, failure, spent = death.folder, death.failure, ElapsedTime(time.monotonic() - began, end.cpu)
         if left is None and failure is None:
-            return RunAnswer(name=order.name, lost=death.told)
+            return JobResult(name=job.name, lost=death.message)
 
         def tell() -> None:
             if left is not None:
                 death.complete(left)
             elif failure is not None:
-                refuse_order(order, folder, failure, spent)
+                record_failed_job(job, folder, failure, spent)
 
-        end, heartbeat = self._in_child(lambda: answer_of(order, tell), folder, log)
-        return _answer(order, heartbeat, "" if heartbeat.status == 0 else death.told)
+        end, heartbeat = self._in_child(lambda: job_result(job, tell), folder, log)
+        return _result(job, heartbeat, "" if heartbeat.status == 0 else death.message)
 
-    def _in_child(self, work: Callable[[], RunAnswer], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
+    def _in_child(self, work: Callable[[], JobResult], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
         heartbeat = supervisor.renew_heartbeat()
 
         def begin() -> NoReturn:
             supervisor.begin_child()
-            os.close(self._orders.fileno())  # answers stay open: by their end the worker knows that runs have ended too
+            os.close(self._jobs.fileno())  # answers stay open: by their end the worker knows that runs have ended too
             for number in (1, 2):
                 os.dup2(log.fileno(), number)
-            answer = work()
-            if answer.lost:
-                heartbeat.tell(loss={"lost": answer.lost, "no_room": answer.no_room})
-            supervisor.leave(1 if answer.lost else 0)
+            result = work()
+            if result.lost:
+                heartbeat.tell(loss={"lost": result.lost, "no_room": result.no_room})
+            supervisor.leave(1 if result.lost else 0)
 
         child = ForkedChild(begin, heartbeat)
-        end = child.wait(self._orders.fileno())
+        end = child.wait(self._jobs.fileno())
         if end is None:  # no order comes before the answer: the worker is gone
             child.kill()
             for scratch in heartbeat.facts.get("scratch", []):
@@ -145,19 +145,19 @@ class RunServer:
         return end, heartbeat
 
 
-def _answer(order: RunOrder, heartbeat: Heartbeat, otherwise: str) -> RunAnswer:
+def _result(job: RunJob, heartbeat: Heartbeat, otherwise: str) -> JobResult:
     """Answer as the child has told that the run is lost, or otherwise."""
     loss: Mapping[str, str] = heartbeat.facts.get("loss", {"lost": otherwise})
-    return RunAnswer(name=order.name, **loss)
+    return JobResult(name=job.name, **loss)
 
 
 def main() -> None:
     """Serve on the standard streams, which runs do not see."""
-    orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    jobs, results = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), 0)
     os.dup2(2, 1)
-    RunServer(orders, answers).serve()
+    RunServer(jobs, results).serve()
 
 
 if __name__ == "__main__":

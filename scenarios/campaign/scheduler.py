@@ -8,7 +8,7 @@ import socket
 from urllib.parse import urlsplit
 
 from handover.cosim.exceptions import one_line
-from handover.scenarios.execution.errors import BadCrew
+from handover.scenarios.execution.errors import PoolError
 
 _CONNECT_TIMEOUT, _GREETING = 3.0, 3.0
 """How long a server gets to be connected, and to say something, s."""
@@ -34,24 +34,24 @@ def probe_port(address: str, host: str, port: int) -> None:
             connection.settimeout(_GREETING)
             greeted = bool(connection.recv(1))
     except TimeoutError as e:
-        raise BadCrew(f"{address} does not answer as a Dask scheduler within {_GREETING:g} s; {RIGHT}") from e
+        raise PoolError(f"{address} does not answer as a Dask scheduler within {_GREETING:g} s; {RIGHT}") from e
     except OSError as e:
-        raise BadCrew(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
+        raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
     if not greeted:
-        raise BadCrew(f"{address} is no Dask scheduler: it hangs up; {RIGHT}")
+        raise PoolError(f"{address} is no Dask scheduler: it hangs up; {RIGHT}")
 
 
 _CONNECT, _ANSWER = 4.0, 5.0
 """How long a scheduler gets to be connected, and until it has answered, s."""
 
 
-def scheduler_address(told: str) -> str:
+def scheduler_address(text: str) -> str:
     """Return the whole address of a scheduler that has answered.
 
     Raises:
         BadCrew: the address is malformed, nothing is there, or no scheduler is.
     """
-    address, host, port = _parts(told)
+    address, host, port = _parts(text)
     if address.startswith("tcp:"):
         probe_port(address, host, port)
     from handover.scenarios.campaign.scheduler_kind import kind_at  # loads Dask
@@ -59,34 +59,34 @@ def scheduler_address(told: str) -> str:
     try:
         kind = kind_at(address, _CONNECT, _ANSWER)
     except (asyncio.TimeoutError, TimeoutError) as e:
-        raise BadCrew(f"{address} does not answer as a Dask scheduler within {_ANSWER:g} s; {RIGHT}") from e
+        raise PoolError(f"{address} does not answer as a Dask scheduler within {_ANSWER:g} s; {RIGHT}") from e
     except OSError as e:
-        raise BadCrew(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
+        raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
     except Exception as e:  # what another protocol's bytes lead to
-        raise BadCrew(f"{address} is no Dask scheduler: {one_line(e)}; {RIGHT}") from e
+        raise PoolError(f"{address} is no Dask scheduler: {one_line(e)}; {RIGHT}") from e
     if kind != "Scheduler":
-        raise BadCrew(f"{address} is a {kind}, not a scheduler; {RIGHT}")
+        raise PoolError(f"{address} is a {kind}, not a scheduler; {RIGHT}")
     return address
 
 
-def _parts(told: str) -> tuple[str, str, int]:
+def _parts(text: str) -> tuple[str, str, int]:
     """Return an address with its protocol, its host and its port."""
-    address = told if "://" in told else f"tcp://{told}"
+    address = text if "://" in text else f"tcp://{text}"
     try:
         parts = urlsplit(address)
         port = parts.port
     except ValueError as e:
-        raise BadCrew(f"scheduler {told!r}: {one_line(e)}; {RIGHT}") from e
+        raise PoolError(f"scheduler {text!r}: {one_line(e)}; {RIGHT}") from e
     if parts.scheme != "tcp":
-        _check_protocol(told, address)
+        _check_protocol(text, address)
     if not parts.hostname or not port:
-        raise BadCrew(f"scheduler {told!r} has no {'port' if parts.hostname else 'host'}; {RIGHT}")
+        raise PoolError(f"scheduler {text!r} has no {'port' if parts.hostname else 'host'}; {RIGHT}")
     return address, parts.hostname, port
 
 
-def _check_protocol(told: str, address: str) -> None:
+def _check_protocol(text: str, address: str) -> None:
     from handover.scenarios.campaign.scheduler_kind import PROTOCOLS  # loads Dask
 
     protocol = address.partition("://")[0].lower()
     if protocol not in PROTOCOLS:
-        raise BadCrew(f"scheduler {told!r}: there is no protocol {protocol!r}, only {', '.join(PROTOCOLS)}")
+        raise PoolError(f"scheduler {text!r}: there is no protocol {protocol!r}, only {', '.join(PROTOCOLS)}")

@@ -7,7 +7,7 @@ from distributed.comm.registry import backends
 from distributed.core import rpc
 from distributed.security import Security
 
-from handover.scenarios.campaign.cluster import asked_aside
+from handover.scenarios.campaign.cluster import call_with_timeout
 
 PROTOCOLS = tuple(p for p in backends if p != "inproc")
 """Those that Dask has here."""
@@ -24,11 +24,11 @@ def kind_at(address: str, connect: float, answer: float) -> str:
     Raises:
         TimeoutError, asyncio.TimeoutError, OSError: it cannot be reached, or does not answer.
     """
-    return asked_aside(lambda: asyncio.run(asyncio.wait_for(_kind(address, connect), answer)), connect + answer)
+    return call_with_timeout(lambda: asyncio.run(asyncio.wait_for(_kind(address, connect), answer)), connect + answer)
 
 
 async def _kind(address: str, connect: float) -> str:
     arguments = cast("dict[str, Any]", Security().get_connection_args("client"))
     async with rpc(address, timeout=connect, connection_args=arguments) as there:
-        told = cast("dict[str, Any]", await there.identity())
-        return str(told["type"])
+        value = cast("dict[str, Any]", await there.identity())
+        return str(value["type"])

@@ -12,7 +12,7 @@ from scipy.stats import beta, binomtest, bootstrap, fisher_exact
 LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
 
-FEWEST = 3
+MIN_SAMPLES = 3
 """Values below which a bootstrap says nothing: of two there are but three different resamples."""
 
 RESAMPLES = 9999
@@ -77,9 +77,9 @@ def time_interval(values: ArrayLike, statistic: Statistic = np.median) -> Interv
     """
     x = np.asarray(values, dtype=np.float64)
     x = x[~np.isnan(x)]
-    if len(x) < FEWEST:
+    if len(x) < MIN_SAMPLES:
         return None
-    for method, told in _METHODS:
+    for method, value in _METHODS:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that BCa is not defined: told by its interval, which is NaN
             ci = bootstrap(
@@ -91,7 +91,7 @@ def time_interval(values: ArrayLike, statistic: Statistic = np.median) -> Interv
                 rng=np.random.default_rng(0),
             ).confidence_interval
         if np.isfinite(ci.low) and np.isfinite(ci.high):
-            return Interval(float(ci.low), float(ci.high), told)
+            return Interval(float(ci.low), float(ci.high), value)
     return None
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from handover.cosim.exceptions import nearest, one_line
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.experiment.experiment import Metric
-from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.results.summary import metric_of
 
 _ANEW = "the call that began the campaign writes it anew"
@@ -46,9 +46,9 @@ class CampaignTable:
         try:
             return cls(pq.read_table(file))
         except FileNotFoundError as e:
-            raise BadRunFolder(file.parent, f"it has no {file.name}; {_ANEW}") from e
+            raise InvalidRunFolder(file.parent, f"it has no {file.name}; {_ANEW}") from e
         except (OSError, pa.ArrowException) as e:
-            raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_ANEW}") from e
+            raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_ANEW}") from e
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -90,7 +90,7 @@ class CampaignTable:
         Raises:
             KeyError: there is no such column.
         """
-        return self._told(name, "unit") or "1"
+        return self._metadata(name, "unit") or "1"
 
     def description(self, name: str) -> str:
         """Return what a column is, in words; "" where nothing is said.
@@ -98,15 +98,15 @@ class CampaignTable:
         Raises:
             KeyError: there is no such column.
         """
-        return self._told(name, "description")
+        return self._metadata(name, "description")
 
     def _kind(self, name: str) -> pa.DataType:
         return cast(Any, self.table.schema.field(self._known(name))).type
 
     def _of_role(self, role: str) -> tuple[str, ...]:
-        return tuple(name for name in self.table.column_names if self._told(name, "role") == role)
+        return tuple(name for name in self.table.column_names if self._metadata(name, "role") == role)
 
-    def _told(self, name: str, fact: str) -> str:
+    def _metadata(self, name: str, fact: str) -> str:
         metadata: Mapping[bytes, bytes] = self.table.schema.field(self._known(name)).metadata or {}
         return metadata.get(fact.encode(), b"").decode()
 

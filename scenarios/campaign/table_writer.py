@@ -20,11 +20,11 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
-from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.execution.selection import scenario_named
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Metric
-from handover.scenarios.experiment.parameters import BadParameter, parse_value
-from handover.scenarios.results.run_folder import BadRunFolder, check_place, told_if_not_written, versions
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_value
+from handover.scenarios.results.run_folder import InvalidRunFolder, check_place, disk_errors_reported, versions
 
 _SHARE = 0.005
 """Part of the time that may go into writing tables before the last one."""
@@ -41,7 +41,7 @@ _BEGIN = (
     ("success", pa.bool_(), "", "whether the task succeeded; null where the run is not done"),
     ("reason", pa.string(), "", "how it ended"),
 )
-_SPENT = (
+_COST_COLUMNS = (
     ("simulated_seconds", "simulated time"),
     ("wall_seconds", "time that the run took"),
     ("cpu_seconds", "time of the processor that the run took"),
@@ -64,7 +64,7 @@ class TableWriter:
     def __init__(self, plan: CampaignPlan, path: Path) -> None:
         self._plan = plan
         self._path = path
-        self._order = {run.name: number for number, run in enumerate(plan.runs())}
+        self._rank = {run.name: number for number, run in enumerate(plan.runs())}
         self._rows: dict[str, RunRow] = {}
         self._next = 0.0
 
@@ -85,7 +85,7 @@ class TableWriter:
     @property
     def rows(self) -> list[RunRow]:
         """The rows."""
-        return sorted(self._rows.values(), key=lambda row: self._order[row.run.name])
+        return sorted(self._rows.values(), key=lambda row: self._rank[row.run.name])
 
     def complete(self) -> None:
         """Write the table, unless it is there as it is to be: what was made of it stays younger than it.
@@ -106,7 +106,7 @@ class TableWriter:
         """
         began = time.monotonic()
         unfinished = self._path.with_name(self._path.name + ".part")
-        with told_if_not_written(self._path):
+        with disk_errors_reported(self._path):
             try:
                 pq.write_table(table_of(self._plan, self.rows), unfinished)
                 os.replace(unfinished, self._path)
@@ -134,7 +134,7 @@ def table_of(plan: CampaignPlan, rows: Sequence[RunRow]) -> pa.Table:
         unit = variable.unit.symbol if variable.kind in (Kind.REAL, Kind.INTEGER) else ""
         at = [_plain(variable, _text(plan, point, variable.name)) for point in range(len(plan.points))]
         add(variable.name, kind, "parameter", unit, variable.description, [at[row.run.point] for row in rows])
-    for name, description in _SPENT:
+    for name, description in _COST_COLUMNS:
         add(name, pa.float64(), "run", "s", description, [getattr(row, name.partition("_")[0]) for row in rows])
     taken = {column.name for column in columns}
     for name, metric in _metrics(rows).items():
@@ -153,7 +153,7 @@ def _of_run(row: RunRow, name: str) -> Any:
 
 def _set_parameters(plan: CampaignPlan) -> list[Variable]:
     """Return the parameters that the plan sets at any point, those that are varied first."""
-    known = {v.name: v for v in scenario_named(plan.scenario).parameters()}
+    known = {v.name: v for v in find_scenario(plan.scenario).parameters()}
     names = dict.fromkeys([*(name for point in plan.points for name in point), *plan.fixed])
     return [known[name] for name in names]
 
@@ -191,7 +191,7 @@ _OF_PLAN = ("scenario", "points", "fixed", "repetitions", "seed", "paired", "sce
 """What `campaign.json` tells of a plan, as far as the table follows from it."""
 
 
-def complete_table(folder: CampaignFolder) -> None:
+def rebuild_table(folder: CampaignFolder) -> None:
     """Give the table of a campaign a row for each run that is done; a table that is damaged is made anew.
 
     It stays as it is if a command carries the campaign out now, if another version has left it, if the folder cannot be
@@ -208,25 +208,25 @@ def complete_table(folder: CampaignFolder) -> None:
         try:
             check_place(folder.path)
             held.enter_context(folder.held())
-        except BadRunFolder:  # who is at work on it keeps its table
+        except InvalidRunFolder:  # who is at work on it keeps its table
             return
         _complete(folder, plan)
 
 
-def _plan_of(told: Mapping[str, Any]) -> CampaignPlan | None:
+def _plan_of(facts: Mapping[str, Any]) -> CampaignPlan | None:
     """Return the plan that a campaign's file tells, None if it cannot be known."""
-    if told.get("versions") != versions():
+    if facts.get("versions") != versions():
         return None
     try:
-        return checked_plan(CampaignPlan(**{name: told[name] for name in _OF_PLAN}))
-    except (BadCall, BadParameter, LookupError, TypeError, ValueError, AttributeError):  # told by who reads on
+        return checked_plan(CampaignPlan(**{name: facts[name] for name in _OF_PLAN}))
+    except (UsageError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):  # told by who reads on
         return None
 
 
 def _complete(folder: CampaignFolder, plan: CampaignPlan) -> None:
     try:
         known = {row.get("run"): row for row in CampaignTable.read(folder.table).rows}
-    except BadRunFolder:
+    except InvalidRunFolder:
         known = {}
     writer = TableWriter(plan, folder.table)
     for run in plan.runs():

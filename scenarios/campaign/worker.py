@@ -22,10 +22,10 @@ from typing import Any, BinaryIO, cast
 
 from distributed import get_worker
 
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 from handover.scenarios.results.run_folder import version_differences, versions
 
-_LOOK = 0.5
+_POLL_INTERVAL = 0.5
 """How often it is asked whether a run is still wanted, s."""
 
 _GRACE = 5.0
@@ -61,7 +61,7 @@ class ServerProcess:
             env={**os.environ, **alike, **dict.fromkeys(_ONE_THREAD, "1")},
             start_new_session=True,
         )
-        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._results: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._listening = threading.Thread(target=self._listen, daemon=True)
         self._listening.start()
 
@@ -75,26 +75,26 @@ class ServerProcess:
         """Whether it can be given orders."""
         return self._process.poll() is None
 
-    def carry_out(self, order: RunOrder, wanted: Callable[[], bool]) -> RunAnswer:
+    def run_job(self, job: RunJob, wanted: Callable[[], bool]) -> JobResult:
         """Carry out an order.
 
         Raises:
             ServerLost: the server has died, or was about to end. NotWanted: `wanted` says so; the server has ended.
         """
-        folder = Path(order.runs, f".{order.name}.{uuid.uuid4().hex[:12]}")
+        folder = Path(job.runs, f".{job.name}.{uuid.uuid4().hex[:12]}")
         try:
             try:
-                pickle.dump((order, folder), self._orders)
-                self._orders.flush()
+                pickle.dump((job, folder), self._jobs)
+                self._jobs.flush()
             except (OSError, ValueError) as e:
                 raise ServerLost(self._last_words()) from e
             while True:
                 lives = self.lives
                 with contextlib.suppress(queue.Empty):
-                    answer = self._answers.get(timeout=_LOOK)
-                    if answer is None:
+                    result = self._results.get(timeout=_POLL_INTERVAL)
+                    if result is None:
                         raise ServerLost(self._last_words())
-                    return answer
+                    return result
                 if not lives:
                     raise ServerLost(self._last_words())
                 if not wanted():
@@ -107,7 +107,7 @@ class ServerProcess:
     def ask_to_end(self) -> None:
         """Let it end, without waiting for that."""
         with contextlib.suppress(OSError, ValueError):
-            self._orders.close()
+            self._jobs.close()
 
     def end(self) -> None:
         """End it, and the run that it carries out, which leaves nothing."""
@@ -120,17 +120,17 @@ class ServerProcess:
         self._listening.join(_GRACE)  # its run dies after it, and writes until then
 
     @property
-    def _orders(self) -> BinaryIO:
+    def _jobs(self) -> BinaryIO:
         return cast(BinaryIO, self._process.stdin)
 
     def _listen(self) -> None:
         """Take answers until both the server and the run that it carries out have ended."""
-        answers = cast(BinaryIO, self._process.stdout)
+        results = cast(BinaryIO, self._process.stdout)
         with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it has ended, maybe amid an answer
             while True:
-                self._answers.put(pickle.load(answers))
-        self._answers.put(None)
-        answers.close()
+                self._results.put(pickle.load(results))
+        self._results.put(None)
+        results.close()
 
     def _last_words(self) -> str:
         """Return how the server ended."""
@@ -150,14 +150,14 @@ _ended: set[str] = set()
 _lock = threading.Lock()
 
 
-def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str]) -> RunAnswer:
+def run_job_on_worker(job: RunJob, batch: str, wanted_versions: Mapping[str, str]) -> JobResult:
     """Carry out an order of a batch. If its server dies, begin it anew with another one, once.
 
     A worker that came when the others had been checked may be of other versions; it carries out nothing.
     """
     worker = get_worker()
     if other := difference(wanted_versions, _versions()):
-        return RunAnswer(name=order.name, lost=f"worker {worker.address} {other}")
+        return JobResult(name=job.name, lost=f"worker {worker.address} {other}")
     task = worker.get_current_task()
 
     def wanted() -> bool:
@@ -167,14 +167,14 @@ def carry_out_run(order: RunOrder, batch: str, wanted_versions: Mapping[str, str
     lost = ""
     for _ in range(2):
         try:
-            return _server_of(batch).carry_out(order, wanted)
+            return _server_of(batch).run_job(job, wanted)
         except ServerLost as e:
             lost = str(e)
         except NotWanted:
             lost = "it was ended, as nobody waited for it"
         if not wanted():
             break
-    return RunAnswer(name=order.name, lost=lost)
+    return JobResult(name=job.name, lost=lost)
 
 
 def end_runs(batch: str) -> None:
@@ -188,7 +188,7 @@ def end_runs(batch: str) -> None:
         server.end()
 
 
-def tell_versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
     """Return the versions of what a run's numbers depend on."""
     return _versions()
 

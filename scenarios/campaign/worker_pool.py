@@ -15,7 +15,7 @@ from handover.cosim.stepping.options import MasterOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOrder:
+class RunJob:
     """What a worker needs to carry out a run. It can be pickled; paths are absolute and seen by all workers alike.
 
     Attributes:
@@ -37,7 +37,7 @@ class RunOrder:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunAnswer:
+class JobResult:
     """How a worker did with an order.
 
     Attributes:
@@ -51,7 +51,7 @@ class RunAnswer:
     no_room: str = ""
 
 
-class Crew(Protocol):
+class WorkerPool(Protocol):
     """Workers that carry out orders side by side."""
 
     def check(self, folder: Path) -> None:
@@ -65,7 +65,7 @@ class Crew(Protocol):
         """
         ...
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
         """Give each order to a worker; yield the answers as they come.
 
         A worker that is lost is replaced where that is possible, and its run begun anew. If the iteration is left
@@ -83,7 +83,7 @@ def cores() -> int:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tally:
+class RunCounts:
     """Numbers of a campaign's runs.
 
     Attributes:
@@ -106,5 +106,5 @@ class Tally:
         return self.total - self.ended - self.lost
 
 
-OnTally = Callable[[Tally], None]
+OnRunCounts = Callable[[RunCounts], None]
 """Told how far a campaign has come, at its start and after each run."""

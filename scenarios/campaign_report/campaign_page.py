@@ -27,7 +27,7 @@ from handover.scenarios.campaign_report.runs import failures_section, runs_secti
 from handover.scenarios.campaign_report.settings import figures_section, setting_section
 from handover.scenarios.campaign_report.spread_section import spread_section
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import (
     Claim,
@@ -38,39 +38,39 @@ from handover.scenarios.published.published_experiment import (
     verdict_counts,
 )
 from handover.scenarios.reporting.page import Section, write_page
-from handover.scenarios.results.run_folder import BadRunFolder, told_if_not_written
+from handover.scenarios.results.run_folder import InvalidRunFolder, disk_errors_reported
 
-_MOST_VALUES = 10
+_MAX_VALUES = 10
 
 
-def campaign_lead(results: CampaignResults, claims: Sequence[Claim]) -> Markup:
+def campaign_header(results: CampaignResults, claims: Sequence[Claim]) -> Markup:
     """Return what was run, verdict, claims by verdict, and the plan in sentences."""
     lines = [Markup("<p class='soft'>{}</p>").format(_scenario(results)), _verdict(results)]
     for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
         counts = verdict_counts(claims, beyond)
         if counts:
-            told = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
-            lines.append(Markup("<p>{}: {}.</p>").format(heading, told))
+            entries = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
+            lines.append(Markup("<p>{}: {}.</p>").format(heading, entries))
     lines.append(Markup("<p class='soft'>{}</p>").format(f"{_plan(results)} {_cost(results)}".strip()))
     return Markup("\n").join(lines)
 
 
 def _scenario(results: CampaignResults) -> str:
     """Tell of the scenario what the page's title does not: its name below a paper's, else what it does."""
-    if results.told.get("experiment"):
+    if results.metadata.get("experiment"):
         return f"Runs of the scenario {results.scenario}."
     scenario = SCENARIOS.get(results.scenario)
-    return str(results.told.get("title", "" if scenario is None else scenario.title))
+    return str(results.metadata.get("title", "" if scenario is None else scenario.title))
 
 
 def _verdict(results: CampaignResults) -> Markup:
     ended, planned, status = len(results.table), results.planned, results.table.column("status")
     done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
     succeeded = sum(p.successes for p in results.points)
-    told = [f"in {succeeded} of {done} runs done the task succeeded"]
-    told += [f"{failed} failed to run"] if failed else []
-    told += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
-    sentence = "; ".join(told) + "."
+    entries = [f"in {succeeded} of {done} runs done the task succeeded"]
+    entries += [f"{failed} failed to run"] if failed else []
+    entries += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
+    sentence = "; ".join(entries) + "."
     if ended < planned:
         begun = Markup("<b>{} of {} runs so far</b>; the same call goes on.").format(ended, planned)
         return Markup("<p class='verdict'>{} {}</p>").format(begun, sentence[0].upper() + sentence[1:])
@@ -81,15 +81,15 @@ def _verdict(results: CampaignResults) -> Markup:
 
 def _plan(results: CampaignResults) -> str:
     """Tell what was varied and how often each point was run."""
-    told = results.told
+    entries = results.metadata
     varied = [f"{name.replace('_', ' ')} ({_values(results, name)})" for name in results.varied]
-    points, repetitions = len(told["points"]), int(told["repetitions"])
+    points, repetitions = len(entries["points"]), int(entries["repetitions"])
     parts = [f"Varied: {'; '.join(varied)}" if varied else "Nothing is varied"]
     number = f"{points} points" if points != 1 else "One point"
     parts.append(
-        f"{number}, {repetitions} {'run' if repetitions == 1 else 'runs'} each; campaign's seed {told['seed']}"
+        f"{number}, {repetitions} {'run' if repetitions == 1 else 'runs'} each; campaign's seed {entries['seed']}"
     )
-    if told.get("paired"):
+    if entries.get("paired"):
         parts.append("Runs of a repetition share a seed, so that points can be compared run by run")
     return ". ".join(parts) + "."
 
@@ -99,19 +99,19 @@ def _cost(results: CampaignResults) -> str:
     if not len(results.table):
         return ""
     cpu, wall = (float(np.nansum(results.table.column(n).astype(np.float64))) for n in ("cpu_seconds", "wall_seconds"))
-    took = [shown_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
+    took = [display_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
     return f"The runs took {took[0]} of CPU time, and {took[1]} from begin to end, added up."
 
 
 def _values(results: CampaignResults, name: str) -> str:
-    texts = list(dict.fromkeys(values[name] for values in results.told["points"] if name in values))
+    texts = list(dict.fromkeys(values[name] for values in results.metadata["points"] if name in values))
     if results.is_number(name):
-        unit = shown_unit(results.unit(name), [float(t) for t in texts])
+        unit = display_unit(results.unit(name), [float(t) for t in texts])
         shown = [f"{float(t) * unit.factor:.4g}" for t in texts]
         symbol = f" {unit.symbol}" if unit.symbol else ""
     else:
         shown, symbol = [t.replace("_", " ") for t in texts], ""
-    if len(shown) > _MOST_VALUES:
+    if len(shown) > _MAX_VALUES:
         shown = [*shown[:4], "…", shown[-1]]
     return ", ".join(shown) + symbol
 
@@ -126,17 +126,19 @@ def read_results(folder: CampaignFolder) -> CampaignResults:
     Raises:
         BadRunFolder: it is not the folder of a campaign, or one of the files is damaged.
     """
-    told = folder.read()
-    faults = [f"{n!r} is {told.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(told.get(n), form)]
-    if not faults and not all(isinstance(p, dict) for p in told["points"]):
+    content = folder.read()
+    faults = [f"{n!r} is {content.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(content.get(n), form)]
+    if not faults and not all(isinstance(p, dict) for p in content["points"]):
         faults = ["its points are not mappings of parameters to values"]
     if faults:
-        raise BadRunFolder(folder.path, f"its campaign.json is damaged: {'; '.join(faults)}")
+        raise InvalidRunFolder(folder.path, f"its campaign.json is damaged: {'; '.join(faults)}")
     table = CampaignTable.read(folder.table)
     missing = [name for name in _COLUMNS if name not in table.table.column_names]
     if missing:
-        raise BadRunFolder(folder.path, f"its {folder.table.name} is damaged: it has no column {', '.join(missing)}")
-    return CampaignResults(told, table)
+        raise InvalidRunFolder(
+            folder.path, f"its {folder.table.name} is damaged: it has no column {', '.join(missing)}"
+        )
+    return CampaignResults(content, table)
 
 
 def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
@@ -152,7 +154,7 @@ def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
         return [Claim.from_data(entry) for entry in cast(list[Mapping[str, Any]], json.loads(file.read_bytes()))]
     except (KeyError, TypeError, ValueError) as e:
         fault = f"its {file.name} is damaged: {one_line(e)}; the same `handover paper` call writes it anew"
-        raise BadRunFolder(folder.path, fault) from e
+        raise InvalidRunFolder(folder.path, fault) from e
 
 
 def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:
@@ -183,7 +185,7 @@ def write_campaign_report(folder: CampaignFolder, file: Path | None = None, pape
     """
     results = read_results(folder)
     claims, tables = (read_claims(folder), None) if paper is None else (paper.claims, paper.tables)
-    with told_if_not_written(folder.figures):
+    with disk_errors_reported(folder.figures):
         draw_campaign(results, folder.figures)
     _write(folder, results, claims, tables, folder.figures, file)
 
@@ -197,7 +199,7 @@ def _write(
     file: Path | None,
 ) -> None:
     """Write the page; a paper's figures are drawn into a folder on the way, and its tables made if they are not."""
-    named = EXPERIMENTS.get(str(results.told.get("experiment", "")))
+    named = EXPERIMENTS.get(str(results.metadata.get("experiment", "")))
     experiment = None if named is None else named()
     sections: list[Section | None] = [claims_section(claims)]
     if experiment is not None and results.points:
@@ -213,7 +215,7 @@ def _write(
         setting_section(results),
     ]
     title = results.scenario if experiment is None else f"{experiment.name}: {experiment.title}"
-    write_page(file or folder.report, title, campaign_lead(results, claims), [s for s in sections if s is not None])
+    write_page(file or folder.report, title, campaign_header(results, claims), [s for s in sections if s is not None])
 
 
 def _published(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, Verdict
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section
@@ -34,7 +34,7 @@ def verdict_html(verdict: Verdict, words: str) -> Markup:
 
 def _row(claim: Claim, header: Sequence[str]) -> Markup:
     where = Markup("<br><span class='soft'>{}</span>").format(claim.where) if claim.where else Markup()
-    verdict = verdict_html(claim.verdict, claim.told_verdict)
+    verdict = verdict_html(claim.verdict, claim.verdict_text)
     cells = {
         "claim": Markup("{}{}").format(claim.claim, where),
         "published": claim.published,
@@ -42,22 +42,22 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
         "95 % interval": _span(claim),
         "verdict": Markup("{}<br><span class='soft'>{}</span>").format(verdict, claim.reason),
     }
-    told = Markup().join(
+    text = Markup().join(
         Markup("<td data-label='{}'{}>{}</td>").format(
             name, Markup() if cells[name] else Markup(" class='empty'"), cells[name]
         )
         for name in header
     )
-    return Markup("<tr>{}</tr>").format(told)
+    return Markup("<tr>{}</tr>").format(text)
 
 
 def _span(claim: Claim) -> str:
     """Return the interval, a rate's in percent."""
     if claim.interval is None:
         return ""
-    unit = shown_unit(claim.unit, claim.interval)
+    unit = display_unit(claim.unit, claim.interval)
     if claim.unit == "1" and "%" in claim.measured:
-        unit = ShownUnit(100.0, "%")
+        unit = DisplayUnit(100.0, "%")
     low, high = (x * unit.factor for x in claim.interval)
     return f"{low:.3g} to {high:.3g} {unit.symbol}".rstrip()
 

@@ -11,14 +11,14 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.statistics import Interval
 from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of
-from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 
 _LINE = 0.24
 """Height of a point of a list, in inches."""
 
-_MOST_LISTED = 80
+_MAX_ENTRIES = 80
 _LETTERS_ALONG = 60
 
 
@@ -30,10 +30,10 @@ def draw_campaign(results: CampaignResults, folder: Path) -> list[Figure]:
     if not any(len(p.done) for p in results.points):
         return []
     layout = layout_of(results)
-    if layout.listed and len(results.points) > _MOST_LISTED:
+    if layout.listed and len(results.points) > _MAX_ENTRIES:
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    metrics = results.told_first
+    metrics = results.shown_metrics
     return [_success(results, layout, folder), *(_metric(results, layout, name, folder) for name in metrics)]
 
 
@@ -53,7 +53,7 @@ def _success(results: CampaignResults, layout: PointLayout, folder: Path) -> Fig
 def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Path) -> Figure:
     """Draw every run of a metric, a disc if it succeeded and else a cross, and the points' medians."""
     column, success = results.table.column(name), results.table.column("success")
-    unit = shown_unit(results.table.unit(name), column)
+    unit = display_unit(results.table.unit(name), column)
     words = name.replace("_", " ")
     with figure(folder / f"{name}_by_point", 1, size=_size(layout)) as [axes]:
         for k, point in enumerate(results.points):
@@ -66,14 +66,18 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
             _median(axes, layout, k, (results.median(point, name), results.median_interval(point, name)), unit)
         _place(axes, layout)
         _across(axes, layout, unit.axis(words), None)
-    told = results.table.description(name) or words
-    caption = f"{told[0].upper()}{told[1:]}: runs that succeeded (discs) and others (crosses); medians of the runs done"
+    value = results.table.description(name) or words
+    caption = (
+        f"{value[0].upper()}{value[1:]}: runs that succeeded (discs) and others (crosses); medians of the runs done"
+    )
     return Figure(
         f"{name}_by_point", caption + (" with their 95 % bootstrap intervals." if results.has_intervals else ".")
     )
 
 
-def _median(axes: Axes, layout: PointLayout, k: int, measured: tuple[float, Interval | None], unit: ShownUnit) -> None:
+def _median(
+    axes: Axes, layout: PointLayout, k: int, measured: tuple[float, Interval | None], unit: DisplayUnit
+) -> None:
     median, span = measured
     if math.isnan(median):
         return

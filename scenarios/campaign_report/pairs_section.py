@@ -10,18 +10,18 @@ from handover.scenarios.campaign.statistics import paired_test
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
-_MOST_PAIRS = 60
+_MAX_PAIRS = 60
 
 
 def pairs_section(results: CampaignResults) -> Section | None:
     """Return exact tests of points that differ in one parameter; None if the campaign is not paired."""
-    if not results.told.get("paired") or len(results.points) < 2:
+    if not results.metadata.get("paired") or len(results.points) < 2:
         return None
     alike, outcomes = _alike(results), _outcomes(results)
     rows: list[tuple[str | Cell, ...]] = []
     left = _number_of_pairs(results, alike)
     for a, b, name in _pairs(results, alike):
-        if len(rows) >= _MOST_PAIRS:
+        if len(rows) >= _MAX_PAIRS:
             break
         left -= 1
         row = _row(results, (results.points[a], results.points[b], name), outcomes[a], outcomes[b])
@@ -29,14 +29,14 @@ def pairs_section(results: CampaignResults) -> Section | None:
             rows.append(row)
     if not rows:
         return None
-    told = (
+    text = (
         "Pairs are runs with the same seed. p: McNemar's exact test, two-sided, not corrected for the number of tests."
     )
     if left:
-        told += f" {left} pairs of points more are left out."
+        text += f" {left} pairs of points more are left out."
     header = ("of", "first", "second", "pairs", "both", "only first", "only second", "neither", "p")
     table = rows_table(header, rows, numbers=range(3, 9), sortable=True)
-    html = Markup("<div class='tall'>{}</div><p class='soft'>{}</p>").format(table, told)
+    html = Markup("<div class='tall'>{}</div><p class='soft'>{}</p>").format(table, text)
     return Section(anchor="pairs", title="Paired comparisons", html=html, scripts=("campaign.js",))
 
 

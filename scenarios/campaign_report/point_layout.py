@@ -8,11 +8,11 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 
-_MOST_COLOURS = 6
-_MOST_NAMES = 10
-_LONGEST_LABELS = 80
+_MAX_COLOURS = 6
+_MAX_NAMES = 10
+_MAX_LABEL_LENGTH = 80
 """Letters of all names along a horizontal axis."""
 
 _UNEVEN = 8.0
@@ -66,7 +66,7 @@ def layout_of(results: CampaignResults) -> PointLayout:
         return _side_by_side(results, varied[0], None)
     if len(varied) == 2:
         across, colour = _axis_and_colour(results, varied[0], varied[1])
-        if len(_texts(results, colour)) <= _MOST_COLOURS:
+        if len(_texts(results, colour)) <= _MAX_COLOURS:
             return _side_by_side(results, across, colour)
     return _list(results)
 
@@ -91,7 +91,7 @@ def _side_by_side(results: CampaignResults, across: str, colour: str | None) -> 
     else:
         texts = _texts(results, across)
         labels = [results.value_text(across, t) for t in texts]
-        if len(labels) > _MOST_NAMES or sum(map(len, labels)) > _LONGEST_LABELS:
+        if len(labels) > _MAX_NAMES or sum(map(len, labels)) > _MAX_LABEL_LENGTH:
             return _list(results)
         along, step = {t: float(k) for k, t in enumerate(texts)}, 1.0
         ticks, title = list(enumerate(labels)), "" if results.is_boolean(across) else across.replace("_", " ")
@@ -104,14 +104,14 @@ def _side_by_side(results: CampaignResults, across: str, colour: str | None) -> 
         room=room,
         ticks=None if ticks is None else [(float(place), name) for place, name in ticks],
         groups=groups,
-        group_names=("",) if colour is None else [_told(results, colour, n) for n in names],
+        group_names=("",) if colour is None else [_label(results, colour, n) for n in names],
     )
 
 
-def _told(results: CampaignResults, parameter: str, text: str) -> str:
+def _label(results: CampaignResults, parameter: str, text: str) -> str:
     if not results.is_number(parameter):
         return results.value_text(parameter, text)
-    unit = shown_unit(results.unit(parameter), [float(t) for t in _texts(results, parameter)])
+    unit = display_unit(results.unit(parameter), [float(t) for t in _texts(results, parameter)])
     return f"{parameter.replace('_', ' ')} {unit.text(float(text))}"
 
 
@@ -121,7 +121,7 @@ def _numbers(
     """Return places by text, ticks if the axis is logarithmic, the least distance between places, and the title."""
     texts = _texts(results, parameter)
     values = np.array([float(t) for t in texts])
-    unit = shown_unit(results.unit(parameter), values)
+    unit = display_unit(results.unit(parameter), values)
     values, title = values * unit.factor, unit.axis(parameter.replace("_", " "))
     steps = np.diff(np.unique(values))
     if values.min() > 0.0 and len(steps) and steps.max() > _UNEVEN * steps.min():

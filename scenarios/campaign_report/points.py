@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign_report.point_layout import PointLayout
-from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.reporting.html import Cell, plot_html, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -23,8 +23,8 @@ def points_section(results: CampaignResults) -> Section | None:
     points = results.points
     if not points:
         return None
-    metrics = results.told_first
-    units = {m: shown_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
+    metrics = results.shown_metrics
+    units = {m: display_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
     written = _written(results)
     rows = [
         (
@@ -43,20 +43,20 @@ def points_section(results: CampaignResults) -> Section | None:
         *(units[m].axis(f"median {m.replace('_', ' ')}") for m in metrics),
     )
     first = len(header) - 3 - len(metrics)
-    told = "Of the runs done. Intervals of success rates: Clopper and Pearson"
-    told += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
+    line = "Of the runs done. Intervals of success rates: Clopper and Pearson"
+    line += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
-    note = Markup("<p class='soft'>{}</p>").format(told)
+    note = Markup("<p class='soft'>{}</p>").format(line)
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
 
 
-def _written(results: CampaignResults) -> Mapping[str, ShownUnit]:
+def _written(results: CampaignResults) -> Mapping[str, DisplayUnit]:
     """Return in which unit the values of each varied number are written."""
     texts = {n: {p.values[n] for p in results.points if n in p.values} for n in results.varied if results.is_number(n)}
-    return {name: shown_unit(results.unit(name), list(map(float, values))) for name, values in texts.items()}
+    return {name: display_unit(results.unit(name), list(map(float, values))) for name, values in texts.items()}
 
 
-def _values(results: CampaignResults, point: PointResults, written: Mapping[str, ShownUnit]) -> list[Cell]:
+def _values(results: CampaignResults, point: PointResults, written: Mapping[str, DisplayUnit]) -> list[Cell]:
     cells: list[Cell] = []
     for name in results.varied:
         text = point.values.get(name)
@@ -73,18 +73,18 @@ def _success(point: PointResults) -> tuple[Cell, Cell]:
     span = point.interval
     if span is None:
         return Cell("–", math.nan), Cell("–", math.nan)
-    told = f"{100 * point.rate:.0f} % ({100 * span.low:.0f} to {100 * span.high:.0f})"
-    return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(told, point.rate)
+    line = f"{100 * point.rate:.0f} % ({100 * span.low:.0f} to {100 * span.high:.0f})"
+    return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(line, point.rate)
 
 
-def _median(results: CampaignResults, point: PointResults, metric: str, unit: ShownUnit) -> Cell:
+def _median(results: CampaignResults, point: PointResults, metric: str, unit: DisplayUnit) -> Cell:
     median, span = results.median(point, metric), results.median_interval(point, metric)
     if math.isnan(median):
         return Cell("–", math.nan)
-    told = f"{median * unit.factor:.4g}"
+    line = f"{median * unit.factor:.4g}"
     if span is not None:
-        told += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
-    return Cell(told, median)
+        line += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
+    return Cell(line, median)
 
 
 def _short(x: float) -> str:
@@ -106,11 +106,11 @@ def success_section(results: CampaignResults, layout: PointLayout) -> Section | 
     place_axis(figure, layout)
     value = "xaxis" if layout.listed else "yaxis"
     figure.update_layout({value: {"title": {"text": "success rate (%)"}, "range": [-4, 104], "dtick": 25}})
-    told = Markup("<p class='soft'>Of the runs done; bars: 95 % intervals of Clopper and Pearson.</p>")
+    entries = Markup("<p class='soft'>Of the runs done; bars: 95 % intervals of Clopper and Pearson.</p>")
     return Section(
         anchor="success",
         title="Success",
-        html=plot_html(figure, plot_height(layout), "success rate by point, with intervals") + told,
+        html=plot_html(figure, plot_height(layout), "success rate by point, with intervals") + entries,
     )
 
 
@@ -121,7 +121,7 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
     spans = [p.interval for p in points]
     low = np.array([s.low for s in spans if s]) * 100.0
     high = np.array([s.high for s in spans if s]) * 100.0
-    told = [
+    entries = [
         [results.label(p), f"{p.successes} of {len(p.done)}", f"{a:.0f} to {b:.0f} %"]
         for p, a, b in zip(points, low, high, strict=True)
     ]
@@ -133,7 +133,7 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
         marker={"size": 10, "color": f"var(--c{group})"},
         name=name,
         showlegend=len(layout.group_names) > 1,
-        customdata=told,
+        customdata=entries,
         hovertemplate="%{customdata[0]}<br>%{customdata[1]} succeeded<br>95 %: %{customdata[2]}<extra></extra>",
     )
 

@@ -15,12 +15,12 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.experiment.display_unit import ShownUnit, shown_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
-_MOST_ROWS = 2000
-_MOST_METRICS = 6
+_MAX_ROWS = 2000
+_MAX_METRICS = 6
 
 
 def runs_section(results: CampaignResults, folder: Path) -> Section | None:
@@ -28,12 +28,12 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
     table = results.table
     if not len(table):
         return None
-    metrics = results.headline[:_MOST_METRICS]
+    metrics = results.headline[:_MAX_METRICS]
     varied = [name for name in results.varied if name in table.parameters]
-    units = {n: shown_unit(table.unit(n), table.column(n)) for n in (*metrics, "cpu_seconds")}
+    units = {n: display_unit(table.unit(n), table.column(n)) for n in (*metrics, "cpu_seconds")}
     columns = {n: table.column(n) for n in varied}
-    set_to = {n: shown_unit(table.unit(n), x) if x.dtype == np.float64 else None for n, x in columns.items()}
-    rows = [_row(row, set_to, units, folder) for row in table.rows[:_MOST_ROWS]]
+    set_to = {n: display_unit(table.unit(n), x) if x.dtype == np.float64 else None for n, x in columns.items()}
+    rows = [_row(row, set_to, units, folder) for row in table.rows[:_MAX_ROWS]]
     header = (
         "run",
         *(n.replace("_", " ") for n in varied),
@@ -73,7 +73,7 @@ def _page_of(name: str, folder: Path) -> str:
 
 
 def _row(
-    row: dict[str, Any], set_to: Mapping[str, ShownUnit | None], units: Mapping[str, ShownUnit], folder: Path
+    row: dict[str, Any], set_to: Mapping[str, DisplayUnit | None], units: Mapping[str, DisplayUnit], folder: Path
 ) -> Sequence[str | Markup | Cell]:
     return (
         run_html(row["run"], folder),
@@ -84,7 +84,7 @@ def _row(
     )
 
 
-def _parameter(value: Any, unit: ShownUnit | None) -> Cell:
+def _parameter(value: Any, unit: DisplayUnit | None) -> Cell:
     if value is None:
         return Cell("–")
     if unit is not None:
@@ -96,13 +96,13 @@ def _parameter(value: Any, unit: ShownUnit | None) -> Cell:
 
 def _verdict(row: dict[str, Any]) -> Markup:
     if row["status"] != "done":
-        kind, told = "bad", row["status"] if row["status"] == "lost" else "run failed"
+        kind, entries = "bad", row["status"] if row["status"] == "lost" else "run failed"
     else:
-        kind, told = ("good", "succeeded") if row["success"] else ("bad", "failed")
-    return Markup("<span class='{}' title='{}'>{}</span>").format(kind, row["reason"] or "", told)
+        kind, entries = ("good", "succeeded") if row["success"] else ("bad", "failed")
+    return Markup("<span class='{}' title='{}'>{}</span>").format(kind, row["reason"] or "", entries)
 
 
-def _number(value: float | None, unit: ShownUnit) -> Cell:
+def _number(value: float | None, unit: DisplayUnit) -> Cell:
     if value is None or not math.isfinite(value):
         return Cell("–", math.nan)
     return Cell(f"{value * unit.factor:.4g}", value)
@@ -110,13 +110,13 @@ def _number(value: float | None, unit: ShownUnit) -> Cell:
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 _EXAMPLES = 3
-_MOST_REASONS = 40
+_MAX_REASONS = 40
 
 
 @dataclass
 class _Group:
     kind: str
-    told: str
+    reason: str
     rows: list[int] = field(default_factory=list[int])
 
 
@@ -133,14 +133,14 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
         (
             Cell(str(len(g.rows)), len(g.rows)),
             Markup("<span class='bad brief'>{}</span>").format(g.kind),
-            Markup("<div class='prose'>{}</div>").format(g.told),
+            Markup("<div class='prose'>{}</div>").format(g.reason),
             Markup("<span class='examples'>{}</span>").format(
                 Markup(", ").join(run_html(str(names[row]), folder) for row in g.rows[:_EXAMPLES])
             ),
         )
-        for g in groups[:_MOST_REASONS]
+        for g in groups[:_MAX_REASONS]
     ]
-    left = len(groups) - _MOST_REASONS
+    left = len(groups) - _MAX_REASONS
     more = Markup("<p class='soft'>{} reasons more, of fewer runs each.</p>").format(left) if left > 0 else Markup()
     table = rows_table(("runs", "how", "reason, such as", "examples"), rows, numbers=(0,), cards=True)
     return Section(anchor="failures", title="Failures", html=table + more)

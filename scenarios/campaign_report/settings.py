@@ -11,21 +11,21 @@ from typing import Any, cast
 from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section
-from handover.scenarios.results.tables import told_value
+from handover.scenarios.results.tables import format_value
 
 
 def setting_section(results: CampaignResults) -> Section:
     """Return tables of what is set for all runs; the scenario's defaults hold for the rest."""
-    told = results.told
+    found = results.metadata
     parts = [
-        _part("Fixed parameters", {n: _value(results, n, v) for n, v in told["fixed"].items()}),
-        _part("Master", _flat(told.get("master", {}))),
-        _part("Versions", {n: str(v) for n, v in told.get("versions", {}).items()}),
-        _fmus(told.get("units", {})),
+        _part("Fixed parameters", {n: _value(results, n, v) for n, v in found["fixed"].items()}),
+        _part("Master", _flat(found.get("master", {}))),
+        _part("Versions", {n: str(v) for n, v in found.get("versions", {}).items()}),
+        _fmus(found.get("units", {})),
     ]
     defaults = "Parameters that are neither varied nor fixed have the scenario's defaults; each run's run.json has all."
     html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)
@@ -56,7 +56,7 @@ def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
 
 def _value(results: CampaignResults, name: str, text: str) -> str:
     if results.is_number(name):
-        return shown_unit(results.unit(name), float(text)).text(float(text))
+        return display_unit(results.unit(name), float(text)).text(float(text))
     unit = results.unit(name)
     return text if unit == "1" else f"{text} {unit}"
 
@@ -68,7 +68,7 @@ def _flat(options: Mapping[str, Any]) -> dict[str, str]:
         if isinstance(value, Mapping):
             flat |= {f"{name} {n}": t for n, t in _flat(cast(Mapping[str, Any], value)).items()}
         elif value is not None:
-            flat[name.replace("_", " ")] = told_value(value)
+            flat[name.replace("_", " ")] = format_value(value)
     return flat
 
 

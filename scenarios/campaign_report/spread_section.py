@@ -11,7 +11,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign_report.point_layout import PointLayout
 from handover.scenarios.campaign_report.points import place_axis, plot_height
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.reporting.html import json_html, plot_html
 from handover.scenarios.reporting.page import Section
 
@@ -76,7 +76,7 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
     traces: list[dict[str, Any]] = []
     for group, succeeded, rows, places in strips:
         name, outcome = layout.group_names[group], "succeeded" if succeeded else "not succeeded"
-        told = [
+        entries = [
             [name_of, int(seed), _ENDED[success]]
             for name_of, seed, success in zip(*(c[rows] for c in columns), strict=True)
         ]
@@ -87,7 +87,7 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
                 along: places,
                 "name": ", ".join(filter(None, (name, outcome if mixed or not name else ""))),
                 "marker": _marker(f"var(--c{group})", _SUCCESS if succeeded else _OTHER),
-                "customdata": told,
+                "customdata": entries,
                 "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{across}:.4g}}"
                 "<br>%{customdata[2]}<extra></extra>",
             }
@@ -116,7 +116,7 @@ def _box_trace(layout: PointLayout, group: int) -> dict[str, Any]:
 def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Sequence[Strip]) -> dict[str, Any]:
     """Return a metric's axis, description, and the values of the traces."""
     column = results.table.column(name)
-    unit = shown_unit(results.table.unit(name), column)
+    unit = display_unit(results.table.unit(name), column)
     values = column * unit.factor
     across = "x" if layout.listed else "y"
     boxes = [

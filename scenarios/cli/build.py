@@ -15,21 +15,21 @@ from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
 from handover.cosim.exceptions import nearest, one_line
 from handover.fmus.binaries import NotCompiled
-from handover.fmus.build import UnusableName, UnusableStep, build
+from handover.fmus.build import InvalidName, InvalidStep, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, import_block
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.layout import DuplicateName
-from handover.fmus.model_description import AmbiguousName, UnusableText
+from handover.fmus.model_description import AmbiguousName, InvalidText
 from handover.fmus.sources import closure
-from handover.scenarios.execution.errors import BadCall, told_in_one_line
+from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.results.run_folder import BadRunFolder, check_place
+from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
 
 _STEP = Fraction(1, 100)  # s, of a block that is not sampled
 
 
-def own_unit(path: str, step: str | None) -> Entry:
+def load_user_block(path: str, step: str | None) -> Entry:
     """Return the unit that a path such as `spring:Spring` names; the working directory is searched first.
 
     Its step is that which is given, a number or a fraction of seconds, else the block's period, else 0.01 s.
@@ -45,9 +45,9 @@ def own_unit(path: str, step: str | None) -> Entry:
         closure(path)
         period = describe(import_block(path)).period
     except (UnknownBlock, DeclarationError) as e:
-        raise BadCall(f"{path}: {e}" if isinstance(e, DeclarationError) else str(e)) from e
+        raise UsageError(f"{path}: {e}" if isinstance(e, DeclarationError) else str(e)) from e
     except Exception as e:  # a module may raise anything while it is loaded
-        raise BadCall(f"{path}: its module cannot be loaded: {type(e).__name__}: {one_line(e)}") from e
+        raise UsageError(f"{path}: its module cannot be loaded: {type(e).__name__}: {one_line(e)}") from e
     return Entry(path.rpartition(":")[2], path, given or period or _STEP, "")
 
 
@@ -57,7 +57,7 @@ def _seconds(text: str) -> Fraction:
     except (ValueError, ZeroDivisionError):
         step = Fraction(0)
     if not sys.float_info.min <= step <= sys.float_info.max:
-        raise BadCall(f"--step {text!r} is not a positive number of seconds, such as 0.01 or 1/30")
+        raise UsageError(f"--step {text!r} is not a positive number of seconds, such as 0.01 or 1/30")
     return step
 
 
@@ -120,12 +120,12 @@ def build_command(
     unknown = [u for u in named if u not in UNITS and ":" not in u]
     if unknown:
         cure = "a unit of your own is named MODULE:CLASS"
-        raise BadCall("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown) + f"; {cure}")
-    with Interruption(), told_in_one_line():
+        raise UsageError("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown) + f"; {cure}")
+    with Interruption(), one_line_errors():
         check_place(out)
-        entries = [UNITS[u] if u in UNITS else own_unit(u, step) for u in named or UNITS]
+        entries = [UNITS[u] if u in UNITS else load_user_block(u, step) for u in named or UNITS]
         if step is not None and all(entry in UNITS.values() for entry in entries):
-            raise BadCall("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
+            raise UsageError("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
         _compile_missing(platforms)
         make = partial(build, out_dir=out, scalar=scalar, platforms=platforms or None)
         for line in _build_all(entries, fmi, make, out, named=bool(units)):
@@ -150,10 +150,10 @@ def _build_all(
                 yield str(make(entry, version))
             except NoFmi2Form as e:
                 if named and fmi == "2":
-                    raise BadCall(str(e)) from e
-            except (UnusableName, UnusableStep, DuplicateName, AmbiguousName, UnusableText) as e:
-                raise BadCall(f"{entry.block}: {e}") from e
+                    raise UsageError(str(e)) from e
+            except (InvalidName, InvalidStep, DuplicateName, AmbiguousName, InvalidText) as e:
+                raise UsageError(f"{entry.block}: {e}") from e
             except OSError as e:
                 if e.filename and Path(e.filename).absolute().is_relative_to(out.absolute()):
-                    raise BadRunFolder(out, f"it cannot be written to: {e.strerror}") from e
-                raise BadCall(f"{entry.name} cannot be built: {e}") from e
+                    raise InvalidRunFolder(out, f"it cannot be written to: {e.strerror}") from e
+                raise UsageError(f"{entry.name} cannot be built: {e}") from e

@@ -23,14 +23,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.scenarios.campaign.campaign import carry_out_campaign
-from handover.scenarios.campaign.folder import CampaignFolder, place_of
+from handover.scenarios.campaign.campaign import run_campaign
+from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import PreparedPlan, prepared
-from handover.scenarios.campaign.pool_config import LateCrew, Workforce
+from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import Crew, Tally
-from handover.scenarios.execution.errors import BadCall, CrewLost, RunNotWritten, WorkersLost, told_in_one_line
+from handover.scenarios.campaign.worker_pool import RunCounts, WorkerPool
+from handover.scenarios.execution.errors import ClusterLost, RunNotWritten, UsageError, WorkersLost, one_line_errors
 from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
 from handover.scenarios.execution.supervisor import leave
 
@@ -49,44 +49,46 @@ class CampaignProgress:
     """
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
-        self.tally: Tally | None = None
+        self.counts: RunCounts | None = None
         """What it was told last."""
         self._stream = stream
         self._clock = clock
-        self._began = self._told = clock()
+        self._began = self._printed_at = clock()
         console = Console(file=stream)
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TextColumn("{task.fields[left]}"))
         self._bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
         self._task = self._bar.add_task(_STARTING, total=None, left="")
-        self._telling, self._ended = threading.Lock(), threading.Event()
-        self._teller = threading.Thread(target=self._tell_while_nothing_ends, daemon=True)
+        self._printing, self._ended = threading.Lock(), threading.Event()
+        self._printer = threading.Thread(target=self._print_periodically, daemon=True)
 
-    def __call__(self, tally: Tally) -> None:
+    def __call__(self, counts: RunCounts) -> None:
         """Take how far it has come."""
-        if self.tally is None:
+        if self.counts is None:
             self._began = self._clock()
-        self.tally = tally
-        ended = tally.ended + tally.lost
-        left = told_left(tally, self._clock() - self._began)
-        self._bar.update(self._task, description=told_done(tally), total=tally.total, completed=ended, left=left)
+        self.counts = counts
+        ended = counts.ended + counts.lost
+        left = format_time_left(counts, self._clock() - self._began)
+        self._bar.update(
+            self._task, description=format_progress(counts), total=counts.total, completed=ended, left=left
+        )
         self.tell()
 
     def tell(self) -> None:
         """Write a line if one is due."""
-        with self._telling:
+        with self._printing:
             if not self._bar.disable or self._due() > 0:
                 return
-            self._told = self._clock()
-            tally = self.tally
-            left = told_left(tally, self._told - self._began) if tally else ""
-            self._stream.write(f"{told_done(tally) if tally else _STARTING}{', ' if left else ''}{left}\n")
+            self._printed_at = self._clock()
+            counts = self.counts
+            left = format_time_left(counts, self._printed_at - self._began) if counts else ""
+            self._stream.write(f"{format_progress(counts) if counts else _STARTING}{', ' if left else ''}{left}\n")
             self._stream.flush()
 
     def __enter__(self) -> "CampaignProgress":
-        self._told = self._clock()
+        self._printed_at = self._clock()
         self._bar.start()
         if self._bar.disable:
-            self._teller.start()
+            self._printer.start()
         return self
 
     def __exit__(
@@ -95,31 +97,31 @@ class CampaignProgress:
         self._bar.stop()
         self._ended.set()
         if self._bar.disable:
-            self._teller.join()
+            self._printer.join()
 
     def _due(self) -> float:
         """Return in how many seconds the next line is due."""
-        return self._told + _PAUSE - self._clock()
+        return self._printed_at + _PAUSE - self._clock()
 
-    def _tell_while_nothing_ends(self) -> None:
+    def _print_periodically(self) -> None:
         while not self._ended.wait(max(self._due(), 0.0)):
             self.tell()
 
 
-def told_done(tally: Tally) -> str:
+def format_progress(counts: RunCounts) -> str:
     """Return such as "12 of 60 runs done, 1 failed, 2 lost"."""
-    parts = [f"{tally.ended} of {tally.total} runs done"]
-    parts += [f"{tally.failed} failed"] if tally.failed else []
-    parts += [f"{tally.lost} lost"] if tally.lost else []
+    parts = [f"{counts.ended} of {counts.total} runs done"]
+    parts += [f"{counts.failed} failed"] if counts.failed else []
+    parts += [f"{counts.lost} lost"] if counts.lost else []
     return ", ".join(parts)
 
 
-def told_left(tally: Tally, elapsed: float) -> str:
+def format_time_left(counts: RunCounts, elapsed: float) -> str:
     """Return such as "3 min left", reckoned from the runs of this call; "" where nothing can be said."""
-    here = tally.ended + tally.lost - tally.kept
-    if here == 0 or tally.left == 0:
+    here = counts.ended + counts.lost - counts.kept
+    if here == 0 or counts.left == 0:
         return ""
-    seconds = elapsed / here * tally.left
+    seconds = elapsed / here * counts.left
     if seconds < 60:
         return f"{max(1, round(seconds))} s left"
     if seconds < 3600:
@@ -139,7 +141,7 @@ class CampaignInterruption:
     """
 
     def __init__(self) -> None:
-        self._asked = self._holds_back = False
+        self._asked = self._defers = False
         self._undo: list[Callable[[], object]] = []
 
     def __enter__(self) -> "CampaignInterruption":
@@ -166,17 +168,17 @@ class CampaignInterruption:
             self._asked = before
 
     @contextlib.contextmanager
-    def held_back(self) -> Generator[None, None, None]:
+    def deferred_signals(self) -> Generator[None, None, None]:
         """Let the first signal count at the end of the block, as what is half started or ended is not in order.
 
         Raises:
             KeyboardInterrupt: at the end, if there has been one.
         """
-        self._holds_back = True
+        self._defers = True
         try:
             yield
         finally:
-            self._holds_back = False
+            self._defers = False
         if self._asked:
             raise KeyboardInterrupt
 
@@ -185,7 +187,7 @@ class CampaignInterruption:
             os.write(2, b"\nAborted!\n" if os.isatty(2) else b"Aborted!\n")
             leave(ABORTED)
         self._asked = True
-        if not self._holds_back:
+        if not self._defers:
             raise KeyboardInterrupt
 
 
@@ -200,26 +202,26 @@ class CampaignCall:
     plan: CampaignPlan
     folder: CampaignFolder
     table: CampaignTable
-    tally: Tally
+    counts: RunCounts
 
     @property
     def status(self) -> int:
         """The command's exit status: whether all runs have ended, whether or not their tasks succeeded."""
-        return UNIT_FAILED if self.tally.failed or self.tally.lost else 0
+        return UNIT_FAILED if self.counts.failed or self.counts.lost else 0
 
 
-def workforce_of(workers: int | None, scheduler: str | None) -> Workforce:
+def workforce_of(workers: int | None, scheduler: str | None) -> PoolConfig:
     """Return workers of this machine, or those of a scheduler.
 
     Raises:
         BadCall: both are given.
     """
     if workers is not None and scheduler is not None:
-        raise BadCall("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
-    return Workforce(workers, scheduler)
+        raise UsageError("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
+    return PoolConfig(workers, scheduler)
 
 
-def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, finish: Finish) -> CampaignCall:
+def call_campaign(plan: CampaignPlan, out: Path | None, workers: PoolConfig, finish: Finish) -> CampaignCall:
     """Carry out a campaign in a folder, or in one of its own in `campaigns/`, and finish it.
 
     Interrupted, the command ends here, with the status that says so.
@@ -230,24 +232,24 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: Workforce, fini
     progress = CampaignProgress(sys.stderr)
     folder = None
     try:
-        with CampaignInterruption() as interruption, told_in_one_line():
+        with CampaignInterruption() as interruption, one_line_errors():
             called = CampaignFolder(out) if out else None
             ready = prepared(plan, lambda checked: _check_cheaply(checked, called, workers, interruption))
-            folder = called or place_of(ready.plan, ready.fmus)
+            folder = called or default_folder(ready.plan, ready.fmus)
             folder.check(ready.plan, ready.fmus)  # before it is told what begins
-            table = _carry_out(ready, folder, workers, interruption, progress)
+            table = _run(ready, folder, workers, interruption, progress)
             finish(folder, table)
     except KeyboardInterrupt:
         _end_interrupted(folder, progress)
-    tally = progress.tally
-    assert tally is not None
-    if tally.kept == tally.total:
+    counts = progress.counts
+    assert counts is not None
+    if counts.kept == counts.total:
         click.echo(f"{folder.path} has all of its runs; none was carried out", err=True)
-    return CampaignCall(ready.plan, folder, table, tally)
+    return CampaignCall(ready.plan, folder, table, counts)
 
 
 def _check_cheaply(
-    plan: CampaignPlan, folder: CampaignFolder | None, workers: Workforce, interruption: CampaignInterruption
+    plan: CampaignPlan, folder: CampaignFolder | None, workers: PoolConfig, interruption: CampaignInterruption
 ) -> None:
     """Check what takes no units, which may have to be built."""
     if folder is not None:
@@ -257,46 +259,46 @@ def _check_cheaply(
             workers.check()
 
 
-def _carry_out(
+def _run(
     ready: PreparedPlan,
     folder: CampaignFolder,
-    workers: Workforce,
+    workers: PoolConfig,
     interruption: CampaignInterruption,
     progress: CampaignProgress,
 ) -> CampaignTable:
     plan = ready.plan
     if not folder.has_all(plan):
         done = sum(map(folder.is_done, plan.runs()))
-        told = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
-        click.echo(f"{told}{f'; {done} are done' if done else ''}", err=True)
+        text = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
+        click.echo(f"{text}{f'; {done} are done' if done else ''}", err=True)
     try:
         with contextlib.ExitStack() as opened, progress:
             start = partial(_started, workers, interruption)
-            return carry_out_campaign(ready, folder, LateCrew(start, opened), progress, interruption.held_back)
-    except (RecordNotWritten, CrewLost) as e:
-        if progress.tally is None:
+            return run_campaign(ready, folder, LazyPool(start, opened), progress, interruption.deferred_signals)
+    except (RecordNotWritten, ClusterLost) as e:
+        if progress.counts is None:
             raise
-        stopped = WorkersLost if isinstance(e, CrewLost) else RunNotWritten
-        raise stopped(f"{e}; {told_done(progress.tally)}; the same call goes on") from e
+        stopped = WorkersLost if isinstance(e, ClusterLost) else RunNotWritten
+        raise stopped(f"{e}; {format_progress(progress.counts)}; the same call goes on") from e
 
 
 @contextlib.contextmanager
-def _started(workers: Workforce, interruption: CampaignInterruption) -> Generator[Crew, None, None]:
+def _started(workers: PoolConfig, interruption: CampaignInterruption) -> Generator[WorkerPool, None, None]:
     """Give workers; neither their start nor their end is interrupted."""
     opened = contextlib.ExitStack()
     try:
-        with interruption.held_back():
-            crew = opened.enter_context(workers.start())
-        yield crew
+        with interruption.deferred_signals():
+            pool = opened.enter_context(workers.start())
+        yield pool
     finally:
-        with interruption.held_back():
+        with interruption.deferred_signals():
             opened.close()
 
 
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:
-    if folder is None or progress.tally is None:
+    if folder is None or progress.counts is None:
         kept = folder is not None and folder.is_there
         click.echo(f"Aborted! The same call goes on with {folder.path}" if folder and kept else "Aborted!", err=True)
         sys.exit(ABORTED)
-    click.echo(f"{told_done(progress.tally)} in {folder.path}; the same call goes on", err=True)
+    click.echo(f"{format_progress(progress.counts)} in {folder.path}; the same call goes on", err=True)
     sys.exit(INTERRUPTED)

@@ -10,23 +10,23 @@ from rich.text import Text
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import Tally
-from handover.scenarios.cli.campaign import told_done
+from handover.scenarios.campaign.worker_pool import RunCounts
+from handover.scenarios.cli.campaign import format_progress
 from handover.scenarios.cli.listing import open_console
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 
-_MOST_POINTS = 12
-_MOST_REASONS = 5
+_MAX_POINTS = 12
+_MAX_REASONS = 5
 _COLUMN = 24
 """Characters that a metric's column takes; as many metrics are told as the terminal is wide."""
 
 
-def print_campaign(results: CampaignResults, tally: Tally, folder: CampaignFolder) -> None:
+def print_campaign(results: CampaignResults, counts: RunCounts, folder: CampaignFolder) -> None:
     """Print how the runs of each point went, why runs failed, and where table and report are."""
     console = open_console()
-    console.print(f"{results.scenario}: {told_done(tally)}", style="bold")
+    console.print(f"{results.scenario}: {format_progress(counts)}", style="bold")
     console.print(_points(results, console))
-    left = len(results.points) - _MOST_POINTS
+    left = len(results.points) - _MAX_POINTS
     if left > 0:
         console.print(f"  and {left} points more")
     _print_reasons(console, results.table)
@@ -41,7 +41,7 @@ def _points(results: CampaignResults, console: Console) -> Table:
     rows = Table(box=None, padding=(0, 2), pad_edge=True)
     for heading in (*varied, "runs", "succeeded", "95 % interval", *(f"median\n{name}" for name in metrics)):
         rows.add_column(Text(heading), justify="right", overflow="fold")
-    for point in results.points[:_MOST_POINTS]:
+    for point in results.points[:_MAX_POINTS]:
         cells = [point.values.get(name, "") for name in varied]
         medians = (_median(results, point, name) for name in metrics)
         rows.add_row(*map(Text, [*cells, str(len(point.rows)), *_successes(point), *medians]))
@@ -58,13 +58,13 @@ def _successes(point: PointResults) -> tuple[str, str]:
 
 def _median(results: CampaignResults, point: PointResults, metric: str) -> str:
     median = results.median(point, metric)
-    return "" if math.isnan(median) else shown_unit(results.table.unit(metric), median).text(median)
+    return "" if math.isnan(median) else display_unit(results.table.unit(metric), median).text(median)
 
 
 def _print_reasons(console: Console, table: CampaignTable) -> None:
     ended = zip(table.column("status").tolist(), table.column("reason").tolist(), strict=True)
     reasons = Counter((status, reason) for status, reason in ended if status != "done")
-    for (status, reason), number in reasons.most_common(_MOST_REASONS):
+    for (status, reason), number in reasons.most_common(_MAX_REASONS):
         console.print(f"{number} {status}: {reason}", markup=False, soft_wrap=True)
-    if len(reasons) > _MOST_REASONS:
-        console.print(f"and {len(reasons) - _MOST_REASONS} reasons more, in the table")
+    if len(reasons) > _MAX_REASONS:
+        console.print(f"and {len(reasons) - _MAX_REASONS} reasons more, in the table")

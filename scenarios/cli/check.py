@@ -13,10 +13,10 @@ from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section
 from handover.cosim.fmu.archive import NO_FILE_FAULT, folder_fault
 from handover.scenarios.cli.listing import open_console
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 
 _FAULTS = 1
-_MOST_FINDINGS = 20  # of one level in one section
+_MAX_FINDINGS = 20  # of one level in one section
 _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAULT: "bold red"}
 
 _HELP = """Tell what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
@@ -46,7 +46,7 @@ Exit status
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
     """Tell what is wrong with files that should be co-simulation FMUs."""
-    _refuse_what_is_not_there(files)
+    _check_files_exist(files)
     reports: list[CheckReport] = []
     for file in files:
         reports.append(check_fmu(file, timeout))
@@ -57,7 +57,7 @@ def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
     sys.exit(0 if all(r.passed for r in reports) else _FAULTS)
 
 
-def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
+def _check_files_exist(files: Sequence[Path]) -> None:
     faults: list[str] = []
     for file in files:
         try:
@@ -70,7 +70,7 @@ def _refuse_what_is_not_there(files: Sequence[Path]) -> None:
         except OSError as e:
             faults.append(f"{file}: {(e.strerror or str(e)).lower()}")
     if faults:
-        raise BadCall("; ".join(faults))
+        raise UsageError("; ".join(faults))
 
 
 def _print_report(report: CheckReport) -> None:
@@ -84,15 +84,15 @@ def _print_report(report: CheckReport) -> None:
 def _print_section(section: Section) -> None:
     level = section.level.name.lower() if section.reached else "-"
     style = _STYLES[section.level] if section.reached else "dim"
-    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.told))
+    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.summary))
     line.rstrip()
     open_console().print(line, soft_wrap=True)
     for wanted in sorted(Level, reverse=True):
         findings = [f for f in section.findings if f.level is wanted]
-        for finding in findings[:_MOST_FINDINGS]:
+        for finding in findings[:_MAX_FINDINGS]:
             _print_finding(finding, named=wanted is not section.level)
-        if len(findings) > _MOST_FINDINGS:
-            more = f"and {len(findings) - _MOST_FINDINGS} more; --json shows all"
+        if len(findings) > _MAX_FINDINGS:
+            more = f"and {len(findings) - _MAX_FINDINGS} more; --json shows all"
             _print_indented("", Text(more), 11)
 
 
@@ -125,11 +125,11 @@ def _verdict(report: CheckReport) -> Text:
         for level in (Level.FAULT, Level.WARNING, Level.NOTE)
         if (n := report.count(level))
     ]
-    told = f" ({', '.join(counted)})" if counted else ""
+    sentence = f" ({', '.join(counted)})" if counted else ""
     if report.passed:
-        return Text.assemble(("usable", "green"), f": no faults were found{told}")
+        return Text.assemble(("usable", "green"), f": no faults were found{sentence}")
     if report.ran:
         return Text.assemble(
-            ("against the standard", "bold red"), f": it runs here, but another tool may refuse it{told}"
+            ("against the standard", "bold red"), f": it runs here, but another tool may refuse it{sentence}"
         )
-    return Text.assemble(("not usable as it is", "bold red"), told)
+    return Text.assemble(("not usable as it is", "bold red"), sentence)

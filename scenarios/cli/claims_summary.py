@@ -26,10 +26,10 @@ def print_results(experiment: PublishedExperiment, results: PaperResults, folder
     for compared in results.tables:
         _print_table(console, compared)
     for beyond, heading in ((False, "Claims"), (True, "Beyond the paper")):
-        told = [claim for claim in results.claims if claim.beyond is beyond]
-        if told:
+        entries = [claim for claim in results.claims if claim.beyond is beyond]
+        if entries:
             console.print(f"\n{heading}", style="bold")
-        for claim in told:
+        for claim in entries:
             _print_claim(console, claim)
     console.print()
     for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
@@ -62,7 +62,7 @@ def _print_claim(console: Console, claim: Claim) -> None:
         unit = "" if claim.unit == "1" else f" {claim.unit}"
         figures.append(f"95 % interval: {claim.interval[0]:.3g} to {claim.interval[1]:.3g}{unit}")
     where = f" ({claim.where})" if claim.where else ""
-    console.print(Text.assemble((claim.told_verdict, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
+    console.print(Text.assemble((claim.verdict_text, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
     if figures:
         console.print(Padding(Text("; ".join(figures)), (0, 0, 0, 4), expand=False))
     console.print(Padding(Text(claim.reason, style="dim"), (0, 0, 0, 4), expand=False))

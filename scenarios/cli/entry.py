@@ -57,9 +57,9 @@ def _command() -> None:
 
 
 def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:
-    from handover.scenarios.cli.crash_report import tell_death  # what it loads is loaded by no other run
+    from handover.scenarios.cli.crash_report import report_crash  # what it loads is loaded by no other run
 
-    return tell_death(heartbeat, end, wall)
+    return report_crash(heartbeat, end, wall)
 
 
 def _abort() -> NoReturn:

@@ -9,9 +9,9 @@ from handover.cosim.ssp.writing import write_ssp
 from handover.fmus.build import cached
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import scenario_options
-from handover.scenarios.execution.errors import BadCall, told_in_one_line
+from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
+from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import check_place
 
@@ -33,21 +33,21 @@ Its units are FMUs of FMI 2, and of FMI 3 only where there is no other form (pic
 @scenario_options
 def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: int, replaced: Sequence[str]) -> None:
     """Write a SCENARIO as an SSP."""
-    experiment = scenario_named(scenario)
-    with Interruption(), told_in_one_line():
+    experiment = find_scenario(scenario)
+    with Interruption(), one_line_errors():
         values = parse_parameters(experiment, parameters)
         if file.suffix.lower() != ".ssp":
-            raise BadCall(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
+            raise UsageError(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
         if file.is_dir():
-            raise BadCall(f"--ssp {file}: there is a folder of that name")
+            raise UsageError(f"--ssp {file}: there is a folder of that name")
         check_place(file.parent)
-        fmus = fmus_of(experiment, replacements(experiment, replaced), exchangeable)
+        fmus = select_fmus(experiment, replacement_fmus(experiment, replaced), exchangeable)
         chosen = experiment()
         system = chosen.build(values, seed, lambda unit: fmus[unit])
         try:
             write_ssp(system, file, experiment.name, chosen.stop_time(values))
         except OSError as e:
-            raise BadCall(f"--ssp {file}: it cannot be written: {e.strerror}") from e
+            raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
     click.echo(file)
 
 

@@ -12,7 +12,7 @@ from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS, Entry, import_block
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
 from handover.scenarios.cli.listing import open_console, print_rows
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.experiment import Experiment
 
 
@@ -27,7 +27,7 @@ def list_command(name: str | None) -> None:
     elif name in SCENARIOS:
         print_scenario(SCENARIOS[name])
     else:
-        raise BadCall(f"no scenario or unit {name!r}: {nearest(name, [*SCENARIOS, *UNITS])}")
+        raise UsageError(f"no scenario or unit {name!r}: {nearest(name, [*SCENARIOS, *UNITS])}")
 
 
 def print_catalog() -> None:

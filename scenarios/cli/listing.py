@@ -18,8 +18,9 @@ from rich.text import Text
 
 from handover.scenarios.execution.exit_status import TASK_FAILED, UNIT_FAILED
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.tables import pace_rows, told, told_conversion
-from handover.scenarios.results.task import Ended, Task
+from handover.scenarios.results.summary import RunResult
+from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows
+from handover.scenarios.results.task import Task
 
 
 def open_console() -> Console:
@@ -43,11 +44,11 @@ class _Console(Console):
             os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
-_MOST_CONVERSIONS = 8
+_MAX_CONVERSIONS = 8
 """Conversions of units that the end of a run tells on the terminal."""
 
 
-def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> None:
+def print_summary(ended: RunResult, headline: Sequence[str], folder: RunFolder) -> None:
     """Print how a run ended, the figures named in the headline, and where its report is, or its results."""
     console = open_console()
     summary = ended.summary
@@ -55,7 +56,7 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
     console.print(f"{summary['scenario']} {verdict}: ", end="")
     console.print(summary["reason"], markup=False, soft_wrap=True)
     metrics = summary["metrics"]
-    rows = [(metrics[n]["description"] or n, told(metrics[n])) for n in headline if n in metrics]
+    rows = [(metrics[n]["description"] or n, format_metric(metrics[n])) for n in headline if n in metrics]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)
@@ -67,13 +68,13 @@ def print_summary(ended: Ended, headline: Sequence[str], folder: RunFolder) -> N
 
 
 def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
-    told = [told_conversion(c) for c in folder.read_run().get("conversions", [])]
-    left = len(told) - _MOST_CONVERSIONS
+    format_metric = [format_conversion(c) for c in folder.read_run().get("conversions", [])]
+    left = len(format_metric) - _MAX_CONVERSIONS
     more = [(f"{left} conversions more", "in the report")] if left > 0 else []
-    return [(f"converted: {ends}", change) for ends, change in told[:_MOST_CONVERSIONS]] + more
+    return [(f"converted: {ends}", change) for ends, change in format_metric[:_MAX_CONVERSIONS]] + more
 
 
-def end_with(ended: Ended, task: Task) -> NoReturn:
+def exit_with(ended: RunResult, task: Task) -> NoReturn:
     """Print how a run ended, and exit with the status that says so."""
     if ended.failure:
         click.echo(str(ended.failure), err=True)

@@ -9,7 +9,7 @@ import click
 
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.scenarios.cli.options import HeadedOption, Seconds
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 
 _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()
@@ -55,7 +55,7 @@ _OPTIONS = (
     _coupling_option(
         "--iterations",
         type=click.IntRange(min=1),
-        default=_PLAIN.most_iterations,
+        default=_PLAIN.max_iterations,
         help="After so many iterations of one step, the run fails.",
     ),
     _coupling_option(
@@ -132,13 +132,13 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """
     limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] not in (None, ())}
     if given["adaptive"] is None and limits:
-        told = ", ".join("--" + name.replace("_", "-") for name in limits)
-        raise BadCall(f"{told}: with --adaptive only; without it, steps are fixed")
+        text = ", ".join("--" + name.replace("_", "-") for name in limits)
+        raise UsageError(f"{text}: with --adaptive only; without it, steps are fixed")
     control = {_CONTROL_FIELDS[name]: value for name, value in limits.items()}
     return {
         "algorithm": Algorithm(given["algorithm"]),
         "tolerance": given["tolerance"],
-        "most_iterations": given["iterations"],
+        "max_iterations": given["iterations"],
         "extrapolation": Extrapolation(given["extrapolation"]),
         "adaptive": None if given["adaptive"] is None else AdaptiveStep(relative=given["adaptive"], **control),
         "repeat_discarded": given["repeat_discarded"],

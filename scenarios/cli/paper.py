@@ -16,8 +16,8 @@ from handover.cosim.exceptions import nearest
 from handover.scenarios.cli.campaign import call_campaign, workforce_of
 from handover.scenarios.cli.listing import open_console
 from handover.scenarios.cli.options import HeadedCommand, campaign_options
-from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.results.run_folder import InvalidRunFolder
 
 if TYPE_CHECKING:
     from handover.scenarios.campaign.folder import CampaignFolder
@@ -66,7 +66,7 @@ def paper(
         _list(EXPERIMENTS.values())
         return
     if experiment not in EXPERIMENTS:
-        raise BadCall(f"no experiment {experiment!r}: {nearest(experiment, EXPERIMENTS)}")
+        raise UsageError(f"no experiment {experiment!r}: {nearest(experiment, EXPERIMENTS)}")
     carried_out = EXPERIMENTS[experiment]()
     plan = carried_out.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
@@ -95,7 +95,7 @@ class _Finish:
             self.results = PaperResults.of(self._experiment, table)
         except KeyError as e:
             fault = f"it is of another version of {self._experiment.name}: its runs have no {e.args[0]}"
-            raise BadRunFolder(folder.path, fault) from e
+            raise InvalidRunFolder(folder.path, fault) from e
         write_claims(self.results.claims, folder)
         if self._report and not folder.is_reported:
             write_campaign_report(folder, paper=self.results)

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.execution.errors import BadCall, told_in_one_line
+from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 _HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
@@ -24,30 +24,30 @@ there is.
 )
 def report(folder: Path, figures: bool, file: Path | None) -> None:
     """Write the page of a run or of a campaign."""
-    with told_in_one_line():
+    with one_line_errors():
         if not folder.is_dir():
-            raise BadCall(f"{folder} is no folder; name that of a run or of a campaign")
+            raise UsageError(f"{folder} is no folder; name that of a run or of a campaign")
         page = file or folder / "report.html"
         if page.is_dir():
-            raise BadCall(f"{page} is a folder; name a file for the page")
+            raise UsageError(f"{page} is a folder; name a file for the page")
         check_place(page.parent)
         if figures:
             check_place(folder)
         campaign = CampaignFolder(folder)
         if campaign.is_there:
             _write_of_campaign(campaign, page, figures)
-        elif not RunFolder.left_at(folder).is_there:
-            raise BadCall(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
+        elif not RunFolder.of_run(folder).is_there:
+            raise UsageError(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
         else:
-            _write_of_run(RunFolder.left_at(folder), page, figures)
+            _write_of_run(RunFolder.of_run(folder), page, figures)
     click.echo(f"report: {page}")
 
 
 def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> None:
-    from handover.scenarios.campaign.table_writer import complete_table
+    from handover.scenarios.campaign.table_writer import rebuild_table
     from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 
-    complete_table(campaign)
+    rebuild_table(campaign)
     (write_campaign_report if figures else write_campaign_page)(campaign, page)
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.cli.listing import end_with
+from handover.scenarios.cli.listing import exit_with
 from handover.scenarios.cli.options import limit_options, limits
 from handover.scenarios.cli.progress import progress_bar
-from handover.scenarios.execution.errors import told_in_one_line
+from handover.scenarios.execution.errors import one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.resume import LeftRun
-from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.resume import InterruptedRun
+from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.run_folder import RunFolder
 
 _HELP = """Go on with a run that was interrupted, killed, or that failed, from its last checkpoint.
@@ -34,12 +34,12 @@ trust.
 @limit_options
 def resume(folder: Path, no_report: bool, call_limit: float, pace: float | None) -> None:
     """Go on with a run from its last checkpoint."""
-    with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
-        left_at = RunFolder.left_at(folder)
-        opened.enter_context(left_at.held())
-        left = LeftRun(left_at)
+    with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
+        of_run = RunFolder.of_run(folder)
+        opened.enter_context(of_run.held())
+        left = InterruptedRun(of_run)
         task = left.task(opened)
         task = replace(task, options=replace(task.options, **limits(call_limit, pace)), presented=not no_report)
         with progress_bar(sys.stderr) as progress:
-            ended = carry_out(task, progress, interruption, left.resumption)
-    end_with(ended, task)
+            ended = run_task(task, progress, interruption, left.resumption)
+    exit_with(ended, task)

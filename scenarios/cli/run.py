@@ -14,15 +14,15 @@ import click
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
-from handover.scenarios.cli.listing import end_with
+from handover.scenarios.cli.listing import exit_with
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
 from handover.scenarios.cli.progress import progress_bar
-from handover.scenarios.cli.ssp import refuse_for_ssp, ssp_options
-from handover.scenarios.execution.errors import BadCall, told_in_one_line
+from handover.scenarios.cli.ssp import reject_for_ssp, ssp_options
+from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import carry_out
-from handover.scenarios.execution.selection import fmus_of, replacements, scenario_named
+from handover.scenarios.execution.runner import run_task
+from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
 from handover.scenarios.execution.ssp_run import NoParameters, is_ssp, open_experiment, source_of
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
@@ -84,19 +84,19 @@ def run(
 ) -> None:
     """Run a SCENARIO or an SSP once."""
     if is_ssp(scenario):
-        refuse_for_ssp(**{"-p": parameters, "--seed": seed, "--unit": replaced})
+        reject_for_ssp(**{"-p": parameters, "--seed": seed, "--unit": replaced})
     elif stop is not None or step is not None:
-        raise BadCall("--stop and --step are for an SSP; a scenario has its own")
-    with Interruption() as interruption, told_in_one_line(), contextlib.ExitStack() as opened:
+        raise UsageError("--stop and --step are for an SSP; a scenario has its own")
+    with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
         options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace))
         source: Mapping[str, Any] = {}
         if is_ssp(scenario):
             experiment, values, source = _of_file(Path(scenario), stop, step, opened)
         else:
-            experiment = scenario_named(scenario)()
+            experiment = find_scenario(scenario)()
             values = parse_parameters(type(experiment), parameters)
         folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{Path(scenario).stem}"))
-        fmus = fmus_of(type(experiment), replacements(type(experiment), replaced), lambda unit: cached(unit, 3))
+        fmus = select_fmus(type(experiment), replacement_fmus(type(experiment), replaced), lambda unit: cached(unit, 3))
         task = Task(
             experiment=experiment,
             parameters=values,
@@ -110,8 +110,8 @@ def run(
             presented=not no_report,
         )
         with progress_bar(sys.stderr) as progress:
-            ended = carry_out(task, progress, interruption)
-    end_with(ended, task)
+            ended = run_task(task, progress, interruption)
+    exit_with(ended, task)
 
 
 def _of_file(

@@ -8,19 +8,19 @@ from typing import Any
 
 from handover.cosim.record.reader import Record, RecordedSignals
 from handover.scenarios.execution.ssp_run import figures_of_outputs
-from handover.scenarios.experiment.experiment import Experiment, Figure, Watch
-from handover.scenarios.experiment.parameters import BadParameter, parameters_of
+from handover.scenarios.experiment.experiment import Evaluator, Experiment, Figure
+from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.experiment.plotting import draw_time_figures
-from handover.scenarios.results.pictures import read_pictures
+from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_facts import RunFacts, record_of
-from handover.scenarios.results.run_folder import BadRunFolder, RunFolder, told_if_not_written
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported
 
 
 def draw_figures(
-    experiment: Experiment[Any], parameters: Any, watch: Watch, record: Record, folder: Path
+    experiment: Experiment[Any], parameters: Any, evaluator: Evaluator, record: Record, folder: Path
 ) -> Sequence[Figure]:
     """Draw what a scenario shows of a run into a folder: the scene and the like, then curves over time."""
-    scenes = experiment.draw(parameters, watch, record, folder)
+    scenes = experiment.draw(parameters, evaluator, record, folder)
     return [*scenes, *draw_time_figures(experiment.time_figures(parameters, record), record.time, folder)]
 
 
@@ -33,9 +33,9 @@ def draw_run(folder: RunFolder) -> Sequence[Figure]:
     """
     facts, record = RunFacts.read(folder), record_of(folder)
     if record is None:
-        raise BadRunFolder(folder.path, "there is nothing to draw: its record has less than two rows")
+        raise InvalidRunFolder(folder.path, "there is nothing to draw: its record has less than two rows")
     unfinished = folder.path / "figures.part"
-    with told_if_not_written(folder.figures):
+    with disk_errors_reported(folder.figures):
         try:
             unfinished.mkdir(exist_ok=True)
             figures = _drawn(facts, record, unfinished)
@@ -53,17 +53,19 @@ def _drawn(facts: RunFacts, record: Record, to: Path) -> Sequence[Figure]:
         return draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
     try:
         parameters = parameters_of(type(experiment), facts.run["parameters"])
-        watch = experiment.watch_of_record(parameters, read_pictures(facts.folder.pictures))
-        _show(record, watch)
-        return draw_figures(experiment, parameters, watch, record, to)
-    except (BadParameter, KeyError) as e:
-        raise BadRunFolder(facts.folder.path, f"the run is of another version of {facts.scenario}: {e.args[0]}") from e
+        evaluator = experiment.evaluator_of_record(parameters, read_picture_files(facts.folder.pictures))
+        _show(record, evaluator)
+        return draw_figures(experiment, parameters, evaluator, record, to)
+    except (InvalidParameter, KeyError) as e:
+        raise InvalidRunFolder(
+            facts.folder.path, f"the run is of another version of {facts.scenario}: {e.args[0]}"
+        ) from e
 
 
-def _show(record: Record, watch: Watch) -> None:
+def _show(record: Record, evaluator: Evaluator) -> None:
     """Let a watch see a run again."""
     signals = RecordedSignals(record)
     for row, t in enumerate(record.time.tolist()):
         signals.row = row
-        watch(t, signals)
-    watch.finish(signals)
+        evaluator(t, signals)
+    evaluator.finish(signals)

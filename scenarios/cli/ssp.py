@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from handover.scenarios.cli.options import HeadedOption, Seconds
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
 _STOP = _option(
@@ -22,7 +22,7 @@ def ssp_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return _STOP(_STEP(command))
 
 
-def refuse_for_ssp(**given: Any) -> None:
+def reject_for_ssp(**given: Any) -> None:
     """Refuse options that are for scenarios.
 
     Raises:
@@ -30,4 +30,4 @@ def refuse_for_ssp(**given: Any) -> None:
     """
     used = [name for name, value in given.items() if value]
     if used:
-        raise BadCall(f"{', '.join(used)}: for scenarios; an SSP has its parameters and units inside")
+        raise UsageError(f"{', '.join(used)}: for scenarios; an SSP has its parameters and units inside")

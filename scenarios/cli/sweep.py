@@ -10,13 +10,13 @@ import click
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
-from handover.scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
+from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import call_campaign, workforce_of
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
-from handover.scenarios.execution.errors import BadCall, told_in_one_line
-from handover.scenarios.execution.selection import replacements, scenario_named
+from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.selection import find_scenario, replacement_fmus
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
@@ -56,7 +56,7 @@ Exit status
 @click.command("sweep", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("scenario", metavar="SCENARIO")
 @click.argument("grid", nargs=-1, metavar="[NAME=VALUES]...")
-@click.option("--repeat", type=click.IntRange(1, MOST_REPETITIONS), default=1, help="Runs of each combination.")
+@click.option("--repeat", type=click.IntRange(1, MAX_REPETITIONS), default=1, help="Runs of each combination.")
 @click.option(
     "--paired", is_flag=True, help="Let all combinations of a repetition share a seed, to compare them run by run."
 )
@@ -81,11 +81,11 @@ def sweep(
     **coupling: Any,
 ) -> None:
     """Run a SCENARIO many times."""
-    crew = workforce_of(workers, scheduler)
+    pool = workforce_of(workers, scheduler)
     if is_ssp(scenario):
-        raise BadCall(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
-    experiment = scenario_named(scenario)
-    with told_in_one_line():
+        raise UsageError(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
+    experiment = find_scenario(scenario)
+    with one_line_errors():
         points = parse_grid(experiment, grid)
         plan = CampaignPlan(
             scenario=scenario,
@@ -94,15 +94,15 @@ def sweep(
             repetitions=repeat,
             seed=seed,
             paired=paired,
-            units={name: str(file) for name, file in replacements(experiment, replaced).items()},
+            units={name: str(file) for name, file in replacement_fmus(experiment, replaced).items()},
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
-    call = call_campaign(plan, out, crew, (lambda _folder, _table: None) if no_report else _write_report)
+    call = call_campaign(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
 
     from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
     from handover.scenarios.cli.campaign_summary import print_campaign
 
-    print_campaign(CampaignResults(call.folder.read(), call.table), call.tally, call.folder)
+    print_campaign(CampaignResults(call.folder.read(), call.table), call.counts, call.folder)
     sys.exit(call.status)
 
 

@@ -16,9 +16,9 @@ from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
 from handover.scenarios.cli.progress import progress_bar
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.vsl.training import FEWEST, Errors, NothingToLearn, VslTraining, file_text
+from handover.scenarios.vsl.training import MIN_POINTS, Errors, NothingToLearn, VslTraining, file_text
 
 _PATH = click.Path(path_type=Path)
 
@@ -32,7 +32,7 @@ class _ArmFailed(click.ClickException):
 
 
 @click.command("vsl-train", context_settings={"show_default": True})
-@click.option("--points", type=click.IntRange(min=FEWEST, max=1_000_000), default=1500, help="Points to measure.")
+@click.option("--points", type=click.IntRange(min=MIN_POINTS, max=1_000_000), default=1500, help="Points to measure.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
 @click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
@@ -48,13 +48,13 @@ def vsl_train(points: int, seed: int, elbow: str, plant: Path | None, out: Path)
 
     Ctrl-C aborts; the file is written at the end, whole or not at all.
     """
-    with Interruption() as interruption, _told_in_one_line(interruption):
+    with Interruption() as interruption, _one_line_errors(interruption):
         _check_file(out)
         arm = Params(elbow=Elbow[elbow.upper()])
         kinematics = VslKinematics(arm.L_1, arm.L_2, arm.L_3, arm.elbow)
         training = VslTraining(fmu=plant or _built(), kinematics=kinematics, points=points, seed=seed)
         with progress_bar(sys.stderr) as progress:
-            model, errors = training.carry_out(progress)
+            model, errors = training.train(progress)
         _write(out, file_text(model, out))
     counts = model.provenance["points"]
     click.echo(
@@ -72,30 +72,30 @@ def _table(errors: Errors) -> Generator[str, None, None]:
         ("forward: tip from the encoders' angles", errors.forward_model_based, errors.forward_hybrid),
         ("inverse: command for a measured tip", errors.inverse_model_based, errors.inverse_hybrid),
     )
-    for told, rigid, hybrid in rows:
-        yield f"{told:44}{rigid * 1000:12.2f}{hybrid * 1000:9.2f}{rigid / hybrid:8.1f}"
+    for value, rigid, hybrid in rows:
+        yield f"{value:44}{rigid * 1000:12.2f}{hybrid * 1000:9.2f}{rigid / hybrid:8.1f}"
 
 
 def _built() -> Path:
     try:
         return cached("VslArm", 3)
     except OSError as e:
-        raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+        raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
 
 
 def _check_file(out: Path) -> None:
     folder = out.absolute().parent
     longest = 240  # of the 255 bytes of a file's name; the unfinished file's name is longer
     if out.suffix not in (".json", ".py"):
-        raise BadCall(f"--out {out}: a name that ends in .json, or in .py for the module form")
+        raise UsageError(f"--out {out}: a name that ends in .json, or in .py for the module form")
     if len(os.fsencode(out.name)) > longest:
-        raise BadCall(f"--out {out}: the name is longer than {longest} bytes")
+        raise UsageError(f"--out {out}: the name is longer than {longest} bytes")
     if out.is_dir():
-        raise BadCall(f"--out {out}: there is a folder of that name")
+        raise UsageError(f"--out {out}: there is a folder of that name")
     if not folder.is_dir():
-        raise BadCall(f"--out {out}: there is no folder {folder}")
+        raise UsageError(f"--out {out}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise BadCall(f"--out {out}: no permission to write to {folder}")
+        raise UsageError(f"--out {out}: no permission to write to {folder}")
 
 
 def _write(out: Path, text: str) -> None:
@@ -111,11 +111,11 @@ def _write(out: Path, text: str) -> None:
             Path(part).unlink(missing_ok=True)
             raise
     except OSError as e:
-        raise BadCall(f"--out {out}: {e.strerror}") from e
+        raise UsageError(f"--out {out}: {e.strerror}") from e
 
 
 @contextmanager
-def _told_in_one_line(interruption: Interruption) -> Generator[None, None, None]:
+def _one_line_errors(interruption: Interruption) -> Generator[None, None, None]:
     try:
         yield
     except UnitFailure as e:
@@ -123,6 +123,6 @@ def _told_in_one_line(interruption: Interruption) -> Generator[None, None, None]
         raise _ArmFailed(e.cause) from e
     except (CosimError, NotCompiled, NothingToLearn, UnknownPlatform) as e:
         interruption.check()
-        raise BadCall(str(e)) from e
+        raise UsageError(str(e)) from e
     except CompilationError as e:
-        raise BadCall(str(e).replace("\n", " ", 1)) from e
+        raise UsageError(str(e).replace("\n", " ", 1)) from e

@@ -11,9 +11,9 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple, NoReturn
 
-from handover.cosim.fmu.heartbeat import Heartbeat, Stillness
+from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
 
-_LOOK = 0.25  # s
+_POLL_INTERVAL = 0.25  # s
 _GRACE = 5.0
 """How much later than the child itself the parent gives up a call, s; only a child that cannot act is late."""
 
@@ -63,11 +63,11 @@ class ForkedChild:
 
         If a unit's call does not return, the child is killed.
         """
-        stillness = Stillness(self._heartbeat, 2 * _LOOK)
+        stall_timer = StallTimer(self._heartbeat, 2 * _POLL_INTERVAL)
         files = [self._alive] if watched is None else [self._alive, watched]
         hung = False
         while True:
-            ready, _, _ = select.select(files, [], [], _LOOK)
+            ready, _, _ = select.select(files, [], [], _POLL_INTERVAL)
             gone = self._alive in ready
             pid, status, spent = os.wait4(self.pid, 0 if gone else os.WNOHANG)
             if pid:
@@ -78,7 +78,7 @@ class ForkedChild:
                 return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, hung)
             if ready:
                 return None
-            if self._heartbeat.limit and stillness.look() >= self._heartbeat.limit + _GRACE:
+            if self._heartbeat.limit and stall_timer.elapsed() >= self._heartbeat.limit + _GRACE:
                 hung = True
                 os.kill(self.pid, signal.SIGKILL)
 

@@ -12,12 +12,11 @@ from handover.cosim.record.reader import Record
 from handover.cosim.record.stream import complete_record
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.experiment.experiment import Outcome
-from handover.scenarios.results.run_folder import RunFolder, told_if_not_written
-from handover.scenarios.results.summary import Spent, crashed_summary, failure_reason
-from handover.scenarios.results.task import Ended
+from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
+from handover.scenarios.results.summary import ElapsedTime, RunResult, crashed_summary, failure_reason
 
 
-class Death:
+class Crash:
     """The death of a run's process. What the run had for its time alone is removed.
 
     Args:
@@ -38,15 +37,15 @@ class Death:
             shutil.rmtree(folder, ignore_errors=True)
         self._end, self._wall, self._time, self._call = end, wall, heartbeat.time, heartbeat.under_way
         self.failure = _failure(heartbeat, self._call, end)
-        self.told = _how_it_ended(self._call, self._time, end) if self.failure is None else str(self.failure)
-        self.folder = RunFolder.left_at(Path(self.facts["folder"])) if "folder" in self.facts else None
+        self.message = _crash_message(self._call, self._time, end) if self.failure is None else str(self.failure)
+        self.folder = RunFolder.of_run(Path(self.facts["folder"])) if "folder" in self.facts else None
 
     @property
     def was_killed(self) -> bool:
         """Whether it was killed from outside, and not because it hung."""
         return self._end.signal == signal.SIGKILL and not self._end.hung
 
-    def complete(self, folder: RunFolder) -> Ended:
+    def complete(self, folder: RunFolder) -> RunResult:
         """Complete the record in the run's folder as far as it goes, and write the summary.
 
         Raises:
@@ -54,13 +53,13 @@ class Death:
         """
         failure = self.failure
         data = _data(self._call, self._time, self._end) if failure is None else failure.as_data()
-        reason = self.told if failure is None else failure_reason(failure)
-        with told_if_not_written(folder.path):
+        reason = self.message if failure is None else failure_reason(failure)
+        with disk_errors_reported(folder.path):
             known = self.facts["configuration"], self.facts["units"]
-            summary = crashed_summary(*known, reason, data, _simulated(folder), Spent(self._wall, self._end.cpu))
+            summary = crashed_summary(*known, reason, data, _simulated(folder), ElapsedTime(self._wall, self._end.cpu))
             folder.write_summary(summary)
             folder.add_to_run(failure=data)
-        return Ended(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
+        return RunResult(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
 
 
 def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFailure | None:
@@ -79,7 +78,7 @@ def _meaning(number: int) -> str:
     return (signal.strsignal(number) or f"signal {number}").lower()
 
 
-def _how_it_ended(call: Call | None, t: float, end: ChildEnd) -> str:
+def _crash_message(call: Call | None, t: float, end: ChildEnd) -> str:
     within = f", in {call.call} of {call.unit}" if call is not None else ", outside of its units"
     if end.signal == signal.SIGKILL:
         return f"the run was killed at t = {t:.6g} s{within}: by someone, or by the system for want of memory"

@@ -9,21 +9,21 @@ from contextlib import contextmanager
 import click
 
 from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
-from handover.scenarios.execution.exit_status import BAD_CALL, UNIT_FAILED
+from handover.scenarios.execution.exit_status import UNIT_FAILED, USAGE_ERROR
 
 
-class BadCrew(ValueError):
+class PoolError(ValueError):
     """A cluster that cannot be reached, is none, has no workers, or has workers that would give other numbers."""
 
 
-class CrewLost(RuntimeError):
+class ClusterLost(RuntimeError):
     """The cluster has gone while runs were under way. What has ended is kept."""
 
 
-class BadCall(click.ClickException):
+class UsageError(click.ClickException):
     """A call that cannot be carried out, told in one line."""
 
-    exit_code = BAD_CALL
+    exit_code = USAGE_ERROR
 
 
 class UnitLost(click.ClickException):
@@ -45,7 +45,7 @@ class WorkersLost(click.ClickException):
 
 
 @contextmanager
-def told_in_one_line() -> Generator[None, None, None]:
+def one_line_errors() -> Generator[None, None, None]:
     """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback.
 
     A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten,
@@ -53,8 +53,8 @@ def told_in_one_line() -> Generator[None, None, None]:
     """
     from handover.fmus.binaries import NotCompiled  # what builds and records is loaded by commands that do it
     from handover.fmus.compile import CompilationError, UnknownPlatform
-    from handover.scenarios.experiment.parameters import BadParameter
-    from handover.scenarios.results.run_folder import BadRunFolder
+    from handover.scenarios.experiment.parameters import InvalidParameter
+    from handover.scenarios.results.run_folder import InvalidRunFolder
 
     try:
         yield
@@ -62,9 +62,9 @@ def told_in_one_line() -> Generator[None, None, None]:
         raise UnitLost(str(e)) from e
     except RecordNotWritten as e:
         raise RunNotWritten(str(e)) from e
-    except CrewLost as e:
+    except ClusterLost as e:
         raise WorkersLost(str(e)) from e
-    except (CosimError, BadParameter, BadRunFolder, BadCrew, NotCompiled, UnknownPlatform) as e:
-        raise BadCall(str(e)) from e
+    except (CosimError, InvalidParameter, InvalidRunFolder, PoolError, NotCompiled, UnknownPlatform) as e:
+        raise UsageError(str(e)) from e
     except CompilationError as e:
-        raise BadCall(str(e).replace("\n", " ", 1)) from e
+        raise UsageError(str(e).replace("\n", " ", 1)) from e

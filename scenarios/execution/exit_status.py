@@ -1,6 +1,6 @@
 """With which status the command `handover` ends: see its help."""
 
-TASK_FAILED, BAD_CALL, UNIT_FAILED = 1, 2, 3
+TASK_FAILED, USAGE_ERROR, UNIT_FAILED = 1, 2, 3
 
 INTERRUPTED = 1
 """A campaign was ended by Ctrl-C: the same call goes on."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
-from handover.cosim.master.checkpoint import BadCheckpoint
+from handover.cosim.master.checkpoint import InvalidCheckpoint
 from handover.cosim.record.file_lock import FileLocked
 from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached
@@ -16,7 +16,7 @@ from handover.scenarios.execution.resumption import Resumption, unpack
 from handover.scenarios.execution.ssp_run import open_experiment
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import (
-    BadRunFolder,
+    InvalidRunFolder,
     RunFolder,
     is_full,
     sha256_of,
@@ -35,18 +35,18 @@ def complete_signals(folder: RunFolder) -> int:
     try:
         return complete_record(folder.signals)
     except FileLocked as e:
-        raise BadRunFolder(folder.path, "the run still goes on") from e
+        raise InvalidRunFolder(folder.path, "the run still goes on") from e
     except FileNotFoundError:  # it ended before it recorded
         return 0
     except ValueError as e:  # Arrow's
-        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
+        raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
     except OSError as e:
         if is_full(e):
             raise RecordNotWritten(folder.signals, str(e.strerror)) from e
-        raise BadRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
+        raise InvalidRunFolder(folder.path, f"its record cannot be completed: {e.strerror or e}") from e
 
 
-class LeftRun:
+class InterruptedRun:
     """A run's folder, whose record is completed as far as it goes; nothing else is changed.
 
     Raises:
@@ -56,15 +56,15 @@ class LeftRun:
 
     def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
-        self._told = folder.read_run()
+        self._description = folder.read_run()
         if folder.read_summary().get("complete"):
-            raise BadRunFolder(folder.path, "the run is complete; there is nothing to go on with")
+            raise InvalidRunFolder(folder.path, "the run is complete; there is nothing to go on with")
         rows = complete_signals(folder)
         self._check_versions(self._object("versions"))
         self.resumption: Resumption = unpack(folder.checkpoint)
         if rows < self.resumption.checkpoint.rows:
             counted = self.resumption.checkpoint.rows
-            raise BadCheckpoint(folder.checkpoint, f"it counts {counted} rows, the record beside it has {rows}")
+            raise InvalidCheckpoint(folder.checkpoint, f"it counts {counted} rows, the record beside it has {rows}")
 
     def task(self, opened: contextlib.ExitStack) -> Task:
         """Return what the run was to do; `opened` closes what that opens.
@@ -72,53 +72,55 @@ class LeftRun:
         Raises:
             BadRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
         """
-        told = self._told
+        value = self._description
         try:
             experiment = self._experiment(opened)
             fmus = {name: self._fmu(name, unit) for name, unit in experiment.units.items()}
-            every = told["checkpoint"]
+            every = value["checkpoint"]
             task = Task(
                 experiment=experiment,
                 parameters=self.resumption.parameters,
-                seed=int(told["seed"] or 0),
+                seed=int(value["seed"] or 0),
                 fmus=fmus,
                 folder=self.folder,
-                formats=tuple(told["formats"]),
+                formats=tuple(value["formats"]),
                 every=None if every is None else Fraction(every),
-                source=told["source"],
+                source=value["source"],
                 options=self.resumption.options,
             )
-        except BadRunFolder:
+        except InvalidRunFolder:
             raise
         except (KeyError, TypeError, ValueError) as e:
-            raise BadRunFolder(self.folder.path, f"its run.json is damaged: {type(e).__name__} {e}") from e
+            raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: {type(e).__name__} {e}") from e
         self._check_fmus(task)
         return task
 
     def _object(self, name: str) -> Mapping[str, Any]:
-        found = self._told.get(name, {})
+        found = self._description.get(name, {})
         if not isinstance(found, dict):
-            raise BadRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
+            raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
         return cast(Mapping[str, Any], found)
 
     def _check_versions(self, before: Mapping[str, str]) -> None:
         if other := version_differences(versions(), before):
-            raise BadRunFolder(self.folder.path, f"the run began with other versions: {other}")
+            raise InvalidRunFolder(self.folder.path, f"the run began with other versions: {other}")
 
     def _experiment(self, opened: contextlib.ExitStack) -> Experiment[Any]:
-        source, name = self._told["source"], self._told["scenario"]
+        source, name = self._description["source"], self._description["scenario"]
         if not source:
             if name not in SCENARIOS:
-                raise BadRunFolder(self.folder.path, f"its scenario {name!r} is not here; {nearest(name, SCENARIOS)}")
+                raise InvalidRunFolder(
+                    self.folder.path, f"its scenario {name!r} is not here; {nearest(name, SCENARIOS)}"
+                )
             return SCENARIOS[name]()
         file, step = Path(source["ssp"]), source["step"]
         if not file.is_file() or sha256_of(file) != source["sha256"]:
-            raise BadRunFolder(self.folder.path, f"{file} is not the file that the run began with")
+            raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
         return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
 
     def _fmu(self, name: str, unit: str) -> Path:
         """Return a unit's file, or the same unit built anew where the folder of built units was cleared."""
-        path = Path(self._told["files"][name])
+        path = Path(self._description["files"][name])
         return path if path.is_file() else cached(unit, 3)
 
     def _check_fmus(self, task: Task) -> None:
@@ -127,6 +129,6 @@ class LeftRun:
         before = {name: unit.get("sha256") for name, unit in self._object("units").items()}
         other = [f"{name} ({here[name]})" for name in here if before.get(name) != sha256_of(here[name])]
         if other:
-            raise BadRunFolder(
+            raise InvalidRunFolder(
                 self.folder.path, f"these FMUs are not those that the run began with: {', '.join(other)}"
             )

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import one_line
-from handover.cosim.master.checkpoint import BadCheckpoint, Checkpoint, read_checkpoint
+from handover.cosim.master.checkpoint import Checkpoint, InvalidCheckpoint, read_checkpoint
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.experiment.experiment import Watch
-from handover.scenarios.results.summary import Spent
+from handover.scenarios.experiment.experiment import Evaluator
+from handover.scenarios.results.summary import ElapsedTime
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,15 +17,15 @@ class Resumption:
     """Where a run goes on: its checkpoint, and what `pack` put into it."""
 
     checkpoint: Checkpoint
-    watch: Watch
+    evaluator: Evaluator
     parameters: Any
     options: MasterOptions
-    spent: Spent
+    spent: ElapsedTime
 
 
-def pack(watch: Watch, parameters: Any, options: MasterOptions, spent: Spent) -> bytes:
+def pack(evaluator: Evaluator, parameters: Any, options: MasterOptions, spent: ElapsedTime) -> bytes:
     """Return what a checkpoint keeps besides the units' states."""
-    return pickle.dumps((watch, parameters, options, spent))
+    return pickle.dumps((evaluator, parameters, options, spent))
 
 
 def unpack(path: Path) -> Resumption:
@@ -36,7 +36,7 @@ def unpack(path: Path) -> Resumption:
     """
     checkpoint = read_checkpoint(path)
     try:
-        watch, parameters, options, spent = pickle.loads(checkpoint.kept)
+        evaluator, parameters, options, spent = pickle.loads(checkpoint.kept)
     except Exception as e:  # unpickling raises what it likes
-        raise BadCheckpoint(path, f"what it keeps of the scenario cannot be read: {one_line(e)}") from e
-    return Resumption(checkpoint=checkpoint, watch=watch, parameters=parameters, options=options, spent=spent)
+        raise InvalidCheckpoint(path, f"what it keeps of the scenario cannot be read: {one_line(e)}") from e
+    return Resumption(checkpoint=checkpoint, evaluator=evaluator, parameters=parameters, options=options, spent=spent)

@@ -8,24 +8,31 @@ from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system.signals import FromThenOn, Observer, Signals
+from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run
-from handover.scenarios.experiment.experiment import Outcome, Watch
-from handover.scenarios.results.pictures import write_pictures
+from handover.scenarios.experiment.experiment import Evaluator, Outcome
+from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of
-from handover.scenarios.results.run_folder import told_if_not_written
-from handover.scenarios.results.summary import Spent, begun_run, crash_facts, failure_reason, finished_summary
-from handover.scenarios.results.task import Ended, Task
+from handover.scenarios.results.run_folder import disk_errors_reported
+from handover.scenarios.results.summary import (
+    ElapsedTime,
+    RunResult,
+    begun_run,
+    crash_facts,
+    failure_reason,
+    finished_summary,
+)
+from handover.scenarios.results.task import Task
 
 Progress = Callable[[float, float], None]
 """Told the simulated time and the time at which the run ends at the latest, in seconds."""
 
 
-def carry_out(
+def run_task(
     task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None
-) -> Ended:
+) -> RunResult:
     """Run a scenario to its end, its failure or its interruption and write its folder; or go on with a run.
 
     Raises:
@@ -35,8 +42,8 @@ def carry_out(
         RecordNotWritten: there is no room for what it leaves; what was recorded stays.
     """
     experiment, parameters = task.experiment, task.parameters
-    spent = Spent() if resumption is None else resumption.spent
-    watch = experiment.watch(parameters) if resumption is None else resumption.watch
+    spent = ElapsedTime() if resumption is None else resumption.spent
+    evaluator = experiment.evaluator(parameters) if resumption is None else resumption.evaluator
     failure: UnitFailure | None = None
     clock = spent.clock()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
@@ -47,23 +54,23 @@ def carry_out(
     try:
         with master:
             if resumption is not None:
-                master.carry_out(lambda: resumption.checkpoint.restore(master))
+                master.call_units(lambda: resumption.checkpoint.restore(master))
             interruption.begin()
             began = True
             _begin_folder(task, master, resumption)
-            failure = _run(task, master, watch, resumption, _Surroundings(progress, interruption, clock))
+            failure = _run(task, master, evaluator, resumption, _Surroundings(progress, interruption, clock))
     except UnitHung as e:  # as units were loaded, or terminated
         if not began:
             raise
         failure = failure or e
-    return _conclude(task, master, watch, failure, interruption.asked, clock())
+    return _conclude(task, master, evaluator, failure, interruption.asked, clock())
 
 
 @dataclass(frozen=True)
 class _Surroundings:
     progress: Progress
     interruption: Interruption
-    clock: Callable[[], Spent]
+    clock: Callable[[], ElapsedTime]
 
 
 def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> None:
@@ -79,26 +86,26 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
 
 
 def _run(
-    task: Task, master: Master, watch: Watch, resumption: Resumption | None, around: _Surroundings
+    task: Task, master: Master, evaluator: Evaluator, resumption: Resumption | None, around: _Surroundings
 ) -> UnitFailure | None:
     """Step until the end, and record; return the failure that it ended with, if any."""
     stop, interruption = task.experiment.stop_time(task.parameters), around.interruption
     rows = 0 if resumption is None else resumption.checkpoint.rows
     with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
-        checkpoints = _checkpoints(task, master, recorder, watch, around.clock)
+        checkpoints = _checkpoints(task, master, recorder, evaluator, around.clock)
 
         def tell(t: float, _signals: Signals) -> None:
             around.progress(t, float(stop))
 
-        observers: list[Observer] = [recorder, watch, *checkpoints]
+        observers: list[Observer] = [recorder, evaluator, *checkpoints]
         if resumption is not None:
-            observers = [FromThenOn(resumption.checkpoint.time, observe) for observe in observers]
+            observers = [ObserveAfter(resumption.checkpoint.time, observe) for observe in observers]
         try:
-            master.run(stop, [*observers, tell], until=lambda: watch.over or interruption.asked)
-            if interruption.asked and not watch.over:
+            master.run(stop, [*observers, tell], until=lambda: evaluator.over or interruption.asked)
+            if interruption.asked and not evaluator.over:
                 for checkpointer in checkpoints:
-                    master.carry_out(checkpointer.write)
-            watch.finish(master.signals)
+                    master.call_units(checkpointer.write)
+            evaluator.finish(master.signals)
         except UnitFailure as e:
             interruption.check()
             return e
@@ -106,50 +113,50 @@ def _run(
 
 
 def _checkpoints(
-    task: Task, master: Master, recorder: Recorder, watch: Watch, clock: Callable[[], Spent]
+    task: Task, master: Master, recorder: Recorder, evaluator: Evaluator, clock: Callable[[], ElapsedTime]
 ) -> list[Checkpointer]:
     if task.every is None:
         return []
 
     def keep() -> bytes:
-        return pack(watch, task.parameters, task.options, clock())
+        return pack(evaluator, task.parameters, task.options, clock())
 
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
 
 
 def _conclude(
-    task: Task, master: Master, watch: Watch, failure: UnitFailure | None, interrupted: bool, spent: Spent
-) -> Ended:
+    task: Task, master: Master, evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, spent: ElapsedTime
+) -> RunResult:
     """Write what is known of a run at its end, and its report."""
-    outcome = _outcome(watch, failure, interrupted)
-    complete = failure is None and (watch.over or not interrupted)
+    outcome = _outcome(evaluator, failure, interrupted)
+    complete = failure is None and (evaluator.over or not interrupted)
     summary = finished_summary(task, outcome, master, spent, failure, complete)
     task.folder.write_summary(summary)
     if failure is not None:
         task.folder.add_to_run(failure=summary["failure"])
-    write_pictures(task.folder.pictures, watch.pictures())
+    write_picture_files(task.folder.pictures, evaluator.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
     if task.presented:
-        with told_if_not_written(task.folder.path):
-            _present(task, watch)
-    return Ended(outcome=outcome, summary=summary, failure=failure)
+        with disk_errors_reported(task.folder.path):
+            _present(task, evaluator)
+    return RunResult(outcome=outcome, summary=summary, failure=failure)
 
 
-def _outcome(watch: Watch, failure: UnitFailure | None, interrupted: bool) -> Outcome:
-    seen = watch.outcome()
+def _outcome(evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool) -> Outcome:
+    seen = evaluator.outcome()
     if failure is not None:
         return Outcome(success=False, reason=failure_reason(failure), metrics=seen.metrics)
-    if interrupted and not watch.over:
+    if interrupted and not evaluator.over:
         return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
     return seen
 
 
-def _present(task: Task, watch: Watch) -> None:
+def _present(task: Task, evaluator: Evaluator) -> None:
     from handover.scenarios.cli.run_figures import draw_figures  # plots take long to load
     from handover.scenarios.reporting.run_page import write_run_page
 
     record = record_of(task.folder)
     if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
-        draw_figures(task.experiment, task.parameters, watch, record, task.folder.figures)
+        draw_figures(task.experiment, task.parameters, evaluator, record, task.folder.figures)
     write_run_page(task.folder)

@@ -7,11 +7,11 @@ from typing import Any
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.experiment import Experiment
 
 
-def scenario_named(name: str) -> type[Experiment[Any]]:
+def find_scenario(name: str) -> type[Experiment[Any]]:
     """Return the scenario of a name.
 
     Raises:
@@ -19,12 +19,12 @@ def scenario_named(name: str) -> type[Experiment[Any]]:
     """
     if name not in SCENARIOS:
         if name in UNITS:
-            raise BadCall(f"{name} is a unit, not a scenario: {', '.join(SCENARIOS)}")
-        raise BadCall(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
+            raise UsageError(f"{name} is a unit, not a scenario: {', '.join(SCENARIOS)}")
+        raise UsageError(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
     return SCENARIOS[name]
 
 
-def replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, Path]:
+def replacement_fmus(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, Path]:
     """Return the files in `NAME=FILE` texts, by the units whose place they take.
 
     Raises:
@@ -34,16 +34,16 @@ def replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> dic
     for text in given:
         name, equals, file = text.partition("=")
         if not equals or not file:
-            raise BadCall(f"--unit {text!r} is not of the form NAME=FILE")
+            raise UsageError(f"--unit {text!r} is not of the form NAME=FILE")
         if name not in experiment.units:
-            raise BadCall(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
+            raise UsageError(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
         if name in found:
-            raise BadCall(f"--unit: {name} is given twice")
+            raise UsageError(f"--unit: {name} is given twice")
         found[name] = Path(file)
     return found
 
 
-def fmus_of(
+def select_fmus(
     experiment: type[Experiment[Any]], others: Mapping[str, Path], built: Callable[[str], Path]
 ) -> dict[str, Path]:
     """Return the FMU of each unit of a scenario: one of the others, or what `built` makes of the catalog's unit.
@@ -54,4 +54,4 @@ def fmus_of(
     try:
         return {name: others.get(name) or built(unit) for name, unit in experiment.units.items()}
     except OSError as e:
-        raise BadCall(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+        raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e

@@ -13,13 +13,13 @@ from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.execution import supervisor
-from handover.scenarios.execution.errors import BadCall
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.display_unit import unit_symbol
-from handover.scenarios.experiment.experiment import Experiment, FmuOf, Outcome, Watch
+from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, TimePlot
 from handover.scenarios.results.run_folder import sha256_of
 
-_MOST_SIGNALS = 6
+_MAX_SIGNALS = 6
 """Signals in one figure."""
 
 
@@ -28,7 +28,7 @@ class NoParameters:
     """An SSP's parameters are bound in it."""
 
 
-class UntilStop(Watch):
+class UntilStop(Evaluator):
     """Lets a run go on to its stop time; reaching that is its success."""
 
     def __init__(self, stop: Fraction) -> None:
@@ -73,7 +73,7 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
         def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
             return stop
 
-        def watch(self, parameters: Any) -> UntilStop:  # noqa: ARG002
+        def evaluator(self, parameters: Any) -> UntilStop:  # noqa: ARG002
             return UntilStop(stop)
 
         def cycle(self) -> tuple[str, ...]:
@@ -89,7 +89,7 @@ def figures_of_outputs(units: Iterable[str], record: Record) -> list[TimeFigure]
     """Return the first real outputs of each unit over time, an axis for each."""
     figures: list[TimeFigure] = []
     for name in units:
-        ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MOST_SIGNALS]
+        ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MAX_SIGNALS]
         if ports:
             file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
             plots = [_output(port, port.removeprefix(f"{name}."), record) for port in ports]
@@ -106,17 +106,17 @@ def open_experiment(
         InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
     """
     ssp = opened.enter_context(SspFile(path, step))
-    supervisor.heartbeat.tell_scratch(str(ssp.folder))
+    supervisor.heartbeat.record_scratch_folder(str(ssp.folder))
     until = stop or ssp.stop
     if until is None:
-        raise BadCall(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
+        raise UsageError(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
     return experiment_of(ssp, until)
 
 
 def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
     """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
-    told = {"stop": str(stop), "step": None if step is None else str(step)}
-    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **told}
+    facts = {"stop": str(stop), "step": None if step is None else str(step)}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **facts}
 
 
 def _output(port: str, quantity: str, record: Record) -> TimePlot:

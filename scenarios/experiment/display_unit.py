@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
-class ShownUnit:
+class DisplayUnit:
     """A unit to show values in: what an SI value is multiplied by, and how the unit is written; "" for pure numbers."""
 
     factor: float
@@ -26,23 +26,23 @@ class ShownUnit:
         return f"{value * self.factor:.4g}{between}{self.symbol}".rstrip()
 
 
-def shown_unit(unit: str, values: ArrayLike) -> ShownUnit:
+def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     """Return the unit in which to show values of an SI unit, by the largest of them."""
     x = np.abs(np.asarray(values, dtype=np.float64))
     finite = x[np.isfinite(x)]
-    most = float(finite.max()) if finite.size else 0.0
+    largest = float(finite.max()) if finite.size else 0.0
     smaller = {"m": (1.0, 1e3, "mm"), "m2": (1e-2, 1e6, "mm²"), "s": (0.1, 1e3, "ms"), "kg": (0.5, 1e3, "g")}
-    if unit in smaller and most < smaller[unit][0]:
-        return ShownUnit(smaller[unit][1], smaller[unit][2])
-    if unit == "s" and most >= 3.6e4:
-        return ShownUnit(1 / 3600, "h")
+    if unit in smaller and largest < smaller[unit][0]:
+        return DisplayUnit(smaller[unit][1], smaller[unit][2])
+    if unit == "s" and largest >= 3.6e4:
+        return DisplayUnit(1 / 3600, "h")
     if unit in ("rad", "rad/s"):
-        return ShownUnit(180.0 / math.pi, unit.replace("rad", "°"))
+        return DisplayUnit(180.0 / math.pi, unit.replace("rad", "°"))
     if unit == "B":
-        return ShownUnit(1e-6, "MB")
-    if unit == "Pa" and most >= 1e3:
-        return ShownUnit(1e-3, "kPa")
-    return ShownUnit(1.0, unit_symbol(unit))
+        return DisplayUnit(1e-6, "MB")
+    if unit == "Pa" and largest >= 1e3:
+        return DisplayUnit(1e-3, "kPa")
+    return DisplayUnit(1.0, unit_symbol(unit))
 
 
 def unit_symbol(unit: str) -> str:

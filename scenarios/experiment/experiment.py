@@ -39,7 +39,7 @@ class Outcome:
     metrics: Mapping[str, Metric] = field(default_factory=dict[str, Metric])
 
 
-class Watch(abc.ABC):
+class Evaluator(abc.ABC):
     """Follows one run as the experimenter does, who sees everything: says when it is over and how it went."""
 
     @abc.abstractmethod
@@ -63,10 +63,10 @@ class Watch(abc.ABC):
         """Return the verdict on what was seen so far."""
 
 
-AnyWatch = TypeVar("AnyWatch", bound=Watch)
+AnyEvaluator = TypeVar("AnyEvaluator", bound=Evaluator)
 
 
-class Experiment(abc.ABC, Generic[AnyWatch]):
+class Experiment(abc.ABC, Generic[AnyEvaluator]):
     """A scenario. Subclasses name it, declare its parameters, wire its system and judge its runs."""
 
     name: ClassVar[str]
@@ -93,12 +93,12 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
         """Return the time at which a run ends at the latest, in seconds."""
 
     @abc.abstractmethod
-    def watch(self, parameters: Any) -> AnyWatch:
+    def evaluator(self, parameters: Any) -> AnyEvaluator:
         """Return an observer of one run."""
 
-    def watch_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyWatch:  # noqa: ARG002
+    def evaluator_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyEvaluator:  # noqa: ARG002
         """Return an observer of a run that is seen again by its record, and by the pictures that its folder keeps."""
-        return self.watch(parameters)
+        return self.evaluator(parameters)
 
     @abc.abstractmethod
     def cycle(self) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ class Experiment(abc.ABC, Generic[AnyWatch]):
         """
         return [plot for figure in self.time_figures(parameters, record) for plot in figure.plots]
 
-    def draw(self, parameters: Any, watch: AnyWatch, record: Record, folder: Path) -> Sequence["Figure"]:  # noqa: ARG002
+    def draw(self, parameters: Any, evaluator: AnyEvaluator, record: Record, folder: Path) -> Sequence["Figure"]:  # noqa: ARG002
         """Draw into a folder what is no curve over time, such as the scene; nothing by default."""
         return ()
 

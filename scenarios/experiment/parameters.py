@@ -11,7 +11,7 @@ from handover.cosim.exceptions import nearest
 from handover.scenarios.experiment.experiment import Experiment
 
 
-class BadParameter(ValueError):
+class InvalidParameter(ValueError):
     """Parameters that a scenario does not have, or values that they cannot take; `faults` lists them."""
 
     def __init__(self, faults: Sequence[str]) -> None:
@@ -35,7 +35,7 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
         if fault:
             faults.append(f"{name}: {fault}")
     if faults:
-        raise BadParameter(faults)
+        raise InvalidParameter(faults)
     return experiment.parameters_type(**values)
 
 

@@ -9,15 +9,15 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
+from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.impedance_evaluation import Errors
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
 
 
-def draw_scenes(watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:
+def draw_scenes(evaluator: HandoverEvaluator, record: Record, folder: Path) -> list[Figure]:
     """Draw the scene, and the transfers from near, into a folder."""
-    gap, rows = jaw_gap(record), _moments(watch, record)
+    gap, rows = jaw_gap(record), _moments(evaluator, record)
     seen = {title: robot_at(record, row, float(gap[row])) + person_at(record, row) for title, row in rows.items()}
     scene = draw_scene(seen, "Blue: jaws; orange: object.", folder)
     between = list(rows)[1:-1]
@@ -28,14 +28,14 @@ def draw_scenes(watch: HandoverWatch, record: Record, folder: Path) -> list[Figu
     return [scene, draw_near({title: seen[title] for title in between}, near, folder)]
 
 
-def _moments(watch: HandoverWatch, record: Record) -> dict[str, int]:
+def _moments(evaluator: HandoverEvaluator, record: Record) -> dict[str, int]:
     """Return the rows of start, end, and when the robot felt the person or signalled in vain, by their titles."""
     times = [(0.0, "start")]
-    for name, transfer in zip(("transfer", "return"), watch.transfers, strict=False):
+    for name, transfer in zip(("transfer", "return"), evaluator.transfers, strict=False):
         times += [(t, "failed reception") for t in transfer.in_vain]
         times.append((transfer.asked, f"{name}: signal") if transfer.felt is None else (transfer.felt, name))
-    if len(times) == 1 and len(watch.phases) > 1:
-        phase, began = watch.phases[-1]
+    if len(times) == 1 and len(evaluator.phases) > 1:
+        phase, began = evaluator.phases[-1]
         times.append((began, phase.replace("_", " ").lower()))
     times.append((float(record.time[-1]), "end"))
     return {f"{t:.1f} s, {title}": int(np.searchsorted(record.time, t)) for t, title in times}

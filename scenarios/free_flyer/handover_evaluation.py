@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
 
@@ -61,7 +61,7 @@ class Transfer:
         whom = "person" if self.receiver == "HAND" else "robot"
         touch = "pull" if self.receiver == "HAND" else "push"
         act = "let go" if self.receiver == "HAND" else "closed"
-        told = {
+        value = {
             "displacement": Metric(
                 self.farthest, "m", f"gripper from its handover place at most, while the {whom} takes the object"
             ),
@@ -75,11 +75,11 @@ class Transfer:
             },
         }
         if self.felt is not None:
-            told["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
+            value["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
         if self.done is not None:
             since = f"from the {'first ' if self.in_vain else ''}signal until the {whom} has the object"
-            told["time"] = Metric(self.done - self.signalled, "s", since)
-        return {f"{prefix}_{name}": metric for name, metric in told.items()}
+            value["time"] = Metric(self.done - self.signalled, "s", since)
+        return {f"{prefix}_{name}": metric for name, metric in value.items()}
 
 
 _SETTLING = 1.0
@@ -90,7 +90,7 @@ _NOT_YIELDING = ("DEACTIVATE_IMPEDANCE", "RETREAT", "DONE", "GIVEN_UP")
 _PEOPLE = {"HAND": "the person", "GRIPPER": "the robot"}
 
 
-class HandoverWatch(Watch):
+class HandoverEvaluator(Evaluator):
     """Follows one run and tells how it ended.
 
     It is a success when the object reached each receiver in turn "without being supported anywhere else and always in
@@ -196,28 +196,28 @@ class HandoverWatch(Watch):
         return Outcome(success=success, reason=self._reason(success), metrics=self._metrics())
 
     def _metrics(self) -> dict[str, Metric]:
-        told: dict[str, Metric] = {}
+        value: dict[str, Metric] = {}
         for prefix, transfer in zip(("transfer", "return"), self.transfers, strict=False):
-            told |= transfer.metrics(prefix)
+            value |= transfer.metrics(prefix)
         if "GRIPPER" in self.receivers:
             empty = "receptions after which the robot found its gripper empty"
-            told["failed_receptions"] = Metric(self._failed, "1", empty)
+            value["failed_receptions"] = Metric(self._failed, "1", empty)
         if self._arrival is not None:
-            told["arrival_error"] = Metric(
+            value["arrival_error"] = Metric(
                 self._arrival[0], "m", "gripper to its handover place when it arrived and began to yield"
             )
-            told["arrival_speed"] = Metric(
+            value["arrival_speed"] = Metric(
                 self._arrival[1], "m/s", "gripper's speed when it arrived there and began to yield"
             )
         share = self._saturated / max(self._steps, 1)
-        told["saturated_share"] = Metric(share, "1", "share of the time for which the thrusters were at their limits")
-        told |= self._stability
+        value["saturated_share"] = Metric(share, "1", "share of the time for which the thrusters were at their limits")
+        value |= self._stability
         for phase, t in self.phases:
             words = phase.replace("_", " ").lower()
-            told.setdefault(
+            value.setdefault(
                 f"phase_{phase.lower()}", Metric(t, "s", f"time at which the robot first entered its phase {words!r}")
             )
-        return told
+        return value
 
     def _reason(self, success: bool) -> str:
         if success:

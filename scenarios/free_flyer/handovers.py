@@ -21,10 +21,10 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
+from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
 from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_handover
@@ -33,7 +33,7 @@ _FLIGHT = 120
 """Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""
 
 
-class FlyerHandover(Experiment[HandoverWatch]):
+class FlyerHandover(Experiment[HandoverEvaluator]):
     """Subclasses say what the robot is to do, what the person does, and who is to have the object in turn."""
 
     parameters_type: ClassVar[type[HandoverParameters]] = HandoverParameters
@@ -115,19 +115,25 @@ class FlyerHandover(Experiment[HandoverWatch]):
         waits = len(self.receivers) + self.failures
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
 
-    def watch(self, parameters: HandoverParameters) -> HandoverWatch:
+    def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return the judge of one handover."""
-        return HandoverWatch(parameters, self.receivers, self.failures)
+        return HandoverEvaluator(parameters, self.receivers, self.failures)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: deciding and controlling."""
         return ("decision", "impedance", "pose")
 
-    def draw(self, parameters: HandoverParameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
+    def draw(
+        self,
+        parameters: HandoverParameters,  # noqa: ARG002
+        evaluator: HandoverEvaluator,
+        record: Record,
+        folder: Path,
+    ) -> list[Figure]:
         """Draw the scene at three moments, and the transfers from near."""
         from handover.scenarios.free_flyer.figures import draw_scenes  # what draws takes long to load
 
-        return draw_scenes(watch, record, folder)
+        return draw_scenes(evaluator, record, folder)
 
     def time_figures(self, parameters: HandoverParameters, record: Record) -> list[TimeFigure]:
         """Return paths, the gripper, who holds the object, and thrust over time."""
@@ -149,8 +155,8 @@ def _check_reach(p_WG: Floats) -> None:
     away, reach = float(np.linalg.norm(p_WH - person["p_WH_0"])), float(person["arm_reach"])
     if away > reach:
         place = ", ".join(f"{x:g}" for x in p_WG)
-        told = f"the hand would be {away:.2f} m from where it rests, and can be {reach:g} m from it"
-        raise BadParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {told}"])
+        text = f"the hand would be {away:.2f} m from where it rests, and can be {reach:g} m from it"
+        raise InvalidParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {text}"])
 
 
 class Collaborative(FlyerHandover):

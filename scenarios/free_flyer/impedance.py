@@ -13,13 +13,13 @@ from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceWatch
+from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluator
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.published import published_of_push
 from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_controller, wire_forces
 
 
-class FlyerImpedance(Experiment[ImpedanceWatch]):
+class FlyerImpedance(Experiment[ImpedanceEvaluator]):
     """The thesis's validation of the impedance control: one pulse of force or torque, and the way back to rest."""
 
     name: ClassVar[str] = "flyer_impedance"
@@ -79,9 +79,9 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         """Return the end of the push and the patience for the way back."""
         return parameters.stop
 
-    def watch(self, parameters: ImpedanceParameters) -> ImpedanceWatch:
+    def evaluator(self, parameters: ImpedanceParameters) -> ImpedanceEvaluator:
         """Return the judge of one push."""
-        return ImpedanceWatch(parameters)
+        return ImpedanceEvaluator(parameters)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing."""
@@ -92,12 +92,12 @@ class FlyerImpedance(Experiment[ImpedanceWatch]):
         return published_of_push(parameters)
 
     def draw(
-        self, parameters: ImpedanceParameters, watch: ImpedanceWatch, record: Record, folder: Path
+        self, parameters: ImpedanceParameters, evaluator: ImpedanceEvaluator, record: Record, folder: Path
     ) -> list[Figure]:
         """Draw the scene at three moments."""
         from handover.scenarios.free_flyer.figures import draw_moments  # what draws takes long to load
 
-        return [draw_moments(watch.errors(), parameters, record, folder)]
+        return [draw_moments(evaluator.errors(), parameters, record, folder)]
 
     def time_figures(self, parameters: ImpedanceParameters, record: Record) -> list[TimeFigure]:
         """Return errors actual and calculated, push and thrust over time."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, ImpedanceParameters
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
@@ -149,7 +149,7 @@ _SPINNING = 60.0
 """Rate at which control counts as lost, rad/s: more than the greatest push can bring about (assumed)."""
 
 
-class ImpedanceWatch(Watch):
+class ImpedanceEvaluator(Evaluator):
     """Follows one push and tells whether the robot came back to rest and moved as the impedance model says.
 
     Raises:
@@ -221,8 +221,8 @@ class ImpedanceWatch(Watch):
             **self._stability,
         }
         if self._at_rest:
-            told = f"from the end of the push until the gripper stays within {_BAND} of its rest"
-            metrics["settling_time"] = Metric(self._settled, "s", told)
+            text = f"from the end of the push until the gripper stays within {_BAND} of its rest"
+            metrics["settling_time"] = Metric(self._settled, "s", text)
         return Outcome(success=self._at_rest and agrees, reason=self._reason(agrees, by, share), metrics=metrics)
 
     def _reason(self, agrees: bool, by: tuple[float, float], share: float) -> str:

@@ -46,8 +46,8 @@ def plot_thrust(record: Record, controllers: Sequence[str], phases: Sequence[Pha
         curves: list[Curve] = []
         for i, axis in enumerate("xyz"):
             curves.append(Curve(label=f"{axis}, given", values=given[:, i], group=axis))
-            told = f"{axis}, commanded"
-            curves.append(Curve(label=told, values=commanded[:, i], held=True, stroke="dotted", group=axis))
+            text = f"{axis}, commanded"
+            curves.append(Curve(label=text, values=commanded[:, i], held=True, stroke="dotted", group=axis))
         plots.append(
             TimePlot(
                 title=f"{name} of the thrusters in B",

@@ -79,14 +79,14 @@ def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str,
         radius, damping, frequency = (
             float(signals[f"{name}.{what}"]) for what in ("pole_radius", "damping_ratio", "pole_frequency")
         )
-        told = f"{name} control, by its own model"
+        text = f"{name} control, by its own model"
         made[f"pole_margin_{name}"] = Metric(
-            1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {told}"
+            1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {text}"
         )
         slowest = -_PERIOD / math.log(radius) if 0.0 < radius < 1.0 else math.inf
         made[f"slowest_decay_{name}"] = Metric(
-            slowest, "s", f"time constant of {_SLOWEST.get(name, 'the slowest mode')}: {told}"
+            slowest, "s", f"time constant of {_SLOWEST.get(name, 'the slowest mode')}: {text}"
         )
-        made[f"damping_ratio_{name}"] = Metric(damping, "1", f"least damping ratio: {told}")
-        made[f"frequency_{name}"] = Metric(frequency, "rad/s", f"frequency of the least damped poles: {told}")
+        made[f"damping_ratio_{name}"] = Metric(damping, "1", f"least damping ratio: {text}")
+        made[f"frequency_{name}"] = Metric(frequency, "rad/s", f"frequency of the least damped poles: {text}")
     return made

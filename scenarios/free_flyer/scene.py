@@ -42,7 +42,7 @@ _ROOTS = (
 _NEAR = np.array([0.20, 0.20, 0.20])
 """Half the sides of a window for pictures from near, m."""
 
-_MARGIN, _WIDEST = 0.05, 3.0
+_MARGIN, _MAX_ASPECT_RATIO = 0.05, 3.0
 """Room around a scene, and its greatest side that is shown as a whole, m."""
 
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -53,7 +53,7 @@ _FACES = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2
 class _View:
     """The axes of W to the right and upwards, and the direction from the scene to the eye."""
 
-    told: str
+    caption: str
     axes: tuple[int, int]
     to_eye: Floats
 
@@ -119,7 +119,7 @@ def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Pat
             for row, view in enumerate(_VIEWS):
                 axes = canvas[row * len(moments) + column]
                 _draw(axes, solids, view, *windows[column])
-                axes.set_title(f"{title}\n{view.told}" if row == 0 else view.told)
+                axes.set_title(f"{title}\n{view.caption}" if row == 0 else view.caption)
     return Figure("scene", f"The scene in W, from the side (above) and from above (below). {caption}")
 
 
@@ -130,7 +130,7 @@ def _windows(moments: Mapping[str, Sequence[Solid]]) -> list[tuple[Floats, Float
     """
     corners = [np.concatenate([s.corners for s in solids]) for solids in moments.values()]
     lows, highs = np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
-    if np.all(highs.max(axis=0) - lows.min(axis=0) < _WIDEST):
+    if np.all(highs.max(axis=0) - lows.min(axis=0) < _MAX_ASPECT_RATIO):
         return [(lows.min(axis=0) - _MARGIN, highs.max(axis=0) + _MARGIN)] * len(corners)
     half = (highs - lows).max(axis=0) / 2 + _MARGIN
     return [((low + high) / 2 - half, (low + high) / 2 + half) for low, high in zip(lows, highs, strict=True)]
@@ -143,7 +143,7 @@ def draw_near(moments: Mapping[str, Sequence[Solid]], middles: Mapping[str, Floa
             for column, view in enumerate(_VIEWS):
                 axes = canvas[2 * row + column]
                 _draw(axes, solids, view, middles[title] - _NEAR, middles[title] + _NEAR)
-                axes.set_title(f"{title}, {view.told}")
+                axes.set_title(f"{title}, {view.caption}")
     return Figure("transfer", "The gripper from near, at the moments between start and end of the scene.")
 
 

@@ -14,14 +14,14 @@ from handover.scenarios.experiment.paper import paper_values
 
 def calibration() -> dict[str, Any]:
     """Return both cameras' calibration under the names of the units' parameters."""
-    told = {name: np.array(value) for name, value in paper_values("helix_handover", "camera").items()}
+    facts = {name: np.array(value) for name, value in paper_values("helix_handover", "camera").items()}
     found: dict[str, Any] = {}
     for i, side in enumerate(("left", "right")):
-        p_WC = told["p_WC"][i]
+        p_WC = facts["p_WC"][i]
         found[f"p_WC_{side}"] = p_WC
-        found[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, told["looked_at"]))
-        found[f"intrinsics_{side}"] = told["intrinsics"][i]
-        found[f"distortion_{side}"] = told["distortion"][i]
+        found[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, facts["looked_at"]))
+        found[f"intrinsics_{side}"] = facts["intrinsics"][i]
+        found[f"distortion_{side}"] = facts["distortion"][i]
     return found
 
 

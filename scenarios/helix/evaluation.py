@@ -17,7 +17,7 @@ from handover.controllers.helix.constant_curvature import forward_kinematics
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.helix.cameras import camera_of
@@ -126,7 +126,7 @@ _MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball"
 _COVERED = "lens covered"
 
 
-class HandoverWatch(Watch):
+class HandoverEvaluator(Evaluator):
     """Follows one handover, keeps pictures of moments that tell of it, and tells how it ended.
 
     Attributes:
@@ -249,7 +249,7 @@ class HandoverWatch(Watch):
     def _reason(self, success: bool) -> str:
         if success:
             return f"the hand let go at {self._released_at:.1f} s and the gripper holds the ball"
-        where = f"ball at {_told(self._p_WO)} m, gripper at {_told(self._p_WG)} m"
+        where = f"ball at {_format_point(self._p_WO)} m, gripper at {_format_point(self._p_WG)} m"
         if self._phase == "WAIT":
             return f"the cameras did not see both ball and arm within {self._deadline:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
@@ -284,5 +284,5 @@ def _beside_and_along(p_GO: Floats) -> tuple[float, float]:
     return float(np.hypot(p_GO[0], p_GO[1])), float(p_GO[2])
 
 
-def _told(p: NDArray[np.float64]) -> str:
+def _format_point(p: NDArray[np.float64]) -> str:
     return "(" + ", ".join(f"{x:.2f}" for x in p) + ")"

@@ -18,7 +18,7 @@ from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.helix.cameras import calibration
-from handover.scenarios.helix.evaluation import HandoverWatch
+from handover.scenarios.helix.evaluation import HandoverEvaluator
 from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
 
 _PAPER = "helix_handover"
@@ -29,8 +29,8 @@ def published_of(p: Parameters) -> Sequence[PublishedValue]:
 
     Nothing for other step sizes, where the ball is elsewhere, or where a lens is covered.
     """
-    told, given = paper_values(_PAPER, "experiment"), Parameters()
-    fits = np.flatnonzero(np.isclose(told["alpha"], p.alpha))
+    entries, given = paper_values(_PAPER, "experiment"), Parameters()
+    fits = np.flatnonzero(np.isclose(entries["alpha"], p.alpha))
     if not len(fits) or (p.radius, p.height) != (given.radius, given.height) or p.cover is not Cover.NONE:
         return ()
     k = int(fits[0])
@@ -51,7 +51,7 @@ def published_of(p: Parameters) -> Sequence[PublishedValue]:
     return values
 
 
-class HelixHandover(Experiment[HandoverWatch]):
+class HelixHandover(Experiment[HandoverEvaluator]):
     """The thesis's first experiment: one automated human-to-robot handover."""
 
     name: ClassVar[str] = "helix_handover"
@@ -124,13 +124,13 @@ class HelixHandover(Experiment[HandoverWatch]):
         """Return the patience for the approach and time for closing the gripper."""
         return Fraction(round(parameters.patience)) + 15
 
-    def watch(self, parameters: Parameters) -> HandoverWatch:
+    def evaluator(self, parameters: Parameters) -> HandoverEvaluator:
         """Return the judge of one handover."""
-        return HandoverWatch(parameters)
+        return HandoverEvaluator(parameters)
 
-    def watch_of_record(self, parameters: Parameters, pictures: Sequence[CameraPicture]) -> HandoverWatch:
+    def evaluator_of_record(self, parameters: Parameters, pictures: Sequence[CameraPicture]) -> HandoverEvaluator:
         """Return an observer with the pictures that the run's folder keeps."""
-        return HandoverWatch(parameters, pictures)
+        return HandoverEvaluator(parameters, pictures)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: seeing and controlling."""
@@ -140,11 +140,11 @@ class HelixHandover(Experiment[HandoverWatch]):
         """Return what table 1 and fig. 9 tell."""
         return published_of(parameters)
 
-    def draw(self, parameters: Parameters, watch: HandoverWatch, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
+    def draw(self, parameters: Parameters, evaluator: HandoverEvaluator, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
         """Draw the camera pictures of some moments."""
         from handover.scenarios.helix.plots import draw_pictures  # what draws takes long to load
 
-        pictures = watch.pictures()
+        pictures = evaluator.pictures()
         return [draw_pictures(pictures, folder)] if pictures else []
 
     def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:

@@ -9,7 +9,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.plants.ir_grasp.objects import SOLIDS
 from handover.plants.ir_grasp.parameters import SEES_NOTHING
-from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.ir_grasp.parameters import Parameters, asked_for
 
 _SETTLING = 0.3
@@ -28,7 +28,7 @@ _AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
 _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
 
 
-class GraspWatch(Watch):
+class GraspEvaluator(Evaluator):
     """Follows one grasp and tells how it ended.
 
     Attributes:
@@ -107,7 +107,7 @@ class GraspWatch(Watch):
         seen, true = signals["reflex.distance"], signals["scene.range"]
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
         stop = int(signals["reflex.stop"])
-        told = {
+        value = {
             "final_cost": Metric(float(signals["reflex.cost"]), "m2", _COST),
             "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
@@ -118,9 +118,9 @@ class GraspWatch(Watch):
             whole = f"{finger} to object as the hand began to close"
             unseen = " (sees nothing)" if seen[i] >= ReflexParams().distance_max else ""
             unmet = " (meets nothing)" if true[i] >= SEES_NOTHING else ""
-            told[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by [Luberto] eq. (11){unseen}")
-            told[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam{unmet}")
-        self._at_closing = told
+            value[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by [Luberto] eq. (11){unseen}")
+            value[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam{unmet}")
+        self._at_closing = value
 
     def _count(self, phase: str, signals: Signals) -> None:
         command = (

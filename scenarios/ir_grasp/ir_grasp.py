@@ -15,10 +15,10 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.ir_grasp.evaluation import GraspWatch
+from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation
 
 FINGERS = ("thumb", "index", "ring")
@@ -43,7 +43,7 @@ def published_of(p: Parameters) -> Sequence[PublishedValue]:
     ]
 
 
-class IrGrasp(Experiment[GraspWatch]):
+class IrGrasp(Experiment[GraspEvaluator]):
     """One trial of the paper's table I: one object, one pose, one strategy.
 
     The paper gives neither the pre-grasp pose nor the perturbations. The gap of 70 mm between palm and object
@@ -83,8 +83,8 @@ class IrGrasp(Experiment[GraspWatch]):
             BadParameter: the shortest shift of a perturbed object is longer than the longest.
         """
         if parameters.shift_least > parameters.shift_most:
-            least, most = parameters.shift_least, parameters.shift_most
-            raise BadParameter([f"shift_least {least:g} m must be at most shift_most {most:g} m"])
+            shift_min, shift_max = parameters.shift_least, parameters.shift_most
+            raise InvalidParameter([f"shift_least {shift_min:g} m must be at most shift_most {shift_max:g} m"])
         p, drawn = parameters, Situation.draw(parameters, seed)
         s = System()
         scene = s.add(
@@ -118,9 +118,9 @@ class IrGrasp(Experiment[GraspWatch]):
         """Return a time that no run came near: of 140 by reflex the longest, with the printed equations, took 26 s."""
         return Fraction(90)
 
-    def watch(self, parameters: Parameters) -> GraspWatch:
+    def evaluator(self, parameters: Parameters) -> GraspEvaluator:
         """Return the judge of one grasp."""
-        return GraspWatch(parameters)
+        return GraspEvaluator(parameters)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing."""
@@ -130,11 +130,11 @@ class IrGrasp(Experiment[GraspWatch]):
         """Return the distances of table II."""
         return published_of(parameters)
 
-    def draw(self, parameters: Parameters, watch: GraspWatch, record: Record, folder: Path) -> list[Figure]:
+    def draw(self, parameters: Parameters, evaluator: GraspEvaluator, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments."""
         from handover.scenarios.ir_grasp.plots import draw_scene  # what draws takes long to load
 
-        return [draw_scene(parameters, watch.moments, record, folder)]
+        return [draw_scene(parameters, evaluator.moments, record, folder)]
 
     def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
         """Return distances, cost, and wrist, heading and closure over time."""

@@ -34,7 +34,7 @@ FINGER_COLOURS = COLOURS[:3]
 _NAMES = {0: "reach", 1: "look", 2: "look", 3: "look", 4: "probe", 5: "step", 6: "close", 7: "pull", 8: "shake", 9: ""}
 """Of phases: a look may include approaching and recovering motions."""
 _WRIST = ("reflex.p_WH_cmd", "scene.p_WH")
-_LEAST_COST = 0.1
+_MIN_COST = 0.1
 """What is drawn of a smaller cost, mm²: a logarithm has no zero."""
 
 
@@ -93,7 +93,7 @@ def _cost(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> Ti
         unit="mm²",
         phases=phases,
         logarithmic=True,
-        curves=(Curve(label="cost f", values=np.maximum(1e6 * record["reflex.cost"], _LEAST_COST), held=True),),
+        curves=(Curve(label="cost f", values=np.maximum(1e6 * record["reflex.cost"], _MIN_COST), held=True),),
         levels=(Level(label="the hand closes", value=1e6 * closes),),
     )
 

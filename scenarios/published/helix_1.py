@@ -35,8 +35,8 @@ class Helix1(PublishedExperiment):
 
     def plan(self, quick: bool) -> CampaignPlan:
         """Return alpha x place for the thesis's settings and ours, each twice; if quick, a part of it."""
-        told, published = paper_values(self.scenario, "experiment"), paper_values(self.scenario, "published")
-        repetitions = int(published["runs"]) // len(told["places"])
+        entries, published = paper_values(self.scenario, "experiment"), paper_values(self.scenario, "published")
+        repetitions = int(published["runs"]) // len(entries["places"])
         points = [
             {
                 "tuning": tuning.name.lower(),
@@ -45,7 +45,7 @@ class Helix1(PublishedExperiment):
                 "place": place.name.lower(),
             }
             for tuning in ((Tuning.THESIS,) if quick else (Tuning.THESIS, Tuning.OWN))
-            for alpha, period in zip(told["alpha"], published["timestep_mean"], strict=True)
+            for alpha, period in zip(entries["alpha"], published["timestep_mean"], strict=True)
             for place in (_QUICK_PLACES if quick else Place)
         ]
         return CampaignPlan(

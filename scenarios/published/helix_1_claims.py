@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.stats import page_trend_test, ttest_ind_from_stats
 
-from handover.scenarios.campaign.statistics import FEWEST, LEVEL, success_interval, time_interval, two_proportions
+from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES, success_interval, time_interval, two_proportions
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.published.helix_1_runs import Helix1Arm, missing, published, too_few
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.verdicts import ratio_interval, told_p
+from handover.scenarios.published.verdicts import format_p_value, ratio_interval
 
 
 def time_claims(arm: Helix1Arm) -> list[Claim]:
@@ -24,46 +24,46 @@ def time_claims(arm: Helix1Arm) -> list[Claim]:
 
 def _falls(arm: Helix1Arm) -> Claim:
     medians = published()["arm_time_median"]
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "claim": "The arm's time falls with the step size",
         "published": " > ".join(f"{m:.1f}" for m in medians) + " s (medians)",
         "where": "table 1, sec. 5.1",
     }
     blocks = arm.blocks()
     if len(blocks) < 2:
-        return too_few(told, f"{len(blocks)} places with runs at every step size")
+        return too_few(facts, f"{len(blocks)} places with runs at every step size")
     p = float(page_trend_test(blocks[:, ::-1], method="exact").pvalue)
     ours = np.median(blocks, axis=0)
     falls = bool(np.all(ours[:-1] > ours[1:])) and p < LEVEL
     return Claim(
-        **told,
+        **facts,
         measured=", ".join(f"{m:.1f}" if np.isfinite(m) else "never" for m in ours) + " s (medians)",
         verdict=Verdict.REPRODUCED if falls else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if the medians fall, and Page's exact test of a trend within places rejects: p = "
-        f"{told_p(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as longer "
-        "than any.",
+        f"{format_p_value(p)}, {len(blocks)} places and repetitions. A run that never closes the gripper counts as "
+        "longer than any.",
     )
 
 
 def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
     medians, half = published()["arm_time_median"], published()["halving"]
     i, j = arm.alphas.index(small), arm.alphas.index(large)
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "claim": f"Doubling the step size from {small} to {large} about halves the arm's time",
         "published": f"{medians[i] / medians[j]:.2f} times (medians)",
         "where": "sec. 5.1",
     }
     x, y = arm.times(small), arm.times(large)
-    if min(len(x), len(y)) < FEWEST:
-        return too_few(told, f"{len(x)} and {len(y)} runs")
+    if min(len(x), len(y)) < MIN_SAMPLES:
+        return too_few(facts, f"{len(x)} and {len(y)} runs")
     interval = ratio_interval(x, y, np.median)
     if interval is None:
-        return too_few(told, "no times to divide by")
+        return too_few(facts, "no times to divide by")
     low, high = interval
     halves, stays = low <= half <= high, low <= 1.0 <= high
     verdict = Verdict.REPRODUCED if halves else Verdict.NOT_REPRODUCED
     return Claim(
-        **told,
+        **facts,
         measured=f"{np.median(x) / np.median(y):.2f} times (medians)",
         interval=interval,
         verdict=Verdict.NOT_COMPARABLE if halves and stays else verdict,
@@ -75,7 +75,7 @@ def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
 def _takes(arm: Helix1Arm, alpha: float) -> Claim:
     told_there, i = published(), arm.alphas.index(alpha)
     mean, std, median = (told_there[f"arm_time_{name}"][i] for name in ("mean", "std", "median"))
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "claim": f"At step size {alpha} the arm takes {mean} s on average",
         "published": f"{mean} ± {std} s (median {median} s)",
         "where": "table 1",
@@ -83,17 +83,17 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
     x = arm.times(alpha)
     interval = time_interval(x, np.mean)
     if interval is None:
-        return too_few(told, f"{len(x)} runs")
+        return too_few(facts, f"{len(x)} runs")
     ours = float(np.mean(x)), float(np.std(x, ddof=1))
     p = float(ttest_ind_from_stats(*ours, len(x), mean, std, told_there["runs"], equal_var=False).pvalue)
     return Claim(
-        **told,
+        **facts,
         measured=f"{ours[0]:.1f} ± {ours[1]:.1f} s (median {np.median(x):.1f} s)",
         interval=(interval.low, interval.high),
         unit="s",
         verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {told_p(p)}, {len(x)} runs against "
-        f"{told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
+        reason=f"Reproduced if Welch's test does not tell the two means apart: p = {format_p_value(p)}, {len(x)} runs "
+        f"against {told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
         f"{_stall(arm, alpha)}",
     )
 
@@ -112,19 +112,19 @@ def _stall(arm: Helix1Arm, alpha: float) -> str:
 
 def _narrows(arm: Helix1Arm) -> Claim:
     std = published()["arm_time_std"]
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "claim": "The spread of the arm's time falls with the step size",
         "published": " > ".join(f"{s:.1f}" for s in std) + " s (standard deviations)",
         "where": "table 1",
     }
     times = [arm.times(alpha) for alpha in arm.alphas]
-    if min(map(len, times)) < FEWEST:
-        return too_few(told, f"{min(map(len, times))} runs at a step size")
+    if min(map(len, times)) < MIN_SAMPLES:
+        return too_few(facts, f"{min(map(len, times))} runs at a step size")
     interval = ratio_interval(times[-1], times[0], _spread)
     ours = [float(np.std(x, ddof=1)) for x in times]
     narrows = all(a > b for a, b in pairwise(ours)) and interval is not None and interval[1] < 1.0
     return Claim(
-        **told,
+        **facts,
         measured=", ".join(f"{s:.1f}" for s in ours) + " s (standard deviations)",
         interval=interval,
         verdict=Verdict.REPRODUCED if narrows else Verdict.NOT_REPRODUCED,
@@ -161,24 +161,24 @@ def _succeeds(arm: Helix1Arm) -> Claim:
 
 def _rate(arm: Helix1Arm, claim: str, successes: int) -> Claim:
     k, n = published()["success"]
-    told: dict[str, Any] = {"claim": claim, "published": f"{k} of {n}", "where": "sec. 4"}
+    facts: dict[str, Any] = {"claim": claim, "published": f"{k} of {n}", "where": "sec. 4"}
     if not arm.tried:
-        return too_few(told, "no runs")
+        return too_few(facts, "no runs")
     interval, p = success_interval(successes, arm.tried), two_proportions(successes, arm.tried, k, n)
     rule = "Reproduced if every run does; the interval is Clopper and Pearson's"
     return Claim(
-        **told,
+        **facts,
         measured=f"{successes} of {arm.tried}",
         interval=(interval.low, interval.high),
         verdict=Verdict.REPRODUCED if successes == arm.tried else Verdict.NOT_REPRODUCED,
-        reason=f"{rule}. Fisher's exact test against the published rate: p = {told_p(p)}.{_broken(arm)}",
+        reason=f"{rule}. Fisher's exact test against the published rate: p = {format_p_value(p)}.{_broken(arm)}",
     )
 
 
 def _mismatch(arm: Helix1Arm) -> Claim:
     there, alpha = published(), arm.alphas[0]
     named = ("model_mismatch", "arm_travel", "model_travel")
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "claim": "At the goal the model's gripper is far from the measured one",
         "published": "{:.2f} m (arm {:.2f} m, model {:.2f} m from the start)".format(*(there[n] for n in named)),
         "where": "sec. 5.2, fig. 9",
@@ -186,10 +186,10 @@ def _mismatch(arm: Helix1Arm) -> Claim:
     values = [arm.metric(name, alpha) for name in named]
     interval = time_interval(values[0], np.mean)
     if interval is None:
-        return too_few(told, f"{len(values[0])} runs at step size {alpha}")
+        return too_few(facts, f"{len(values[0])} runs at step size {alpha}")
     agrees = interval.low - _READING <= there["model_mismatch"] <= interval.high + _READING
     return Claim(
-        **told,
+        **facts,
         measured="{:.3f} m (arm {:.3f} m, model {:.3f} m from the start)".format(*map(np.mean, values)),
         interval=(interval.low, interval.high),
         unit="m",
@@ -207,7 +207,7 @@ def _timestep(arm: Helix1Arm) -> Claim:
     return Claim(
         claim="A control step takes about 1.4 s",
         published=", ".join(f"{m} ± {s}" for m, s in zip(mean, std, strict=True)) + " s",
-        measured=", ".join(f"{p:.2f}" for told in periods.values() for p in told) + " s (as set)",
+        measured=", ".join(f"{p:.2f}" for facts in periods.values() for p in facts) + " s (as set)",
         verdict=Verdict.NOT_COMPARABLE,
         reason="The published time is what the thesis's program took to compute a step on its laptop; here it is the "
         "control period that runs are given.",
@@ -229,7 +229,7 @@ def _own_success(own: Helix1Arm) -> Claim:
 
 
 def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "claim": "With our settings the gripper takes the ball nearer to its axis than with the thesis's",
         "published": "",
         "beyond": True,
@@ -237,11 +237,11 @@ def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
     theirs, ours = (
         np.concatenate([a.metric("grasp_offset_lateral", alpha) for alpha in a.alphas]) for a in (thesis, own)
     )
-    if min(len(theirs), len(ours)) < FEWEST:
-        return too_few(told, f"{len(theirs)} and {len(ours)} balls taken")
+    if min(len(theirs), len(ours)) < MIN_SAMPLES:
+        return too_few(facts, f"{len(theirs)} and {len(ours)} balls taken")
     interval = ratio_interval(ours, theirs, np.median)
     return Claim(
-        **told,
+        **facts,
         measured=f"{np.median(ours):.4f} m against {np.median(theirs):.4f} m (medians)",
         interval=interval,
         verdict=Verdict.REPRODUCED if interval and interval[1] < 1.0 else Verdict.NOT_REPRODUCED,

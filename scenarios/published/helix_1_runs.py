@@ -99,9 +99,9 @@ def published() -> dict[str, Any]:
     return paper_values("helix_handover", "published")
 
 
-def too_few(told: dict[str, Any], what: str) -> Claim:
+def too_few(facts: dict[str, Any], what: str) -> Claim:
     """Return the claim, told but for what came out, as one that so few runs say nothing of."""
-    return nothing_measured(**told, reason=f"Too few runs to tell: {what}.")
+    return nothing_measured(**facts, reason=f"Too few runs to tell: {what}.")
 
 
 def missing(arm: Helix1Arm, *alphas: float) -> str:

@@ -9,7 +9,7 @@ from handover.scenarios.campaign.statistics import Statistic
 from handover.scenarios.helix.parameters import Place, Tuning
 from handover.scenarios.published.helix_1_runs import Helix1Arm, published
 from handover.scenarios.published.published_experiment import ComparisonTable
-from handover.scenarios.published.verdicts import told_median
+from handover.scenarios.published.verdicts import format_median
 
 _ON_EQUAL_BOUNDS = (
     " The thesis's ε_pose,bound and ε_control are both 5 mm. One iteration of the Jacobian loop leaves about "
@@ -24,7 +24,7 @@ def table_1(arm: Helix1Arm) -> ComparisonTable:
     header = ["α", *(f"{alpha} {whose}" for alpha in arm.alphas for whose in ("published", "ours"))]
     rows = [
         _row("Minimum", there["arm_time_min"], arm, lambda x: _figure(x, np.min)),
-        _row("Median", there["arm_time_median"], arm, lambda x: told_median(x, 1)),
+        _row("Median", there["arm_time_median"], arm, lambda x: format_median(x, 1)),
         _row("Maximum", there["arm_time_max"], arm, lambda x: _figure(x, np.max)),
         _row("Mean", _plus_minus(there["arm_time_mean"], there["arm_time_std"]), arm, _mean),
         ["Timestep"],
@@ -52,7 +52,7 @@ def steps(arm: Helix1Arm) -> ComparisonTable:
         x, step = arm.metric("steps", alpha), there["timestep_mean"][i]
         ends = [f"{there[f'arm_time_{end}'][i] / step:.0f}" for end in ("min", "max")]
         ours = ["–".join(_figure(x, end, 0) for end in (np.min, np.max)) if len(x) else ""]
-        rows.append([str(alpha), str(there["steps_median"][i]), "–".join(ends), told_median(x, 0), *ours])
+        rows.append([str(alpha), str(there["steps_median"][i]), "–".join(ends), format_median(x, 0), *ours])
     header = ["α", "published median", "published range", "our median", "our range"]
     note = "Published: times of table 1 over its mean time steps. In brackets: 95 % interval by bootstrap."
     if arm.tuning is Tuning.THESIS:
@@ -72,10 +72,10 @@ def by_place(arm: Helix1Arm) -> ComparisonTable:
 
 def fig_9(arm: Helix1Arm) -> ComparisonTable:
     """Return how far the model is from the arm at the end, in the words of sec. 5.2."""
-    there, told = published(), (("model to arm", "model_mismatch"), ("arm", "arm_travel"), ("model", "model_travel"))
+    there, entries = published(), (("model to arm", "model_mismatch"), ("arm", "arm_travel"), ("model", "model_travel"))
     rows = [
         [name, f"{there[metric]:.2f}", *(_figure(arm.metric(metric, alpha), np.mean, 3) for alpha in arm.alphas)]
-        for name, metric in told
+        for name, metric in entries
     ]
     header = ["m", "α = 0.1, published", *(f"α = {alpha}, ours" for alpha in arm.alphas)]
     note = (
@@ -86,9 +86,9 @@ def fig_9(arm: Helix1Arm) -> ComparisonTable:
     return ComparisonTable(title=f"Model and arm as in fig. 9, {arm.title}", header=header, rows=rows, note=note)
 
 
-def _row(name: str, told: Sequence[float | str], arm: Helix1Arm, text: Callable[[Floats], str]) -> list[str]:
+def _row(name: str, entries: Sequence[float | str], arm: Helix1Arm, text: Callable[[Floats], str]) -> list[str]:
     ours = [text(arm.times(alpha)) for alpha in arm.alphas]
-    return [name, *(str(cell) for pair in zip(told, ours, strict=True) for cell in pair)]
+    return [name, *(str(cell) for pair in zip(entries, ours, strict=True) for cell in pair)]
 
 
 def _at(arm: Helix1Arm, place: Place, alpha: float) -> str:

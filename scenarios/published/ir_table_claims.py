@@ -19,21 +19,21 @@ from handover.scenarios.published.ir_table_runs import (
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.verdicts import (
+    format_p_value,
+    format_rate,
     majority_claim,
     no_worse_claim,
     nothing_measured,
     order_claim,
     rare_claim,
     rate_claim,
-    told_p,
-    told_rate,
     without_verdict,
 )
 
 _PUSHED = 0.001
 """How far an object must have moved before the hand closed to count as touched, m."""
 
-_BLIND_CHOSEN = (
+_BLIND_SELECTED = (
     "The paper does not tell how far the hand is from the object before it closes, nor how far objects were moved: "
     "both were chosen so that the blind hand fails about as often as in table I, so agreement is no evidence."
 )
@@ -51,7 +51,7 @@ def rate_claims(runs: IrTableRuns) -> list[Claim]:
             if published is not None:
                 sentence = f"The {arm.title} hand holds {published[0]} of {published[1]} objects in {pose} poses."
                 claim = rate_claim(sentence, "table I, total", published, runs.count(arm, perturbed))
-                claims.append(claim if arm is not BLIND else without_verdict(claim, _BLIND_CHOSEN))
+                claims.append(claim if arm is not BLIND else without_verdict(claim, _BLIND_SELECTED))
     return claims
 
 
@@ -64,14 +64,14 @@ def order_claims(runs: IrTableRuns) -> list[Claim]:
     fewer = "The {} hand succeeds less often in perturbed poses than in nominal ones."
     claims.append(_order(runs, fewer.format(REFLEX.title), (REFLEX, False), (REFLEX, True)))
     blind = _order(runs, fewer.format(BLIND.title), (BLIND, False), (BLIND, True))
-    return [*claims, without_verdict(blind, _BLIND_CHOSEN)]
+    return [*claims, without_verdict(blind, _BLIND_SELECTED)]
 
 
 def _order(runs: IrTableRuns, sentence: str, first: Way, second: Way) -> Claim:
     """Return a claim of order, and what the paper's own counts, which are not paired, say of it."""
     theirs = [count for count in (runs.published(*first), runs.published(*second)) if count is not None]
-    printed = f"{told_rate(*theirs[0])} against {told_rate(*theirs[1])}"
-    note = f"The paper's own counts give p = {told_p(two_proportions(*theirs[0], *theirs[1]))} (Fisher)."
+    printed = f"{format_rate(*theirs[0])} against {format_rate(*theirs[1])}"
+    note = f"The paper's own counts give p = {format_p_value(two_proportions(*theirs[0], *theirs[1]))} (Fisher)."
     return order_claim(sentence, "table I, sec. V-D", printed, *runs.pairs(first, second), note=note)
 
 
@@ -125,17 +125,17 @@ def further_claims(runs: IrTableRuns) -> list[Claim]:
 _WHERE = "table II"
 _IN_COST = ("thumb", "ring")
 
-_MOST_RUNS = (2.5, 97.5)
+_SPAN_OF_MOST_RUNS = (2.5, 97.5)
 """Percentiles of our runs between which a published figure passes for that of one run."""
 
-_FEWEST_RUNS = 10
+_MIN_RUNS = 10
 """Runs of an object below which such percentiles say nothing."""
 
 _TARGET_TAKEN = (
     "The distance to which thumb and ring are brought, 10 mm, was taken from these figures: agreement would only show "
     "that the correction reaches its target."
 )
-_TOO_FEW = f"There are fewer than {_FEWEST_RUNS} runs of an object that came to their end."
+_TOO_FEW = f"There are fewer than {_MIN_RUNS} runs of an object that came to their end."
 _IN_SPACE = (
     "The index lags behind as the hand's synergy has it in space. The plane hand's index is stiffer by assumption, so "
     "that it lags behind too: what comes of it is no evidence."
@@ -145,15 +145,15 @@ _IN_SPACE = (
 def distance_claims(runs: IrTableRuns) -> list[Claim]:
     """Return the claims of table II."""
     return [
-        _told(runs, _IN_COST, False, _TARGET_TAKEN),
+        _without_verdict(runs, _IN_COST, False, _TARGET_TAKEN),
         _within_runs(runs),
         _centred(runs),
-        *(_told(runs, ("index",), perturbed, _IN_SPACE) for perturbed in POSES),
+        *(_without_verdict(runs, ("index",), perturbed, _IN_SPACE) for perturbed in POSES),
         _index_further(runs),
     ]
 
 
-def _told(runs: IrTableRuns, fingers: tuple[str, ...], perturbed: bool, reason: str) -> Claim:
+def _without_verdict(runs: IrTableRuns, fingers: tuple[str, ...], perturbed: bool, reason: str) -> Claim:
     """Return a claim on fingers' distances that has no verdict."""
     medians = [
         float(np.median(values))
@@ -179,15 +179,15 @@ def _within_runs(runs: IrTableRuns) -> Claim:
     for name, things in OBJECTS.items():
         for finger in _IN_COST:
             values = runs.metric(f"final_distance_{finger}", REFLEX, True, things)
-            if len(values) < _FEWEST_RUNS:
+            if len(values) < _MIN_RUNS:
                 return nothing_measured(sentence, _WHERE, printed, reason=_TOO_FEW)
-            low, high = np.percentile(values, _MOST_RUNS)
+            low, high = np.percentile(values, _SPAN_OF_MOST_RUNS)
             inside.append(bool(low <= runs.published_distances(name, True)[finger] <= high))
             medians.append(float(np.median(values)))
     reason = (
         "The paper tells neither of how many runs its figures are nor how they spread. Reproduced if each of the six "
-        f"lies between the {_MOST_RUNS[0]:g}th and {_MOST_RUNS[1]:g}th percentile of our runs, so that it could be a "
-        f"run's: {sum(inside)} of {len(inside)} do."
+        f"lies between the {_SPAN_OF_MOST_RUNS[0]:g}th and {_SPAN_OF_MOST_RUNS[1]:g}th percentile of our runs, so that it could "
+        f"be a run's: {sum(inside)} of {len(inside)} do."
     )
     return Claim(
         claim=sentence,
@@ -209,12 +209,12 @@ def _centred(runs: IrTableRuns) -> Claim:
         ]
     )
     sentence = "Thumb and ring are well centred with respect to the object."
-    told, where, interval = f"{_span(printed)} apart", "table II, sec. V-D", time_interval(unlike)
+    output, where, interval = f"{_span(printed)} apart", "table II, sec. V-D", time_interval(unlike)
     if interval is None:
-        return nothing_measured(sentence, where, told, reason=_TOO_FEW)
+        return nothing_measured(sentence, where, output, reason=_TOO_FEW)
     return Claim(
         claim=sentence,
-        published=told,
+        published=output,
         measured=f"{1000 * float(np.median(unlike)):.1f} mm apart (median)",
         interval=(interval.low, interval.high),
         unit="m",
@@ -234,7 +234,7 @@ def _index_further(runs: IrTableRuns) -> Claim:
     return Claim(
         claim="The index is always further from the object than thumb and ring, in most of the tasks.",
         published="in all rows",
-        measured=f"{told_rate(sum(further), len(further))} of the runs" if further else "",
+        measured=f"{format_rate(sum(further), len(further))} of the runs" if further else "",
         interval=None if interval is None else (interval.low, interval.high),
         verdict=Verdict.NOT_COMPARABLE,
         reason=_IN_SPACE,

@@ -20,7 +20,7 @@ from handover.scenarios.published.ir_table_runs import (
     IrTableRuns,
 )
 from handover.scenarios.published.published_experiment import ComparisonTable
-from handover.scenarios.published.verdicts import told_interval, told_median, told_p, told_share
+from handover.scenarios.published.verdicts import format_interval, format_median, format_p_value, format_share
 
 _TITLES = {
     Thing.CYLINDER: "cylinder",
@@ -45,7 +45,7 @@ def _successes(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
     rows = [[title, *_cells(runs, perturbed, thing)] for thing, title in _TITLES.items()]
     note = (
         "Intervals by Clopper and Pearson, 95 %; all runs of an arm count in the total. A star: Fisher's exact test "
-        f"tells ours from theirs at {told_share(LEVEL)}, of each cell by itself. The forward arms are a control that "
+        f"tells ours from theirs at {format_share(LEVEL)}, of each cell by itself. The forward arms are a control that "
         "the paper does not have."
     )
     if runs.not_done:
@@ -62,16 +62,16 @@ def _cells(runs: IrTableRuns, perturbed: bool, thing: Thing | None) -> list[str]
     cells: list[str] = []
     for arm in ARMS:
         ours, theirs = runs.count(arm, perturbed, thing), runs.published(arm, perturbed, thing)
-        told = _with_interval(ours) if thing is None else _told(ours)
+        value = _with_interval(ours) if thing is None else _format_count(ours)
         if theirs is not None:
             apart = ours[1] and two_proportions(*ours, *theirs) < LEVEL
-            cells.append(_with_interval(theirs) if thing is None else _told(theirs))
-            told += " *" if apart else ""
-        cells.append(told)
+            cells.append(_with_interval(theirs) if thing is None else _format_count(theirs))
+            value += " *" if apart else ""
+        cells.append(value)
     return cells
 
 
-def _told(count: Count) -> str:
+def _format_count(count: Count) -> str:
     return f"{count[0]}/{count[1]}" if count[1] else ""
 
 
@@ -79,7 +79,7 @@ def _with_interval(count: Count) -> str:
     if not count[1]:
         return ""
     interval = success_interval(*count)
-    return f"{_told(count)} ({told_interval(interval.low, interval.high)})"
+    return f"{_format_count(count)} ({format_interval(interval.low, interval.high)})"
 
 
 def _tests(runs: IrTableRuns) -> ComparisonTable:
@@ -90,7 +90,7 @@ def _tests(runs: IrTableRuns) -> ComparisonTable:
         first, second = runs.pairs(*ways)
         test = paired_test(first, second)
         names = [f"{arm.title}, {POSES[perturbed]}" for arm, perturbed in ways]
-        rows.append([*names, str(len(first)), str(test.only_first), str(test.only_second), told_p(test.p)])
+        rows.append([*names, str(len(first)), str(test.only_first), str(test.only_second), format_p_value(test.p)])
     return ComparisonTable(
         title="Runs in the same scenes",
         header=["first", "second", "pairs", "only the first held", "only the second held", "p"],
@@ -110,8 +110,8 @@ def _closing(runs: IrTableRuns) -> ComparisonTable:
                 [
                     f"{arm.title}, {pose}",
                     ", ".join(f"{n} {stop}" for stop, n in stops.most_common()),
-                    told_median(runs.metric("steps", arm, perturbed), 0),
-                    told_median(runs.metric("refinement_time", arm, perturbed), 1),
+                    format_median(runs.metric("steps", arm, perturbed), 0),
+                    format_median(runs.metric("refinement_time", arm, perturbed), 1),
                     f"{np.median(displaced):.1f}, {np.max(displaced):.1f}" if len(displaced) else "",
                 ]
             )
@@ -131,7 +131,7 @@ def _distances(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
         row, published = [name.replace("_", " ")], runs.published_distances(name, perturbed)
         for finger in FINGER_NAMES:
             ours = 1000 * runs.metric(f"final_distance_{finger}", REFLEX, perturbed, things)
-            row += [f"{1000 * published[finger]:.0f}", told_median(ours, 1)]
+            row += [f"{1000 * published[finger]:.0f}", format_median(ours, 1)]
         rows.append(row)
     return ComparisonTable(
         title=f"Table II, {POSES[perturbed]} poses: distances at the last step (mm)",

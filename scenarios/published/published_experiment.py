@@ -21,7 +21,7 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.results.run_folder import told_if_not_written, write_whole
+from handover.scenarios.results.run_folder import disk_errors_reported, write_whole
 
 
 class Verdict(str, enum.Enum):
@@ -67,7 +67,7 @@ class Claim:
     beyond: bool = False
 
     @property
-    def told_verdict(self) -> str:
+    def verdict_text(self) -> str:
         """The verdict in words: that of a claim which nobody has published says whether it holds."""
         return _BEYOND[self.verdict] if self.beyond else self.verdict.value
 
@@ -100,8 +100,8 @@ class Claim:
 
 def verdict_counts(claims: Sequence[Claim], beyond: bool) -> Sequence[tuple[int, Verdict, str]]:
     """Return how many of a paper's claims, or of those beyond it, have each verdict that occurs, with its words."""
-    told = [(c.verdict, c.told_verdict) for c in claims if c.beyond is beyond]
-    return [(told.count(t), *t) for t in sorted(set(told), key=lambda t: list(Verdict).index(t[0]))]
+    entries = [(c.verdict, c.verdict_text) for c in claims if c.beyond is beyond]
+    return [(entries.count(t), *t) for t in sorted(set(entries), key=lambda t: list(Verdict).index(t[0]))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,8 +183,8 @@ def write_claims(claims: Sequence[Claim], folder: CampaignFolder) -> None:
     Raises:
         RecordNotWritten: it cannot be written.
     """
-    told = [claim.as_data() for claim in claims]
-    write_whole(folder.path / "claims.json", json.dumps(told, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    entries = [claim.as_data() for claim in claims]
+    write_whole(folder.path / "claims.json", json.dumps(entries, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def draw_figures(experiment: PublishedExperiment, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
@@ -193,6 +193,6 @@ def draw_figures(experiment: PublishedExperiment, table: CampaignTable, runs: Pa
     Raises:
         RecordNotWritten: there is no room.
     """
-    with told_if_not_written(folder):
+    with disk_errors_reported(folder):
         folder.mkdir(exist_ok=True)
         return experiment.draw(table, runs, folder)

@@ -29,38 +29,38 @@ from handover.scenarios.campaign.statistics import (
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 
-def told_rate(successes: int, n: int) -> str:
+def format_rate(successes: int, n: int) -> str:
     """Return such as `11/15 (73 %)`."""
-    return f"{successes}/{n} ({told_share(successes / n)})"
+    return f"{successes}/{n} ({format_share(successes / n)})"
 
 
-def told_share(share: float) -> str:
+def format_share(share: float) -> str:
     """Return such as `73 %`."""
     return f"{100 * share:.0f} %"
 
 
-def told_interval(low: float, high: float) -> str:
+def format_interval(low: float, high: float) -> str:
     """Return the interval of a rate such as `45 to 92 %`."""
-    return f"{100 * low:.0f} to {told_share(high)}"
+    return f"{100 * low:.0f} to {format_share(high)}"
 
 
-def told_p(p: float) -> str:
+def format_p_value(p: float) -> str:
     """Return a p-value, such as `0.031` or `2e-12`."""
     return f"{p:.2g}"
 
 
-def told_median(values: Floats, digits: int) -> str:
+def format_median(values: Floats, digits: int) -> str:
     """Return a median with its interval by bootstrap, such as `5.2 (4.8 to 6.1)`; "" of no values."""
     if not len(values):
         return ""
-    interval, told = time_interval(values), f"{np.median(values):.{digits}f}"
-    return told if interval is None else f"{told} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
+    interval, entries = time_interval(values), f"{np.median(values):.{digits}f}"
+    return entries if interval is None else f"{entries} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
 
 
 FEW = 0.10
 """Share of runs below which something counts as not happening."""
 
-_FEWEST_DIFFERING = next(k for k in range(1, 64) if 2.0 ** (1 - k) < LEVEL)
+_MIN_DIFFERING = next(k for k in range(1, 64) if 2.0 ** (1 - k) < LEVEL)
 """Pairs that must differ, all in one direction, for McNemar's exact test to reject."""
 
 
@@ -71,7 +71,7 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
     The reason tells which counts the test would have let pass; not comparable if these are all.
     """
     if not measured[1]:
-        return nothing_measured(claim, where, told_rate(*published))
+        return nothing_measured(claim, where, format_rate(*published))
     ours, theirs = success_interval(*measured), success_interval(*published)
     p, n = two_proportions(*measured, *published), measured[1]
     low, high = compatible_counts(*published, n)
@@ -79,13 +79,13 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
     if (low, high) == (0, n):
         power = f"with so few trials no count of ours out of {n} could have been told from theirs"
     reason = (
-        f"Reproduced if Fisher's exact test of both counts does not reject at {told_share(LEVEL)} that the rates are "
-        f"equal: p = {told_p(p)}. Their own interval is {told_interval(theirs.low, theirs.high)}; {power}."
+        f"Reproduced if Fisher's exact test of both counts does not reject at {format_share(LEVEL)} that the rates are "
+        f"equal: p = {format_p_value(p)}. Their own interval is {format_interval(theirs.low, theirs.high)}; {power}."
     )
     return Claim(
         claim=claim,
-        published=told_rate(*published),
-        measured=told_rate(*measured),
+        published=format_rate(*published),
+        measured=format_rate(*measured),
         interval=(ours.low, ours.high),
         verdict=_verdict(p >= LEVEL, could_be_either=(low, high) != (0, n)),
         reason=reason,
@@ -112,15 +112,15 @@ def order_claim(
     test, n = paired_test(first, second), len(first)
     reason = (
         f"{'Holds' if beyond else 'Reproduced'} if McNemar's exact test of runs in the same scenes rejects at "
-        f"{told_share(LEVEL)}, in this direction: of {n} pairs only the first succeeded in {test.only_first}, only the "
-        f"second in {test.only_second}; p = {told_p(test.p)}. {note}"
+        f"{format_share(LEVEL)}, in this direction: of {n} pairs only the first succeeded in {test.only_first}, only "
+        f"the second in {test.only_second}; p = {format_p_value(test.p)}. {note}"
     )
     return Claim(
         claim=claim,
         published=published,
-        measured=f"{told_rate(sum(first), n)} against {told_rate(sum(second), n)}",
-        verdict=_verdict(test.first_is_better, could_be_either=n >= _FEWEST_DIFFERING),
-        reason=_with_want(reason, n, _FEWEST_DIFFERING),
+        measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
+        verdict=_verdict(test.first_is_better, could_be_either=n >= _MIN_DIFFERING),
+        reason=_with_want(reason, n, _MIN_DIFFERING),
         where=where,
         beyond=beyond,
     )
@@ -138,14 +138,14 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
     interval = success_interval(test.only_second, n)
     reason = (
         "Holds if the share of scenes in which only the second succeeds has an interval (Clopper-Pearson) below "
-        f"{told_share(FEW)}: of {n} pairs that is so in {test.only_second}, "
-        f"{told_interval(interval.low, interval.high)}; the reverse in {test.only_first}; McNemar's p = "
-        f"{told_p(test.p)}."
+        f"{format_share(FEW)}: of {n} pairs that is so in {test.only_second}, "
+        f"{format_interval(interval.low, interval.high)}; the reverse in {test.only_first}; McNemar's p = "
+        f"{format_p_value(test.p)}."
     )
     return Claim(
         claim=claim,
         published="",
-        measured=f"{told_rate(sum(first), n)} against {told_rate(sum(second), n)}",
+        measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
         interval=(interval.low, interval.high),
         verdict=_verdict(interval.high < FEW, could_be_either=n >= fewest_for(FEW)),
         reason=_with_want(reason, n, fewest_for(FEW)),
@@ -168,7 +168,9 @@ def rare_claim(claim: str, where: str, published: str, measured: tuple[int, int]
     if not measured[1]:
         return nothing_measured(claim, where, published)
     interval, fewest = success_interval(*measured), fewest_for(FEW)
-    rule = f"Reproduced if the interval of how often it happens (Clopper-Pearson) lies below {told_share(FEW)}. {note}"
+    rule = (
+        f"Reproduced if the interval of how often it happens (Clopper-Pearson) lies below {format_share(FEW)}. {note}"
+    )
     met = interval.high < FEW
     return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
 
@@ -190,8 +192,8 @@ def nothing_measured(
 
 def without_verdict(claim: Claim, reason: str) -> Claim:
     """Return a claim that a rule has judged, without its verdict, for a reason that stands before the rule's."""
-    told = f"{reason} For what it is worth: {claim.reason}"
-    return replace(claim, verdict=Verdict.NOT_COMPARABLE, reason=told)
+    text = f"{reason} For what it is worth: {claim.reason}"
+    return replace(claim, verdict=Verdict.NOT_COMPARABLE, reason=text)
 
 
 def _of_rate(
@@ -207,7 +209,7 @@ def _of_rate(
     return Claim(
         claim=claim,
         published=published,
-        measured=told_rate(*measured),
+        measured=format_rate(*measured),
         interval=(interval.low, interval.high),
         verdict=_verdict(met, could_be_either=measured[1] >= fewest),
         reason=_with_want(rule, measured[1], fewest),

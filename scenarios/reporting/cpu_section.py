@@ -10,7 +10,7 @@ from markupsafe import Markup
 from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, template
 
-_MOST = 24
+_MAX_BARS = 24
 """Units that have a bar of their own; the cheapest of more share one."""
 
 _REST = "master, recording and other"
@@ -51,21 +51,21 @@ def cpu_section(summary: Mapping[str, Any]) -> Section | None:
 def _bars(units: Sequence[Mapping[str, Any]]) -> list[_Bar]:
     """Return bars of the units, the most expensive first."""
     ordered = sorted(units, key=lambda u: -u["cpu_seconds"])
-    bars = [_Bar(label=u["name"], seconds=u["cpu_seconds"]) for u in ordered[:_MOST]]
-    if others := ordered[_MOST:]:
+    bars = [_Bar(label=u["name"], seconds=u["cpu_seconds"]) for u in ordered[:_MAX_BARS]]
+    if others := ordered[_MAX_BARS:]:
         bars.append(_Bar(label=f"{len(others)} other units", seconds=sum(u["cpu_seconds"] for u in others)))
     return bars
 
 
 def _plot(bars: Sequence[_Bar], in_all: float) -> Markup:
     seconds = [b.seconds for b in bars]
-    told = [f"{s:.3g} s, {_share(s, in_all)}" for s in seconds]
+    entries = [f"{s:.3g} s, {_share(s, in_all)}" for s in seconds]
     bar = go.Bar(
         x=seconds,
         y=[_in_two_lines(b.label) for b in bars],
         orientation="h",
         marker={"color": [b.colour for b in bars]},
-        text=told,
+        text=entries,
         textposition="auto",
         insidetextanchor="end",
         insidetextfont={"color": "var(--page)"},
@@ -82,7 +82,7 @@ def _plot(bars: Sequence[_Bar], in_all: float) -> Markup:
         },
     )
     return plot_html(figure, height=80 + 32 * len(bars), label="CPU time by unit: " + "; ".join(
-        f"{b.label} {text}" for b, text in zip(bars, told, strict=True)
+        f"{b.label} {text}" for b, text in zip(bars, entries, strict=True)
     ))  # fmt: skip
 
 

@@ -13,14 +13,14 @@ import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.scenarios.experiment.time_plot import COLOURS
 from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, template
 
 Pair = tuple[str, str]
 
-_MOST_ON_A_CIRCLE = 8
+_MAX_ON_A_CIRCLE = 8
 _BEND = 0.16
 """How far a line's middle lies beside the straight one, as a share of its length."""
 _POINTS = 21
@@ -34,7 +34,7 @@ def places(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
     """
     if len(units) <= 2:
         return {name: np.array([2.0 * k - (len(units) - 1.0), 0.0]) for k, name in enumerate(units)}
-    if len(units) <= _MOST_ON_A_CIRCLE:
+    if len(units) <= _MAX_ON_A_CIRCLE:
         return _around(_flow(units, pairs))
     return _near_each_other(units, pairs)
 
@@ -74,9 +74,9 @@ def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str,
     return {name: 2.0 * (found[name] - low) / np.maximum(high - low, 1e-9) - 1.0 for name in units}
 
 
-_MOST_UNITS = 40
-_MOST_ROWS = 1000
-_MOST_TOLD = 14
+_MAX_UNITS = 40
+_MAX_ROWS = 1000
+_MAX_REPORTED = 14
 """Signals of a line that are told where one points at it."""
 _FEW = 8
 """Units beyond which a box has room for the name alone."""
@@ -87,7 +87,7 @@ class _Signal(NamedTuple):
 
     out: str
     into: str
-    told: Mapping[str, Any]
+    description: Mapping[str, Any]
 
 
 _Bundles = Mapping[tuple[str, str], Sequence[_Signal]]
@@ -106,10 +106,10 @@ def graph_section(run: Mapping[str, Any]) -> Section | None:
         return None
     connections: Sequence[Mapping[str, Any]] = system.get("connections", ())
     html = template("graph.html").render(
-        plot=_plot(units, _bundled([u["name"] for u in units], connections)) if len(units) <= _MOST_UNITS else None,
+        plot=_plot(units, _bundled([u["name"] for u in units], connections)) if len(units) <= _MAX_UNITS else None,
         units=[(u["name"], u["model"], u["fmi"], rate(u)) for u in units],
-        rows=_rows(connections[:_MOST_ROWS], run.get("conversions", ())),
-        left_out=max(0, len(connections) - _MOST_ROWS),
+        rows=_rows(connections[:_MAX_ROWS], run.get("conversions", ())),
+        left_out=max(0, len(connections) - _MAX_ROWS),
         connections=len(connections),
     )
     return Section(anchor="graph", title="Units and signals", html=Markup(html))
@@ -118,15 +118,15 @@ def graph_section(run: Mapping[str, Any]) -> Section | None:
 def rate(unit: Mapping[str, Any]) -> str:
     """Return how often a unit steps, as one reads it, such as "33.3 ms, sampled"."""
     period = unit["period"]
-    told = "steps vary" if period is None else f"{period:.3g} s" if period >= 1.0 else f"{1000.0 * period:.3g} ms"
-    return told + (", sampled" if unit["sampled"] else "")
+    text = "steps vary" if period is None else f"{period:.3g} s" if period >= 1.0 else f"{1000.0 * period:.3g} ms"
+    return text + (", sampled" if unit["sampled"] else "")
 
 
 def _bundled(names: Collection[str], connections: Sequence[Mapping[str, Any]]) -> _Bundles:
     bundles: dict[tuple[str, str], list[_Signal]] = {}
     for c in connections:
         (source, out), (target, into) = (_parted(c[end], names) for end in ("source", "target"))
-        bundles.setdefault((source, target), []).append(_Signal(out=out, into=into, told=c))
+        bundles.setdefault((source, target), []).append(_Signal(out=out, into=into, description=c))
     return bundles
 
 
@@ -145,7 +145,7 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
     lines = [bent(at[a], at[b]) for a, b in between]
     drawn = [_line(points, colour[a]) for points, (a, _) in zip(lines, between, strict=True)]
     heads = [
-        _head(points, _told(*pair, cs), colour[pair[0]])
+        _head(points, _signal_text(*pair, cs), colour[pair[0]])
         for points, (pair, cs) in zip(lines, between.items(), strict=True)
     ]
     axis = {"visible": False, "fixedrange": True}
@@ -161,9 +161,9 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
     )
-    told = "; ".join(f"{a} to {b}: {', '.join(s.out for s in signals)}" for (a, b), signals in bundles.items())
+    text = "; ".join(f"{a} to {b}: {', '.join(s.out for s in signals)}" for (a, b), signals in bundles.items())
     height = 230 if len(units) <= 2 else 280 + 40 * min(len(units), 10)
-    return plot_html(figure, height=height, label=f"Graph of {len(units)} units. {told}")
+    return plot_html(figure, height=height, label=f"Graph of {len(units)} units. {text}")
 
 
 def _line(points: Floats, colour: str) -> Any:
@@ -171,7 +171,7 @@ def _line(points: Floats, colour: str) -> Any:
     return go.Scatter(x=points[:, 0], y=points[:, 1], mode="lines", line=line, hoverinfo="skip")
 
 
-def _head(points: Floats, told: str, colour: str) -> Any:
+def _head(points: Floats, text: str, colour: str) -> Any:
     """Return an arrow's head in the middle of its line, where boxes of any size leave it free, with its signals."""
     middle = len(points) // 2
     ends = points[middle - 1 : middle + 1]
@@ -187,19 +187,19 @@ def _head(points: Floats, told: str, colour: str) -> Any:
             "opacity": 1,
             "line": {"width": 0},
         },
-        hovertext=["", told],
+        hovertext=["", text],
         hoverinfo="text",
         hoverlabel={"align": "left"},
     )
 
 
-def _told(source: str, target: str, signals: Sequence[_Signal]) -> str:
+def _signal_text(source: str, target: str, signals: Sequence[_Signal]) -> str:
     lines = [f"<b>{escape(source)} → {escape(target)}</b>"]
-    for s in signals[:_MOST_TOLD]:
+    for s in signals[:_MAX_REPORTED]:
         port = s.out if s.out == s.into else f"{s.out} → {s.into}"
-        lines.append(f"{escape(port)}{escape(_form(s.told))}")
-    if len(signals) > _MOST_TOLD:
-        lines.append(f"and {len(signals) - _MOST_TOLD} more")
+        lines.append(f"{escape(port)}{escape(_form(s.description))}")
+    if len(signals) > _MAX_REPORTED:
+        lines.append(f"and {len(signals) - _MAX_REPORTED} more")
     return "<br>".join(lines)
 
 
@@ -208,8 +208,8 @@ def _form(c: Mapping[str, Any]) -> str:
     kind = [] if c["kind"] == "real" else [c["kind"]]
     unit = [c["unit"]] if c["unit"] not in ("", "1") else []
     size = [f"x {c['size']}"] if c["size"] != 1 else []
-    told = ", ".join([*kind, *unit, *size])
-    return f" ({told})" if told else ""
+    text = ", ".join([*kind, *unit, *size])
+    return f" ({text})" if text else ""
 
 
 def _box(unit: Mapping[str, Any], at: Floats, colour: str, *, few: bool) -> dict[str, Any]:
@@ -234,7 +234,7 @@ def _rows(
     connections: Sequence[Mapping[str, Any]], conversions: Sequence[Mapping[str, Any]]
 ) -> list[tuple[str, str, str, str, str]]:
     """Return source, target, unit, size and conversion of each connection."""
-    changes = {(c["source"], c["target"]): str(Linear(c["factor"], c["offset"])) for c in conversions}
+    changes = {(c["source"], c["target"]): str(LinearTransformation(c["factor"], c["offset"])) for c in conversions}
     return [
         (
             c["source"],

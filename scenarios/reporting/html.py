@@ -25,10 +25,10 @@ def plot_html(figure: go.Figure, height: int = 320, label: str = "") -> Markup:
         height: in pixels; the legend comes below.
         label: what one hears who cannot see it.
     """
-    told = cast(dict[str, Any], figure.to_dict())
-    told["layout"].pop("template", None)  # of paper-white figures
+    value = cast(dict[str, Any], figure.to_dict())
+    value["layout"].pop("template", None)  # of paper-white figures
     return Markup(
-        f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{json_html(told)}</div>'
+        f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{json_html(value)}</div>'
     )
 
 

@@ -45,14 +45,14 @@ _EQUAL = re.compile(r"\b(\w) ([=<]) (?=-?\d)")
 _SPACE = "\u00a0"
 
 
-def tied(html: str) -> str:
+def non_breaking(html: str) -> str:
     """Return HTML in whose text no line breaks within "5 mm", "3 to 5 %" and "p = 0.03"; scripts stay as they are."""
     parts = _PARTS.split(html)
-    parts[::2] = [_tied(text) for text in parts[::2]]
+    parts[::2] = [_non_breaking(text) for text in parts[::2]]
     return "".join(parts)
 
 
-def _tied(text: str) -> str:
+def _non_breaking(text: str) -> str:
     text = _RANGE.sub(f"{_SPACE}to{_SPACE}", _UNIT.sub(_SPACE, text))
     return _EQUAL.sub(rf"\1{_SPACE}\2{_SPACE}", text)
 
@@ -81,8 +81,8 @@ def write_page(path: Path, title: str, lead: Markup, sections: Sequence[Section]
         path,
         template("page.html").render(
             title=title,
-            lead=Markup(tied(lead)),
-            sections=[replace(s, html=Markup(tied(s.html))) for s in sections],
+            lead=Markup(non_breaking(lead)),
+            sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
             style=Markup(asset("page.css")),
             scripts=[Markup(s) for s in scripts],
             policy=_policy(scripts),

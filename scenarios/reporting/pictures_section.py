@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.reporting.page import Section, template
-from handover.scenarios.results.pictures import read_pictures
+from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_folder import RunFolder
 
 _WIDTHS = (960, 800, 640, 480, 360)
@@ -22,14 +22,14 @@ _ROOM = 1_200_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Shown:
+class _DisplayedPicture:
     """A picture in the page: where it comes from, and what one hears who cannot see it."""
 
     picture: CameraPicture
     data: str
 
     @property
-    def told(self) -> str:
+    def caption(self) -> str:
         p = self.picture
         marked = ", ".join(mark.label for mark in p.marks)
         return f"{p.camera} camera at {p.t:.1f} s, {p.role}" + (f"; marked: {marked}" if marked else "; nothing marked")
@@ -41,12 +41,12 @@ def pictures_section(folder: RunFolder) -> Section | None:
     Raises:
         BadRunFolder: they are damaged.
     """
-    pictures = read_pictures(folder.pictures)
+    pictures = read_picture_files(folder.pictures)
     if not pictures:
         return None
-    moments: dict[tuple[float, str], list[_Shown]] = {}
+    moments: dict[tuple[float, str], list[_DisplayedPicture]] = {}
     for picture, data in zip(pictures, _inline(pictures), strict=True):
-        moments.setdefault((picture.t, picture.role), []).append(_Shown(picture=picture, data=data))
+        moments.setdefault((picture.t, picture.role), []).append(_DisplayedPicture(picture=picture, data=data))
     marks = {mark.label: mark for picture in pictures for mark in picture.marks}
     html = template("pictures.html").render(moments=moments, legend=list(marks.values()), place=_place)
     return Section(anchor="pictures", title="What the cameras saw", html=Markup(html))

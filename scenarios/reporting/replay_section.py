@@ -19,14 +19,14 @@ from handover.scenarios.experiment.replay import Body, Line, Replay
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import Section, asset
 
-MOST = 240
+MAX_FRAMES = 240
 """Frames of a replay; the page moves bodies smoothly between them."""
 
 
 def frame_rows(time: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the rows of a record, rising, that lie about evenly in time, first and last among them."""
     last = len(time) - 1
-    wanted: Floats = np.linspace(float(time[0]), float(time[-1]), min(MOST, len(time)))
+    wanted: Floats = np.linspace(float(time[0]), float(time[-1]), min(MAX_FRAMES, len(time)))
     after = np.clip(np.searchsorted(time, wanted), min(1, last), last)
     nearest = after - (wanted - time[after - 1] < time[after] - wanted)
     return np.unique([0, *nearest.tolist(), last]).astype(np.int64)
@@ -80,12 +80,12 @@ def replay_section(replay: Replay, record: Record) -> Section:
 def _at(drawn: Drawn, rows: NDArray[np.int64], all_rows: int) -> Drawn:
     """Return what is drawn at some rows of the record only; at one if it stays."""
     if isinstance(drawn, Line):
-        return replace(drawn, points=_thinned(drawn.label, drawn.points, rows, all_rows, keep=drawn.trail))
-    q_WB = None if drawn.q_WB is None else _thinned(drawn.label, drawn.q_WB, rows, all_rows)
-    return replace(drawn, p_WB=_thinned(drawn.label, drawn.p_WB, rows, all_rows), q_WB=q_WB)
+        return replace(drawn, points=_downsampled(drawn.label, drawn.points, rows, all_rows, keep=drawn.trail))
+    q_WB = None if drawn.q_WB is None else _downsampled(drawn.label, drawn.q_WB, rows, all_rows)
+    return replace(drawn, p_WB=_downsampled(drawn.label, drawn.p_WB, rows, all_rows), q_WB=q_WB)
 
 
-def _thinned(label: str, values: Floats, rows: NDArray[np.int64], all_rows: int, keep: bool = False) -> Floats:
+def _downsampled(label: str, values: Floats, rows: NDArray[np.int64], all_rows: int, keep: bool = False) -> Floats:
     if len(values) == 1:
         return values
     if len(values) != all_rows:
@@ -168,7 +168,7 @@ def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str
         for name in dict.fromkeys(d.label for d in drawn)
     ]
     speeds = [f'<option value="{s}"{" selected" if s == "1" else ""}>{s}&times;</option>' for s in _SPEEDS]
-    told = [f'<p class="soft">{escape(note)}</p>' for note in notes]
+    entries = [f'<p class="soft">{escape(note)}</p>' for note in notes]
     return Markup(
         f"<style>{asset('replay.css')}</style>"
         f'<div class="replay">{data}'
@@ -182,5 +182,5 @@ def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str
         f'<select class="replay-speed" aria-label="speed of the replay">{"".join(speeds)}</select>'
         '<button type="button" class="replay-reset">reset view</button></div>'
         f'<div class="replay-legend" role="group" aria-label="what is shown">{"".join(chips)}</div>'
-        f"</div>{''.join(told)}</div>"
+        f"</div>{''.join(entries)}</div>"
     )

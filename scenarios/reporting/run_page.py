@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import PublishedValue
-from handover.scenarios.experiment.parameters import BadParameter, parameters_of
+from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.reporting.cpu_section import cpu_section
 from handover.scenarios.reporting.graph import graph_section
 from handover.scenarios.reporting.html import rows_table
@@ -24,23 +24,23 @@ from handover.scenarios.reporting.pictures_section import pictures_section
 from handover.scenarios.reporting.replay_section import replay_section
 from handover.scenarios.reporting.time_plots import explorer_section, time_plots_section
 from handover.scenarios.results.run_facts import RunFacts, record_of
-from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
-from handover.scenarios.results.tables import master_rows, told, told_conversion
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.tables import format_conversion, format_metric, master_rows
 
 _VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
 
 
-def run_lead(facts: RunFacts) -> Markup:
+def run_header(facts: RunFacts) -> Markup:
     """Return the verdict, what ran with which seed and versions, and what was told of a failure."""
     summary, versions = facts.summary, facts.run.get("versions", {})
-    told = [facts.title] if facts.title else []
+    entries = [facts.title] if facts.title else []
     if facts.run.get("seed") is not None:
-        told.append(f"seed {facts.run['seed']}")
-    told.append(_how_long(facts))
-    told += [f"{name} {versions[key]}" for key, name in _VERSIONS.items() if key in versions]
+        entries.append(f"seed {facts.run['seed']}")
+    entries.append(_how_long(facts))
+    entries += [f"{name} {versions[key]}" for key, name in _VERSIONS.items() if key in versions]
     return Markup(
         template("run_lead.html").render(
-            told=[t for t in told if t],
+            entries=[t for t in entries if t],
             verdict=_verdict(facts),
             good=summary["success"],
             reason=summary["reason"],
@@ -83,7 +83,7 @@ def metrics_section(facts: RunFacts) -> Section | None:
     metrics: Mapping[str, Any] = facts.summary["metrics"]
     first = [n for n in facts.headline if n in metrics]
     others = [n for n in metrics if n not in first and not n.startswith(_IN_TABLES)]
-    rows = [(metrics[n].get("description") or n, told(metrics[n]), n) for n in first + others]
+    rows = [(metrics[n].get("description") or n, format_metric(metrics[n]), n) for n in first + others]
     return _table("figures", "Figures of the run", rows, first=len(first))
 
 
@@ -100,10 +100,10 @@ def master_section(facts: RunFacts) -> Section | None:
     """
     try:
         rows = master_rows(facts.summary) if "master" in facts.summary else []
-        conversions = [told_conversion(c) for c in facts.run.get("conversions", [])]
+        conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
     except (KeyError, TypeError, ValueError) as e:
         fault = f"what it tells of its master is damaged: {type(e).__name__} {e}"
-        raise BadRunFolder(facts.folder.path, fault) from e
+        raise InvalidRunFolder(facts.folder.path, fault) from e
     if not rows and not conversions:
         return None
     html = template("run_master.html").render(rows=rows, conversions=conversions)
@@ -148,20 +148,20 @@ def _values(facts: RunFacts) -> Sequence[PublishedValue]:
         return ()
     try:
         return facts.experiment.published(parameters_of(type(facts.experiment), facts.run["parameters"]))
-    except BadParameter:  # of another version: the page tells it where it leaves plots out
+    except InvalidParameter:  # of another version: the page tells it where it leaves plots out
         return ()
 
 
 def _row(value: PublishedValue, metric: Mapping[str, Any]) -> tuple[str | Markup, ...]:
     unit = {"unit": metric["unit"]}
-    shown = f"{value.relation} {told({**unit, 'value': value.value})}".lstrip()
+    shown = f"{value.relation} {format_metric({**unit, 'value': value.value})}".lstrip()
     if value.limits is not None:
-        shown += " ({} to {})".format(*(told({**unit, "value": x}) for x in value.limits))
+        shown += " ({} to {})".format(*(format_metric({**unit, "value": x}) for x in value.limits))
     status = "" if value.status == "stated" else f" ({value.status})"
     where = Markup("{}{}").format(value.where, status)
     if value.note:
         where += Markup("<br><span class='soft'>{}</span>").format(value.note)
-    return metric["description"] or value.metric, told(metric), shown, where
+    return metric["description"] or value.metric, format_metric(metric), shown, where
 
 
 def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
@@ -189,7 +189,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
         files_section(facts),
     ]
     heading = f"{facts.scenario}: {'succeeded' if facts.summary['success'] else 'failed'}"
-    write_page(file or folder.report, heading, run_lead(facts), [s for s in sections if s is not None])
+    write_page(file or folder.report, heading, run_header(facts), [s for s in sections if s is not None])
 
 
 def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
@@ -203,7 +203,7 @@ def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
             time_plots_section(plots, record.time),
             None if replay is None else replay_section(replay, record),
         ]
-    except (BadParameter, KeyError) as e:
+    except (InvalidParameter, KeyError) as e:
         why = e.args[0] if e.args else e
         html = Markup("<p>The run is of another version of {}, so its plots and its replay are left out: {}.</p>")
         return [Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))]
@@ -214,4 +214,4 @@ def _of_units(facts: RunFacts) -> Sequence[Section | None]:
         return graph_section(facts.run), cpu_section(facts.summary)
     except (KeyError, TypeError, AttributeError, ValueError, IndexError) as e:
         fault = f"what it tells of its units is damaged: {type(e).__name__} {e}"
-        raise BadRunFolder(facts.folder.path, fault) from e
+        raise InvalidRunFolder(facts.folder.path, fault) from e

@@ -26,23 +26,23 @@ from handover.scenarios.reporting.page import Section, template
 Rows = NDArray[np.int64]
 
 
-def rows_of_curve(values: Floats, most: int) -> Rows:
+def rows_of_curve(values: Floats, max_rows: int) -> Rows:
     """Return rows of a curve, shape (rows,), between which straight lines look like it; about `most` at the most.
 
     Gaps (NaN) stay gaps. Rows are chosen by extremes and by the largest triangles.
     """
-    if len(values) <= most:
+    if len(values) <= max_rows:
         return np.arange(len(values))
     finite = np.isfinite(values)
     there = np.flatnonzero(finite)
-    if len(there) > most:
-        chosen = MinMaxLTTBDownsampler().downsample(np.ascontiguousarray(values[there]), n_out=most)
+    if len(there) > max_rows:
+        chosen = MinMaxLTTBDownsampler().downsample(np.ascontiguousarray(values[there]), n_out=max_rows)
         there = there[chosen.astype(np.int64)]
     gaps = np.flatnonzero(~finite & np.concatenate(([True], finite[:-1])))  # the first row of each
-    return np.union1d(there, gaps[:most])
+    return np.union1d(there, gaps[:max_rows])
 
 
-def rows_of_steps(values: Floats, most: int) -> Rows:
+def rows_of_steps(values: Floats, max_rows: int) -> Rows:
     """Return the rows where a value that is held changes, the first and the last; a curve's if they are too many.
 
     Of a gap (NaN) the row before it is one, too: until there the value is drawn.
@@ -50,8 +50,8 @@ def rows_of_steps(values: Floats, most: int) -> Rows:
     if len(values) == 0:
         return np.zeros(0, np.int64)
     changes = changes_of(values)
-    if len(changes) > most:
-        return rows_of_curve(values, most)
+    if len(changes) > max_rows:
+        return rows_of_curve(values, max_rows)
     before_gaps = changes[np.isnan(values[changes])] - 1
     return np.unique(np.concatenate((changes, before_gaps, [0, len(values) - 1])))
 
@@ -63,9 +63,9 @@ def changes_of(values: Floats) -> Rows:
 
 
 TIME_AXIS = "time (s)"
-_MOST = 900
+_MAX_ROWS = 900
 """Points of a curve: more than a plot has pixels for."""
-_MOST_PHASES = 200
+_MAX_PHASES = 200
 _STROKES: dict[str, dict[str, Any]] = {
     "solid": {"width": 1.8},
     "dashed": {"width": 1.8, "dash": "dash"},
@@ -113,7 +113,7 @@ def time_figure(plot: TimePlot, time: Floats) -> go.Figure:
 
 def _trace(curve: Curve, time: Floats, unit: str, colour: int) -> Any:
     values = np.asarray(curve.values, dtype=np.float64)
-    rows = rows_of_steps(values, _MOST) if curve.held else rows_of_curve(values, _MOST)
+    rows = rows_of_steps(values, _MAX_ROWS) if curve.held else rows_of_curve(values, _MAX_ROWS)
     shape = "hv" if curve.held else "linear"
     return go.Scatter(
         x=time[rows].astype(np.float32),
@@ -139,13 +139,13 @@ def _level(value: float, label: str, time: Floats, dash: str) -> Any:
 
 def _phases(phases: Sequence[Phase]) -> list[dict[str, Any]]:
     """Return the phases as the page's script takes them; the longest ones where there are too many to be seen."""
-    longest = sorted(phases, key=lambda phase: phase.begin - phase.end)[:_MOST_PHASES]
+    longest = sorted(phases, key=lambda phase: phase.begin - phase.end)[:_MAX_PHASES]
     return [{"from": p.begin, "to": p.end, "name": p.name} for p in sorted(longest, key=lambda p: p.begin)]
 
 
 _BUDGET = 1_400_000
 """Bytes in the page for all signals, about."""
-_FEWEST, _MAX_EXPLORED = 60, 800
+_MIN_ROWS, _MAX_EXPLORED_ROWS = 60, 800
 """Points of a scalar signal."""
 _A_POINT = 8 * 4 / 3
 """Bytes that a point takes: time and value as float32, in base64."""
@@ -160,17 +160,17 @@ def explorer_section(record: Record) -> Section | None:
     if len(record.time) < 2 or not record.signals:
         return None
     columns = sum(int(np.prod(record[name].shape[1:])) for name in record.signals)
-    most = int(np.clip(_BUDGET / (_A_POINT * columns), _FEWEST, _MAX_EXPLORED))
+    max_rows = int(np.clip(_BUDGET / (_A_POINT * columns), _MIN_ROWS, _MAX_EXPLORED_ROWS))
     time = record.time.astype(np.float32)
     data = {
         "span": [float(time[0]), float(time[-1])],
-        "signals": [_signal(record, name, time, most) for name in record.signals],
+        "signals": [_signal(record, name, time, max_rows) for name in record.signals],
     }
-    html = template("explorer.html").render(data=json_html(data), scalars=columns, rows=len(time), most=most)
+    html = template("explorer.html").render(data=json_html(data), scalars=columns, rows=len(time), max_rows=max_rows)
     return Section(anchor="signals", title="All signals", html=Markup(html), scripts=("explorer.js",))
 
 
-def _signal(record: Record, name: str, time: NDArray[np.float32], most: int) -> dict[str, Any]:
+def _signal(record: Record, name: str, time: NDArray[np.float32], max_rows: int) -> dict[str, Any]:
     values = record[name]
     flat = values.reshape(len(values), -1).astype(np.float64)
     return {
@@ -179,7 +179,7 @@ def _signal(record: Record, name: str, time: NDArray[np.float32], most: int) -> 
         "about": record.description(name),
         "items": record.items(name) or ({0: "false", 1: "true"} if values.dtype == np.bool_ else {}),
         "columns": [
-            {"of": of, **_column(flat[:, k], time, most)} for k, of in enumerate(_subscripts(values.shape[1:]))
+            {"of": of, **_column(flat[:, k], time, max_rows)} for k, of in enumerate(_subscripts(values.shape[1:]))
         ],
     }
 
@@ -189,14 +189,14 @@ def _subscripts(shape: tuple[int, ...]) -> list[str]:
     return [",".join(str(i + 1) for i in index) for index in product(*map(range, shape))]
 
 
-def _column(values: Floats, time: NDArray[np.float32], most: int) -> Mapping[str, Any]:
+def _column(values: Floats, time: NDArray[np.float32], max_rows: int) -> Mapping[str, Any]:
     """Return a scalar signal as the page draws it: one value, steps, or a curve."""
     changes = changes_of(values)
     if len(changes) == 0:
         return {"value": float(values[0]) if np.isfinite(values[0]) else None}
     held = len(changes) < 0.7 * len(values)
-    few = held and len(changes) < most
-    rows = np.union1d(changes, [0, len(values) - 1]) if few else rows_of_curve(values, most)
+    few = held and len(changes) < max_rows
+    rows = np.union1d(changes, [0, len(values) - 1]) if few else rows_of_curve(values, max_rows)
     return {"t": _packed(time[rows]), "y": _packed(values[rows].astype(np.float32)), "held": held}
 
 

@@ -10,33 +10,33 @@ from typing import Any
 
 from handover.cosim.exceptions import one_line
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.results.run_folder import BadRunFolder, told_if_not_written, write_whole
+from handover.scenarios.results.run_folder import InvalidRunFolder, disk_errors_reported, write_whole
 
-_TOLD = ("t", "camera", "role", "width", "height")
+_KEYS = ("t", "camera", "role", "width", "height")
 
 
-def write_pictures(folder: Path, pictures: Sequence[CameraPicture]) -> None:
+def write_picture_files(folder: Path, pictures: Sequence[CameraPicture]) -> None:
     """Write pictures into a folder, in place of those that are in it; without pictures there is no folder.
 
     Raises:
         RecordNotWritten: they cannot be written.
     """
-    with told_if_not_written(folder):
+    with disk_errors_reported(folder):
         if folder.exists():
             shutil.rmtree(folder)
         if not pictures:
             return
         folder.mkdir(parents=True)
-        told: list[dict[str, Any]] = []
+        entries: list[dict[str, Any]] = []
         for number, picture in enumerate(pictures, start=1):
             file = f"{number:02}_{_plain(picture.role)}_{_plain(picture.camera)}.jpg"
             (folder / file).write_bytes(picture.jpeg)
-            facts = {name: getattr(picture, name) for name in _TOLD}
-            told.append({**facts, "file": file, "marks": [asdict(mark) for mark in picture.marks]})
-    write_whole(folder / "pictures.json", json.dumps(told, indent=2, allow_nan=False) + "\n")
+            facts = {name: getattr(picture, name) for name in _KEYS}
+            entries.append({**facts, "file": file, "marks": [asdict(mark) for mark in picture.marks]})
+    write_whole(folder / "pictures.json", json.dumps(entries, indent=2, allow_nan=False) + "\n")
 
 
-def read_pictures(folder: Path) -> list[CameraPicture]:
+def read_picture_files(folder: Path) -> list[CameraPicture]:
     """Return the pictures in a folder, in their order; none where there is no folder of the kind.
 
     Raises:
@@ -46,17 +46,17 @@ def read_pictures(folder: Path) -> list[CameraPicture]:
     if not listed.is_file():
         return []
     try:
-        return [_picture(folder, told) for told in json.loads(listed.read_bytes())]
+        return [_picture(folder, entries) for entries in json.loads(listed.read_bytes())]
     except OSError as e:
-        raise BadRunFolder(folder.parent, f"its picture {e.filename} cannot be read: {e.strerror}") from e
+        raise InvalidRunFolder(folder.parent, f"its picture {e.filename} cannot be read: {e.strerror}") from e
     except (ValueError, TypeError, KeyError) as e:
-        raise BadRunFolder(folder.parent, f"its pictures.json is damaged: {one_line(e)}") from e
+        raise InvalidRunFolder(folder.parent, f"its pictures.json is damaged: {one_line(e)}") from e
 
 
-def _picture(folder: Path, told: dict[str, Any]) -> CameraPicture:
-    marks = tuple(Mark(**mark) for mark in told["marks"])
-    jpeg = (folder / Path(told["file"]).name).read_bytes()
-    return CameraPicture(jpeg=jpeg, marks=marks, **{name: told[name] for name in _TOLD})
+def _picture(folder: Path, entries: dict[str, Any]) -> CameraPicture:
+    marks = tuple(Mark(**mark) for mark in entries["marks"])
+    jpeg = (folder / Path(entries["file"]).name).read_bytes()
+    return CameraPicture(jpeg=jpeg, marks=marks, **{name: entries[name] for name in _KEYS})
 
 
 def _plain(name: str) -> str:

@@ -11,9 +11,9 @@ from handover.cosim.exceptions import one_line
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.summary import MetricData, RunData, Summary, faults_of, unwritten_summary
-from handover.scenarios.results.tables import told_value
+from handover.scenarios.results.tables import format_value
 
 _NEEDED = {"run.json": ("scenario", "parameters"), "summary.json": ("success", "reason", "metrics")}
 
@@ -72,7 +72,7 @@ class RunFacts:
         """Name, value with unit, and description of each parameter."""
         if "told_parameters" in self.run:
             return [(str(row[0]), str(row[1]), str(row[2])) for row in self.run["told_parameters"]]
-        return [(name, told_value(value), "") for name, value in self.run["parameters"].items()]
+        return [(name, format_value(value), "") for name, value in self.run["parameters"].items()]
 
 
 def _check(folder: RunFolder, file: str, content: Mapping[str, Any], declared: type[Any]) -> None:
@@ -81,14 +81,14 @@ def _check(folder: RunFolder, file: str, content: Mapping[str, Any], declared: t
     if isinstance(rows, list) and any(not isinstance(row, list) or len(row) != 3 for row in rows):  # pyright: ignore
         faults.append("'told_parameters' are not rows of three")
     if faults:
-        raise BadRunFolder(folder.path, f"its {file} is damaged: {'; '.join(faults)}")
+        raise InvalidRunFolder(folder.path, f"its {file} is damaged: {'; '.join(faults)}")
 
 
 def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
     for name, metric in metrics.items():
         data = cast(dict[str, Any], metric) if isinstance(metric, dict) else {}
         if not {"value", "unit"} <= data.keys() or faults_of(data, MetricData):
-            raise BadRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")
+            raise InvalidRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")
 
 
 def record_of(folder: RunFolder) -> Record | None:
@@ -103,4 +103,4 @@ def record_of(folder: RunFolder) -> Record | None:
         record = Record(folder.signals)
         return record if len(record.time) > 1 else None
     except (OSError, ValueError, KeyError) as e:  # Arrow's faults are among them
-        raise BadRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
+        raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e

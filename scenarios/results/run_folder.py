@@ -18,7 +18,7 @@ from handover.cosim.record.file_lock import FileLocked, folder_locked, holder_of
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 
 
-class BadRunFolder(ValueError):
+class InvalidRunFolder(ValueError):
     """The output folder cannot be used."""
 
     def __init__(self, path: Path, fault: str) -> None:
@@ -34,9 +34,9 @@ def check_place(path: Path) -> None:
     """
     existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
     if not existing.is_dir():
-        raise BadRunFolder(path, f"{existing} is a file, so no folder can be made in it")
+        raise InvalidRunFolder(path, f"{existing} is a file, so no folder can be made in it")
     if not os.access(existing, os.W_OK | os.X_OK):
-        raise BadRunFolder(path, f"no permission to write to {existing}")
+        raise InvalidRunFolder(path, f"no permission to write to {existing}")
 
 
 class RunFolder:
@@ -52,13 +52,13 @@ class RunFolder:
         self.path = path
         if path.exists():
             if not path.is_dir():
-                raise BadRunFolder(path, "there is a file of that name; name a new or an empty folder")
+                raise InvalidRunFolder(path, "there is a file of that name; name a new or an empty folder")
             if any(path.iterdir()):
-                raise BadRunFolder(path, "it is not empty; name a new or an empty folder")
+                raise InvalidRunFolder(path, "it is not empty; name a new or an empty folder")
         check_place(path)
 
     @classmethod
-    def left_at(cls, path: Path) -> "RunFolder":
+    def of_run(cls, path: Path) -> "RunFolder":
         """Return the folder that a run has left."""
         folder = cls.__new__(cls)
         folder.path = path
@@ -103,7 +103,7 @@ class RunFolder:
         try:
             self.figures.mkdir(parents=True)
         except OSError as e:
-            raise BadRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+            raise InvalidRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
 
     def remove_presentation(self) -> None:
         """Remove page and figures, which tell of less than the run that goes on.
@@ -111,7 +111,7 @@ class RunFolder:
         Raises:
             RecordNotWritten: they cannot be removed.
         """
-        with told_if_not_written(self.report):
+        with disk_errors_reported(self.report):
             self.report.unlink(missing_ok=True)
             shutil.rmtree(self.figures, ignore_errors=True)
             self.figures.mkdir(exist_ok=True)
@@ -134,13 +134,13 @@ class RunFolder:
         """Write `run.json`."""
         _write_json(self.path / "run.json", run)
 
-    def add_to_run(self, **told: Any) -> None:
+    def add_to_run(self, **facts: Any) -> None:
         """Add facts to `run.json`.
 
         Raises:
             BadRunFolder: there is none.
         """
-        _write_json(self.path / "run.json", {**self.read_run(), **told})
+        _write_json(self.path / "run.json", {**self.read_run(), **facts})
 
     def read_run(self) -> dict[str, Any]:
         """Return what `write_run` wrote.
@@ -169,11 +169,11 @@ def read_object(file: Path, missing: str) -> dict[str, Any]:
     try:
         content = json.loads(file.read_bytes())
     except OSError as e:
-        raise BadRunFolder(file.parent, missing) from e
+        raise InvalidRunFolder(file.parent, missing) from e
     except ValueError as e:
-        raise BadRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}") from e
+        raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}") from e
     if not isinstance(content, dict):
-        raise BadRunFolder(file.parent, f"its {file.name} is damaged: it holds no JSON object")
+        raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: it holds no JSON object")
     return cast(dict[str, Any], content)
 
 
@@ -189,14 +189,14 @@ def folder_held(path: Path, by_another: str) -> Generator[None, None, None]:
             held.enter_context(folder_locked(path))
         except FileLocked as e:
             holder = holder_of(path)
-            raise BadRunFolder(path, by_another + (f" (process {holder})" if holder else "")) from e
+            raise InvalidRunFolder(path, by_another + (f" (process {holder})" if holder else "")) from e
         except OSError as e:
-            raise BadRunFolder(path, f"it cannot be opened: {e.strerror}") from e
+            raise InvalidRunFolder(path, f"it cannot be opened: {e.strerror}") from e
         yield
 
 
 @contextlib.contextmanager
-def told_if_not_written(path: Path) -> Generator[None, None, None]:
+def disk_errors_reported(path: Path) -> Generator[None, None, None]:
     """Tell as RecordNotWritten that a file could not be written."""
     try:
         yield
@@ -216,7 +216,7 @@ def write_whole(path: Path, text: str) -> None:
         RecordNotWritten: it cannot be written.
     """
     unfinished = path.with_name(path.name + ".part")
-    with told_if_not_written(path):
+    with disk_errors_reported(path):
         try:
             unfinished.write_text(text, encoding="utf-8")
             os.replace(unfinished, path)

@@ -22,18 +22,18 @@ from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_type
 
 import numpy as np
 
-from handover.cosim.exceptions import CosimError, UnitFailure, UnitRefused, one_line
+from handover.cosim.exceptions import CosimError, InitializationError, UnitFailure, one_line
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.system import Connection, PlacedUnit, System
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment, Metric, Outcome
 from handover.scenarios.results.run_folder import sha256_of, versions
-from handover.scenarios.results.tables import conversions_of, told_value
+from handover.scenarios.results.tables import conversions_of, format_value
 from handover.scenarios.results.task import Task
 
 
-def told_system(system: System, *, adaptive: bool) -> dict[str, Any]:
+def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
     """Return units and connections of a system without faults, as JSON can hold it.
 
     For `adaptive` see `own_period`.
@@ -48,7 +48,7 @@ def told_system(system: System, *, adaptive: bool) -> dict[str, Any]:
         }
         for name, unit in system.units.items()
     ]
-    return {"units": units, "connections": [_told(system, c) for c in system.connections]}
+    return {"units": units, "connections": [_describe_connection(system, c) for c in system.connections]}
 
 
 def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
@@ -56,7 +56,7 @@ def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
     return None if adaptive and not unit.sampled else float(unit.period)
 
 
-def _told(system: System, c: Connection) -> dict[str, Any]:
+def _describe_connection(system: System, c: Connection) -> dict[str, Any]:
     port = system.units[c.source.unit].description.outputs.get(c.source.port)
     if port is None:
         kind, unit, size = "clock", "", 1
@@ -96,9 +96,9 @@ def peak_memory() -> float | None:
 def _iterations(count: IterationCount) -> dict[str, Metric]:
     if not count.steps:
         return {}
-    told = f"mean number of iterations of a step that was iterated, {count.most} at most"
+    text = f"mean number of iterations of a step that was iterated, {count.most} at most"
     return {
-        "iterations": Metric(count.iterations / count.steps, "1", told),
+        "iterations": Metric(count.iterations / count.steps, "1", text),
         "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
     }
 
@@ -152,6 +152,15 @@ class Summary(Configuration, _OfSomeSummaries):
     failure: dict[str, Any] | None
 
 
+@dataclass(frozen=True, kw_only=True)
+class RunResult:
+    """A run after its end. `failure` is set when a unit failed; the record then ends there."""
+
+    outcome: Outcome
+    summary: Summary
+    failure: UnitFailure | None = None
+
+
 class _OfSomeRuns(TypedDict, total=False):
     system: dict[str, Any]
     conversions: list[dict[str, Any]]
@@ -176,16 +185,16 @@ class RunData(Configuration, _OfSomeRuns):
 
 
 @dataclass(frozen=True)
-class Spent:
+class ElapsedTime:
     """Seconds that a run has taken until now, in all its processes."""
 
     wall: float = 0.0
     cpu: float = 0.0
 
-    def clock(self) -> Callable[[], "Spent"]:
+    def clock(self) -> Callable[[], "ElapsedTime"]:
         """Return a function that tells what has been spent since, this included."""
         wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
-        return lambda: Spent(time.perf_counter() - wall, time.process_time() - cpu)
+        return lambda: ElapsedTime(time.perf_counter() - wall, time.process_time() - cpu)
 
 
 def configuration(task: Task) -> Configuration:
@@ -199,7 +208,7 @@ def configuration(task: Task) -> Configuration:
 
 
 def finished_summary(
-    task: Task, outcome: Outcome, master: Master, spent: Spent, failure: UnitFailure | None, complete: bool
+    task: Task, outcome: Outcome, master: Master, spent: ElapsedTime, failure: UnitFailure | None, complete: bool
 ) -> Summary:
     """Return the summary of a run that came to its end, its failure or its interruption."""
     metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
@@ -225,7 +234,7 @@ def crash_facts(task: Task, master: Master) -> dict[str, Any]:
 
 def crashed_summary(
     configuration: Configuration, units: Sequence[tuple[str, str, str]], reason: str, failure: dict[str, Any],
-    simulated: float, spent: Spent,
+    simulated: float, spent: ElapsedTime,
 ) -> Summary:  # fmt: skip
     """Return the summary of a run whose process ended in it after so many simulated seconds."""
     return Summary(
@@ -235,7 +244,7 @@ def crashed_summary(
     )  # fmt: skip
 
 
-def refused_summary(task: Task, refusal: CosimError, spent: Spent) -> Summary:
+def refused_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> Summary:
     """Return the summary of a run that could not begin."""
     reason = failure_reason(refusal) if isinstance(refusal, UnitFailure) else one_line(refusal)
     return Summary(
@@ -253,7 +262,7 @@ def unwritten_summary(run: Mapping[str, Any]) -> dict[str, Any]:
 
 def begun_run(task: Task, master: Master) -> RunData:
     """Return `run.json` of a run that begins."""
-    system = told_system(master.system, adaptive=master.steps is not None)
+    system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
     return _run(task, fmus, {"system": system, "conversions": conversions_of(master.system)})
 
@@ -283,7 +292,7 @@ def parameter_rows(task: Task) -> list[list[str]]:
     """Return name, value with unit, and description of each parameter."""
     rows: list[list[str]] = []
     for v in task.experiment.parameters():
-        value = told_value(_plain(getattr(task.parameters, v.name)))
+        value = format_value(_plain(getattr(task.parameters, v.name)))
         rows.append([v.name, f"{value} {unit_symbol(v.unit.symbol)}".rstrip(), v.description])
     return rows
 
@@ -321,7 +330,7 @@ def _units(master: Master) -> list[UnitData]:
 
 
 def _refusal_data(refusal: CosimError) -> dict[str, Any]:
-    if isinstance(refusal, UnitRefused):
+    if isinstance(refusal, InitializationError):
         return refusal.failure.as_data()
     if isinstance(refusal, UnitFailure):
         return refusal.as_data()

@@ -12,9 +12,9 @@ from typing import Any
 
 from handover.cosim.master.pacing import PaceReport
 from handover.cosim.stepping.options import Algorithm
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import System
-from handover.scenarios.experiment.display_unit import shown_unit
+from handover.scenarios.experiment.display_unit import display_unit
 
 
 def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -47,15 +47,15 @@ def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _steps(steps: Mapping[str, Any]) -> str:
-    told = f"{steps['accepted']} accepted, {steps['rejected']} rejected"
+    text = f"{steps['accepted']} accepted, {steps['rejected']} rejected"
     if not steps["accepted"]:
-        return told
-    return f"{told}, {steps['shortest'] * 1000:.3g} to {steps['longest'] * 1000:.3g} ms"
+        return text
+    return f"{text}, {steps['shortest'] * 1000:.3g} to {steps['longest'] * 1000:.3g} ms"
 
 
 def conversions_of(system: System) -> list[dict[str, Any]]:
     """Return, as JSON can hold it, the connections that change values: both ends with their units, and how."""
-    told: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     for c in system.connections:
         change = system.change_by(c)
         if change is not None:
@@ -63,29 +63,29 @@ def conversions_of(system: System) -> list[dict[str, Any]]:
             target = system.units[c.target.unit].description.inputs[c.target.port]
             ends = {"source": str(c.source), "unit": str(source.unit)}
             ends |= {"target": str(c.target), "target_unit": str(target.unit)}
-            told.append({**ends, "factor": change.factor, "offset": change.offset})
-    return told
+            entries.append({**ends, "factor": change.factor, "offset": change.offset})
+    return entries
 
 
-def told_conversion(conversion: Mapping[str, Any]) -> tuple[str, str]:
+def format_conversion(conversion: Mapping[str, Any]) -> tuple[str, str]:
     """Return a conversion as one reads it: from where to where, and how."""
     source = _with_unit(conversion["source"], conversion["unit"])
     target = _with_unit(conversion["target"], conversion["target_unit"])
-    return f"{source} -> {target}", str(Linear(conversion["factor"], conversion["offset"]))
+    return f"{source} -> {target}", str(LinearTransformation(conversion["factor"], conversion["offset"]))
 
 
 def _with_unit(port: str, unit: str) -> str:
     return f"{port} ({unit})" if unit else port
 
 
-def told_value(value: Any) -> str:
+def format_value(value: Any) -> str:
     """Return a number to six digits, true or false, and else the text of a value."""
     if isinstance(value, float):
         return f"{value:g}"
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def told(metric: Mapping[str, Any]) -> str:
+def format_metric(metric: Mapping[str, Any]) -> str:
     """Write a metric, as `summary.json` has it, in the unit in which pages show such a value."""
     value, unit = metric["value"], metric["unit"]
-    return "undefined" if value is None else shown_unit(unit, value).text(value)
+    return "undefined" if value is None else display_unit(unit, value).text(value)

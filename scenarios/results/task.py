@@ -1,7 +1,4 @@
-"""What is to be run.
-
-How a run ended.
-"""
+"""What is to be run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,11 +6,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import UnitFailure
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.experiment.experiment import Experiment, Outcome
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.summary import Summary
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,12 +36,3 @@ class Task:
     source: Mapping[str, Any] = field(default_factory=dict[str, Any])
     options: MasterOptions = field(default_factory=MasterOptions)
     presented: bool = True
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ended:
-    """A run after its end. `failure` is set when a unit failed; the record then ends there."""
-
-    outcome: Outcome
-    summary: Summary
-    failure: UnitFailure | None = None

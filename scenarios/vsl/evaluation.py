@@ -11,7 +11,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.experiment import Metric, Outcome, Watch
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.vsl.parameters import Parameters
 
 
@@ -78,7 +78,7 @@ _REACH_SPAN = 0.01
 """Paths that reach equally far throughout, to this many metres, have no near and far part (assumed)."""
 
 
-class PathWatch(Watch):
+class PathEvaluator(Evaluator):
     """Follows one run along a path and tells how far the tip was from it.
 
     A point counts at the instant when the planner goes on to the next one: until then the arm had time to get there.

@@ -15,17 +15,17 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.vsl.evaluation import PathWatch
+from handover.scenarios.vsl.evaluation import PathEvaluator
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
 _MORE = 5
 """Time after which a path that should have been completed is given up, s (assumed)."""
 
 
-class PathExperiment(Experiment[PathWatch]):
+class PathExperiment(Experiment[PathEvaluator]):
     """The tip is to follow a path; servos, pressures and currents are measured, the tip is not."""
 
     units: ClassVar[Mapping[str, str]] = {
@@ -62,7 +62,7 @@ class PathExperiment(Experiment[PathWatch]):
         """
         p = parameters
         if faults := p.path_faults():
-            raise BadParameter(faults)
+            raise InvalidParameter(faults)
         arm_seed = int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1)
         s = System()
         planner = s.add(
@@ -107,19 +107,19 @@ class PathExperiment(Experiment[PathWatch]):
         """Return the time that the path takes, with what precedes it, and some more."""
         return Fraction(round(parameters.settle + parameters.length / parameters.speed)) + _MORE
 
-    def watch(self, parameters: Parameters) -> PathWatch:
+    def evaluator(self, parameters: Parameters) -> PathEvaluator:
         """Return the judge of one run along the path."""
-        return PathWatch(parameters, hybrid=self.hybrid)
+        return PathEvaluator(parameters, hybrid=self.hybrid)
 
     def cycle(self) -> tuple[str, ...]:
         """Return the robot's own computing: planning and kinematics."""
         return ("planner", "kinematics")
 
-    def draw(self, parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
+    def draw(self, parameters: Parameters, evaluator: PathEvaluator, record: Record, folder: Path) -> list[Figure]:
         """Draw the path, the arm's shape at three moments, and errors."""
         from handover.scenarios.vsl.plots import draw_path_run  # what draws takes long to load
 
-        return draw_path_run(parameters, watch, record, folder)
+        return draw_path_run(parameters, evaluator, record, folder)
 
     def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
         """Return error and place of the tip, joints, pressures and currents over time."""

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import figure
 from handover.scenarios.experiment.time_plot import (
     COLOURS,
     Curve,
@@ -24,7 +24,7 @@ from handover.scenarios.experiment.time_plot import (
     TimePlot,
     phases_of,
 )
-from handover.scenarios.vsl.evaluation import PathWatch, distance
+from handover.scenarios.vsl.evaluation import PathEvaluator, distance
 from handover.scenarios.vsl.parameters import Parameters
 
 SERVOS, TIP = "tip by the servos, links taken as rigid", "tip by the tracker"
@@ -139,64 +139,64 @@ _APART = 0.01
 """Points nearer to each other than this are shown once, m (assumed)."""
 
 
-def draw_path_run(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> list[Figure]:
+def draw_path_run(parameters: Parameters, evaluator: PathEvaluator, record: Record, folder: Path) -> list[Figure]:
     """Draw a run's path and what it was like into a folder; nothing of a run that did not come to a point of it."""
-    if not watch.points:
+    if not evaluator.points:
         return []
-    return [_path(watch, folder), _shapes(parameters, watch, record, folder), _errors(watch, folder)]
+    return [_path(evaluator, folder), _shapes(parameters, evaluator, record, folder), _errors(evaluator, folder)]
 
 
-def _path(watch: PathWatch, folder: Path) -> Figure:
-    points = watch.points
+def _path(evaluator: PathEvaluator, folder: Path) -> Figure:
+    points = evaluator.points
     lines: list[tuple[Sequence[Floats], dict[str, Any]]] = [
-        (list(watch.path), {"color": DESIRED_COLOUR, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
+        (list(evaluator.path), {"color": DESIRED_COLOUR, "lw": 3.0, "alpha": 0.35, "label": "desired"}),
         (
             [p.servo for p in points],
             {"color": SERVO_COLOUR, "ls": "--", "lw": 1.3, "label": SERVOS},
         ),
         ([p.tracked for p in points], {"color": TIP_COLOUR, "lw": 1.3, "label": TIP}),
     ]
-    if watch.hybrid:
+    if evaluator.hybrid:
         label = "tip by the hybrid forward model"
         lines.append(([p.estimated for p in points], {"color": ESTIMATE_COLOUR, "ls": ":", "lw": 1.8, "label": label}))
-    places = [_in_plane(np.array(positions), watch) for positions, _ in lines]
+    places = [_in_plane(np.array(positions), evaluator) for positions, _ in lines]
     xlim, zlim = _limits(np.hstack([np.array(place) for place in places]))
     size = (6.4, min(1.5 + 5.6 * (zlim[1] - zlim[0]) / (xlim[1] - xlim[0]), 7.6))
     with figure(folder / "path", 1, size=size) as (axes,):
         for place, (_, style) in zip(places, lines, strict=True):
             axes.plot(*place, **style)
-        axes.plot(*_in_plane(watch.path[:1], watch), "o", ms=6, color=DESIRED_COLOUR, label="start")
-        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal", xlim=xlim, ylim=zlim)
+        axes.plot(*_in_plane(evaluator.path[:1], evaluator), "o", ms=6, color=DESIRED_COLOUR, label="start")
+        axes.set(xlabel=_horizontal(evaluator), ylabel="z in W (mm)", aspect="equal", xlim=xlim, ylim=zlim)
         axes.figure.legend(ncols=2, loc="outside lower center")
     return Figure("path", "The path: desired, by the servos' encoders, and of the tip. Equal scales.")
 
 
-def _shapes(parameters: Parameters, watch: PathWatch, record: Record, folder: Path) -> Figure:
+def _shapes(parameters: Parameters, evaluator: PathEvaluator, record: Record, folder: Path) -> Figure:
     shapes = record["arm.shape"]
     with figure(folder / "shape", 1, size=(8.0, 5.2)) as (axes,):
-        axes.plot(*_in_plane(watch.path, watch), color=DESIRED_COLOUR, lw=3.0, alpha=0.35, label="desired path")
-        for k, (role, t) in enumerate(_moments(watch).items()):
-            arm_x, arm_z = _along_tip(shapes[np.searchsorted(record.time, t - 1e-9)], watch)
+        axes.plot(*_in_plane(evaluator.path, evaluator), color=DESIRED_COLOUR, lw=3.0, alpha=0.35, label="desired path")
+        for k, (role, t) in enumerate(_moments(evaluator).items()):
+            arm_x, arm_z = _along_tip(shapes[np.searchsorted(record.time, t - 1e-9)], evaluator)
             axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
             if parameters.load > 0.0:
                 axes.plot(arm_x[-1], arm_z[-1] - 8.0, "s", ms=9, color=COLOURS[k])
         if parameters.load > 0.0:
             axes.plot([], [], "s", ms=9, color="#9aa3af", label=f"load, {parameters.load * 1000:.0f} g")
         axes.axhspan(-30.0, 0.0, color="#d8dde4", lw=0, zorder=0)
-        axes.set(xlabel=_horizontal(watch), ylabel="z in W (mm)", aspect="equal")
+        axes.set(xlabel=_horizontal(evaluator), ylabel="z in W (mm)", aspect="equal")
         axes.figure.legend(ncols=5, loc="outside lower center", columnspacing=1.2, handlelength=1.6)
     load = f" with its load of {parameters.load * 1000:.0f} g (squares)" if parameters.load > 0.0 else ""
     return Figure("shape", f"Centre line of the arm{load} at three moments, above the ground. Equal scales.")
 
 
-def _errors(watch: PathWatch, folder: Path) -> Figure:
+def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
     groups = {
-        "tip by servos,\nto desired": [distance(p.servo, p.desired) for p in watch.points],
-        "tip by tracker,\nto desired": [p.error for p in watch.points],
-        "tip by servos,\nto true tip": [distance(p.servo, p.true) for p in watch.points],
+        "tip by servos,\nto desired": [distance(p.servo, p.desired) for p in evaluator.points],
+        "tip by tracker,\nto desired": [p.error for p in evaluator.points],
+        "tip by servos,\nto true tip": [distance(p.servo, p.true) for p in evaluator.points],
     }
-    if watch.hybrid:
-        groups["hybrid model,\nto true tip"] = [distance(p.estimated, p.true) for p in watch.points]
+    if evaluator.hybrid:
+        groups["hybrid model,\nto true tip"] = [distance(p.estimated, p.true) for p in evaluator.points]
     colours = (SERVO_COLOUR, TIP_COLOUR, COLOURS[4], ESTIMATE_COLOUR)
     with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
         for k, (values, colour) in enumerate(zip(groups.values(), colours, strict=False)):
@@ -204,8 +204,8 @@ def _errors(watch: PathWatch, folder: Path) -> Figure:
         boxes.set_xticks(range(len(groups)), list(groups), fontsize="small")
         boxes.set(ylabel="error (mm)", ylim=(0.0, None))
         boxes.grid(visible=False, axis="x")
-        where, label = _spread(watch)
-        reach.plot(where, [p.error * 1000 for p in watch.points], ".", color=TIP_COLOUR)
+        where, label = _spread(evaluator)
+        reach.plot(where, [p.error * 1000 for p in evaluator.points], ".", color=TIP_COLOUR)
         reach.set(xlabel=label, ylabel="error of the tip (mm)", ylim=(0.0, None))
     caption = (
         "Left: 25th to 75th percentile (box), range, median (line) and mean (dot), of distances of the tip by the "
@@ -215,18 +215,20 @@ def _errors(watch: PathWatch, folder: Path) -> Figure:
     return Figure("errors", caption)
 
 
-def _moments(watch: PathWatch) -> dict[str, float]:
+def _moments(evaluator: PathEvaluator) -> dict[str, float]:
     """Return three moments by what they are; on a path that reaches farthest at an end, the second is half way."""
-    first, last = watch.points[0], watch.points[-1]
-    role, second = "farthest reach", max(watch.points, key=lambda p: p.reach)
+    first, last = evaluator.points[0], evaluator.points[-1]
+    role, second = "farthest reach", max(evaluator.points, key=lambda p: p.reach)
     if min(distance(second.desired, end.desired) for end in (first, last)) < _APART:
-        role, second = "half way", watch.points[len(watch.points) // 2]
+        role, second = "half way", evaluator.points[len(evaluator.points) // 2]
     return {"start": first.t, role: second.t, "end": last.t}
 
 
-def _spread(watch: PathWatch) -> tuple[Floats, str]:
+def _spread(evaluator: PathEvaluator) -> tuple[Floats, str]:
     """Return the points' reach, mm, and what it is; their height for a path that reaches equally far throughout."""
-    r, z = (1000 * np.array(values) for values in zip(*((p.reach, p.desired[2]) for p in watch.points), strict=True))
+    r, z = (
+        1000 * np.array(values) for values in zip(*((p.reach, p.desired[2]) for p in evaluator.points), strict=True)
+    )
     return (z, "z in W (mm)") if np.ptp(r) < 1000 * _APART else (r, _DISTANCE)
 
 
@@ -253,21 +255,21 @@ def _draw_box(axes: Axes, x: float, values: Floats, colour: str) -> None:
     axes.plot(x, np.mean(values), "o", ms=4, color=colour)
 
 
-def _in_plane(positions: Floats, watch: PathWatch) -> tuple[Floats, Floats]:
+def _in_plane(positions: Floats, evaluator: PathEvaluator) -> tuple[Floats, Floats]:
     """Return x of a path in the plane XZ, else the distance from the first joint's axis, and the height, mm."""
     mm = positions * 1000
-    return (mm[:, 0] if _flat(watch) else np.hypot(mm[:, 0], mm[:, 1])), mm[:, 2]
+    return (mm[:, 0] if _flat(evaluator) else np.hypot(mm[:, 0], mm[:, 1])), mm[:, 2]
 
 
-def _along_tip(shape: Floats, watch: PathWatch) -> tuple[Floats, Floats]:
+def _along_tip(shape: Floats, evaluator: PathEvaluator) -> tuple[Floats, Floats]:
     """Return the same of the arm; off the plane XZ what points away from its tip is negative."""
     mm, tip = shape * 1000, shape[-1, :2]
-    return (mm[:, 0] if _flat(watch) else mm[:, :2] @ (tip / np.linalg.norm(tip))), mm[:, 2]
+    return (mm[:, 0] if _flat(evaluator) else mm[:, :2] @ (tip / np.linalg.norm(tip))), mm[:, 2]
 
 
-def _flat(watch: PathWatch) -> bool:
-    return bool(np.all(np.abs(watch.path[:, 1]) < 1e-6))
+def _flat(evaluator: PathEvaluator) -> bool:
+    return bool(np.all(np.abs(evaluator.path[:, 1]) < 1e-6))
 
 
-def _horizontal(watch: PathWatch) -> str:
-    return "x in W (mm)" if _flat(watch) else _DISTANCE
+def _horizontal(evaluator: PathEvaluator) -> str:
+    return "x in W (mm)" if _flat(evaluator) else _DISTANCE

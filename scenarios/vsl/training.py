@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.vsl.fit import Fit, fit_cubic
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.controllers.vsl.learned_model import FORWARD_INPUTS, VslModel, inputs_of, turned
+from handover.controllers.vsl.learned_model import FORWARD_INPUTS, VslModel, inputs_of, rotate_about_z
 from handover.controllers.vsl.model_text import model_text
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
@@ -23,10 +23,10 @@ from handover.scenarios.vsl.training_data import STRETCH, Dataset, collect, desc
 SPLIT = (0.70, 0.15, 0.15)
 """Shares of training, validation and test points. [Gandarias2020] sec. IV-B"""
 
-FEWEST = 400
+MIN_POINTS = 400
 """Points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
 
-_LEAST_VARIATION = 1e-9
+_MIN_VARIATION = 1e-9
 """Share of its size by which an input must vary to be learned from; less is rounding."""
 
 _MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
@@ -81,7 +81,7 @@ class VslTraining:
     points: int
     seed: int
 
-    def carry_out(self, progress: Callable[[float, float], None]) -> tuple[VslModel, Errors]:
+    def train(self, progress: Callable[[float, float], None]) -> tuple[VslModel, Errors]:
         """Return the model, whose provenance has no date or path, and its errors.
 
         Raises:
@@ -99,7 +99,7 @@ class VslTraining:
         forward = fit_cubic(*self.forward_pairs(training), *self.forward_pairs(validation))
         model = VslModel(inverse.cubic, forward.cubic, self.kinematics, {})
         errors = self.errors(model, test)
-        told: dict[str, Any] = {
+        facts: dict[str, Any] = {
             "arm": {
                 "fmu": d.name,
                 "key": content_key(self.fmu),
@@ -112,12 +112,12 @@ class VslTraining:
                 "validation": len(validation),
                 "test": len(test),
             },
-            "inverse": _told(inverse, "rad"),
-            "forward": _told(forward, "m"),
+            "inverse": _fit_facts(inverse, "rad"),
+            "forward": _fit_facts(forward, "m"),
             "mean_test_errors_m": {k: float(f"{v:.4g}") for k, v in vars(errors).items()},
             "versions": {"python": platform.python_version(), "numpy": np.__version__},
         }
-        return VslModel(inverse.cubic, forward.cubic, self.kinematics, told), errors
+        return VslModel(inverse.cubic, forward.cubic, self.kinematics, facts), errors
 
     def inverse_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
         """Return inputs, the rigid angles of the measured tips first, and commanded minus rigid angles, rad.
@@ -130,7 +130,9 @@ class VslTraining:
     def forward_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
         """Return inputs, the measured angles first, and measured minus rigid tips in the arm's plane, m."""
         rigid = np.array([self.kinematics.forward(q) for q in data.q])
-        residuals = [turned(r, -theta_1) for r, theta_1 in zip(data.p_WG - rigid, data.q[:, 0].tolist(), strict=True)]
+        residuals = [
+            rotate_about_z(r, -theta_1) for r, theta_1 in zip(data.p_WG - rigid, data.q[:, 0].tolist(), strict=True)
+        ]
         return inputs_of(data.q, data.p, data.i), np.array(residuals)
 
     def errors(self, model: VslModel, test: Dataset) -> Errors:
@@ -160,7 +162,7 @@ class VslTraining:
                 f"shoulder {k.L_1:g} m high can be; half of them should be",
             )
         x = inputs_of(usable.q, usable.p, usable.i)
-        still = np.ptp(x, axis=0) <= _LEAST_VARIATION * np.max(np.abs(x), axis=0)
+        still = np.ptp(x, axis=0) <= _MIN_VARIATION * np.max(np.abs(x), axis=0)
         if np.any(still):
             names = ", ".join(name for name, s in zip(FORWARD_INPUTS, still, strict=True) if s)
             raise NothingToLearn(self.fmu, f"the same at all points, whatever is commanded: {names}")
@@ -200,12 +202,12 @@ def file_text(model: VslModel, path: Path) -> str:
     text = model_text(model)
     if path.suffix != ".py":
         return text
-    told = model.provenance
+    facts = model.provenance
     elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
-    return _MODULE.format(points=told["points"]["measured"], seed=told["seed"], elbow=elbow, text=text)
+    return _MODULE.format(points=facts["points"]["measured"], seed=facts["seed"], elbow=elbow, text=text)
 
 
-def _told(fit: Fit, unit: str) -> dict[str, float]:
+def _fit_facts(fit: Fit, unit: str) -> dict[str, float]:
     return {"penalty": fit.penalty, f"validation_rms_{unit}": float(f"{fit.validation_rms:.4g}")}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import InvalidFmu, UnitFailure, UnitRefused
+from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
 from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.instance import Instance
@@ -149,7 +149,7 @@ def _start(arm: Instance, parameters: Mapping[str, Any]) -> None:
         arm.enter_initialization(0.0, None)
         arm.exit_initialization()
     except UnitFailure as e:
-        raise UnitRefused(e) from e
+        raise InitializationError(e) from e
 
 
 def _settled(arm: Instance, before: int) -> Floats:

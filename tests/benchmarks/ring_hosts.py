@@ -20,7 +20,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 
 STEPS, WARMING = 10_000, 500
-LEAST_REPEATS, MOST_REPEATS, ENOUGH = 3, 40, 0.5
+MIN_REPEATS, MAX_REPEATS, ENOUGH = 3, 40, 0.5
 """A host is measured again until that has taken enough seconds of CPU: what takes milliseconds is easily disturbed."""
 H = Fraction(1, 128)
 REFERENCE_U, REFERENCE_Y = 1, 2
@@ -223,7 +223,7 @@ def measured(host: Host, n: int, fmu: Path) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         with host(n, fmu, Path(folder)) as ring:
             ring.advance(WARMING)
-            while len(spent) < LEAST_REPEATS or (len(spent) < MOST_REPEATS and sum(spent) < ENOUGH):
+            while len(spent) < MIN_REPEATS or (len(spent) < MAX_REPEATS and sum(spent) < ENOUGH):
                 began = time.process_time()
                 ring.advance(STEPS)
                 spent.append(time.process_time() - began)

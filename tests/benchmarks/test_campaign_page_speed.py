@@ -28,8 +28,8 @@ FEW, MANY = 300, 3000
 
 def campaign(path: Path, points: int) -> CampaignFolder:
     """Return a paired campaign of two varied parameters, a run a point."""
-    told = [{"forward": f"{0.0001 * (k // 3):.4f}", "strategy": STRATEGIES[k % 3]} for k in range(points)]
-    plan = CampaignPlan(scenario="ir_grasp", points=told, paired=True)
+    entries = [{"forward": f"{0.0001 * (k // 3):.4f}", "strategy": STRATEGIES[k % 3]} for k in range(points)]
+    plan = CampaignPlan(scenario="ir_grasp", points=entries, paired=True)
     rows = [
         RunRow(
             run=run,
@@ -41,7 +41,7 @@ def campaign(path: Path, points: int) -> CampaignFolder:
         for run in plan.runs()
     ]
     path.mkdir()
-    data: dict[str, Any] = {"scenario": plan.scenario, "points": told, "fixed": {}, "repetitions": 1, "seed": 0}
+    data: dict[str, Any] = {"scenario": plan.scenario, "points": entries, "fixed": {}, "repetitions": 1, "seed": 0}
     (path / "campaign.json").write_text(json.dumps({**data, "paired": True}), encoding="utf-8")
     pq.write_table(table_of(plan, rows), path / "runs.parquet")
     return CampaignFolder(path)

@@ -20,8 +20,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
-from handover.scenarios.campaign.local_cluster import embedded_crew
-from handover.scenarios.campaign.worker_pool import Crew, RunOrder
+from handover.scenarios.campaign.local_cluster import local_cluster
+from handover.scenarios.campaign.worker_pool import RunJob, WorkerPool
 from handover.scenarios.catalog import SCENARIOS
 
 pytestmark = pytest.mark.slow
@@ -35,12 +35,12 @@ FASTER = 1.8
 """How many times as fast two workers are at least as one."""
 
 
-def orders(runs: Path, count: int) -> Sequence[RunOrder]:
+def jobs(runs: Path, count: int) -> Sequence[RunJob]:
     """Return orders of short runs into a folder of their own."""
     runs.mkdir(parents=True)
     fmus = {unit: str(cached(block, 3)) for unit, block in SCENARIOS["helix_handover"].units.items()}
     return [
-        RunOrder(
+        RunJob(
             name=f"run_{i}",
             scenario="helix_handover",
             parameters=("patience=1",),
@@ -53,12 +53,12 @@ def orders(runs: Path, count: int) -> Sequence[RunOrder]:
     ]
 
 
-def carried_out(crew: Crew, given: Sequence[RunOrder]) -> tuple[float, float]:
+def carried_out(pool: WorkerPool, given: Sequence[RunJob]) -> tuple[float, float]:
     """Return the seconds that a crew takes for orders, and the runs' own seconds in all."""
     began = time.perf_counter()
-    answers = list(crew.carry_out(given))
+    results = list(pool.run_jobs(given))
     took = time.perf_counter() - began
-    assert [answer.lost for answer in answers] == [""] * len(given)
+    assert [result.lost for result in results] == [""] * len(given)
     summaries = [json.loads(Path(order.runs, order.name, "summary.json").read_text()) for order in given]
     return took, sum(summary["wall_seconds"] for summary in summaries)
 
@@ -67,15 +67,15 @@ def test_a_campaign_costs_little_beside_its_runs(benchmark: BenchmarkFixture, tm
     relative: list[float] = []
 
     def measure() -> None:
-        took, spent = carried_out(crew, orders(tmp_path / f"{len(relative)}", RUNS if benchmark.enabled else 2))
+        took, spent = carried_out(pool, jobs(tmp_path / f"{len(relative)}", RUNS if benchmark.enabled else 2))
         relative.append((took - spent) / spent)
-        told.append(f"{took:.2f} s, of which the runs {spent:.2f} s")
+        entries.append(f"{took:.2f} s, of which the runs {spent:.2f} s")
 
-    told: list[str] = []
-    with embedded_crew(1) as crew:
-        carried_out(crew, orders(tmp_path / "first", 1))
+    entries: list[str] = []
+    with local_cluster(1) as pool:
+        carried_out(pool, jobs(tmp_path / "first", 1))
         benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
-    print(f"\n{RUNS} runs on one worker: {'; '.join(told)}; overhead {min(relative):.1%}")
+    print(f"\n{RUNS} runs on one worker: {'; '.join(entries)}; overhead {min(relative):.1%}")
     benchmark.extra_info["overhead"] = min(relative)
     if benchmark.enabled:  # else other tests run beside it
         assert min(relative) <= OVERHEAD
@@ -90,18 +90,18 @@ def processor_time(process: psutil.Process) -> float:
 
 def test_a_campaign_takes_little_of_the_processor_beside_its_runs(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     """What Dask, forks and pipes take also while they wait, which a busy machine does not change."""
-    given = orders(tmp_path / "counted", RUNS if benchmark.enabled else 3)
+    given = jobs(tmp_path / "counted", RUNS if benchmark.enabled else 3)
 
     took = 0.0
 
     def measure() -> None:
         nonlocal took
         before = processor_time(psutil.Process())
-        carried_out(crew, given)
+        carried_out(pool, given)
         took = processor_time(psutil.Process()) - before
 
-    with embedded_crew(1) as crew:
-        carried_out(crew, orders(tmp_path / "first", 1))
+    with local_cluster(1) as pool:
+        carried_out(pool, jobs(tmp_path / "first", 1))
         benchmark.pedantic(measure, rounds=1)
     summaries = [json.loads(Path(order.runs, order.name, "summary.json").read_text()) for order in given]
     spent = sum(summary["cpu_seconds"] for summary in summaries)
@@ -116,15 +116,15 @@ def test_two_workers_are_nearly_twice_as_fast_as_one(benchmark: BenchmarkFixture
 
     def measure() -> None:
         for workers, seconds in took.items():
-            with embedded_crew(workers) as crew:
-                carried_out(crew, orders(tmp_path / f"first_{workers}_{len(seconds)}", workers))
-                given = orders(tmp_path / f"{workers}_{len(seconds)}", RUNS if benchmark.enabled else 2)
-                seconds.append(carried_out(crew, given)[0])
+            with local_cluster(workers) as pool:
+                carried_out(pool, jobs(tmp_path / f"first_{workers}_{len(seconds)}", workers))
+                given = jobs(tmp_path / f"{workers}_{len(seconds)}", RUNS if benchmark.enabled else 2)
+                seconds.append(carried_out(pool, given)[0])
 
     benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
     faster = min(took[1]) / min(took[2])
-    told = ", ".join(f"{workers} workers {min(seconds):.2f} s" for workers, seconds in took.items())
-    print(f"\n{RUNS} runs: {told}; {faster:.2f} times as fast")
+    entries = ", ".join(f"{workers} workers {min(seconds):.2f} s" for workers, seconds in took.items())
+    print(f"\n{RUNS} runs: {entries}; {faster:.2f} times as fast")
     benchmark.extra_info["faster"] = faster
     if benchmark.enabled:
         assert faster >= FASTER

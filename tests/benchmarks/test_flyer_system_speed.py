@@ -35,12 +35,12 @@ class Clock:
 def pace(experiment: Experiment[Any]) -> tuple[float, float]:
     """Simulated seconds a second of CPU of a run, and the units' share of the CPU time."""
     p, clock = experiment.parameters_type(), Clock()
-    watch = experiment.watch(p)
+    evaluator = experiment.evaluator(p)
     system = experiment.build(p, SEED, lambda unit: cached(experiment.units[unit], 3))
     with Master(system, MasterOptions(cpu_times=True)) as master:
-        master.run(experiment.stop_time(p), [watch, clock], until=lambda: watch.over)
+        master.run(experiment.stop_time(p), [evaluator, clock], until=lambda: evaluator.over)
         spent = time.process_time() - clock.begin
-    assert watch.over
+    assert evaluator.over
     return clock.t / spent, sum(sum(cpu) for cpu in master.cpu.values()) / spent
 
 

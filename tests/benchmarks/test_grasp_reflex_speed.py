@@ -38,11 +38,11 @@ def fmu(unit: str) -> Path:
 def pace(thing: Thing) -> float:
     """Simulated seconds a second of CPU of one grasp, which must succeed; its judge is part of the time."""
     p, experiment, clock = Parameters(thing=thing), IrGrasp(), Clock()
-    watch = experiment.watch(p)
+    evaluator = experiment.evaluator(p)
     with Master(experiment.build(p, SEED, fmu)) as master:
-        master.run(experiment.stop_time(p), [watch, clock], until=lambda: watch.over)
+        master.run(experiment.stop_time(p), [evaluator, clock], until=lambda: evaluator.over)
         spent = time.process_time() - clock.begin
-    assert watch.outcome().success
+    assert evaluator.outcome().success
     return clock.t / spent
 
 

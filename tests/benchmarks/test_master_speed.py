@@ -83,8 +83,8 @@ def test_memory_of_a_long_record(
         grown.update({n: script("record_memory.py", environment, fmu, n) for n in (10**7, 3 * 10**7)})
 
     benchmark.pedantic(measure)
-    told = ", ".join(f"{megabytes:.0f} MB for {n:.0e} values" for n, megabytes in grown.items())
-    print(f"\nrecording, the peak of resident memory grew by {told}")
+    line = ", ".join(f"{megabytes:.0f} MB for {n:.0e} values" for n, megabytes in grown.items())
+    print(f"\nrecording, the peak of resident memory grew by {line}")
     benchmark.extra_info.update({f"{n:.0e} values": megabytes for n, megabytes in grown.items()})
     assert grown[3 * 10**7] < 100.0
 
@@ -115,7 +115,7 @@ def test_wiring(benchmark: BenchmarkFixture, native_fmu: NativeFmu, fmi: int) ->
     runs: list[dict[str, float]] = []
     benchmark.pedantic(lambda: runs.append(wiring(native_fmu("hub", fmi))), rounds=3)
     spent = min(runs, key=lambda run: sum(run.values()))
-    told = ", ".join(f"{what} {seconds:.2f}" for what, seconds in spent.items())
-    print(f"\n1,000 units, 5,000 connections, FMI {fmi}, s of CPU: {told}")
+    line = ", ".join(f"{what} {seconds:.2f}" for what, seconds in spent.items())
+    print(f"\n1,000 units, 5,000 connections, FMI {fmi}, s of CPU: {line}")
     benchmark.extra_info.update(spent)
     assert sum(spent.values()) < WIRING

@@ -1,11 +1,11 @@
-"""The controllers' own rotations against those of `handover.cosim.blocks.plain_rotation`, which the last bit apart are the same."""
+"""The controllers' own rotations against those of `handover.cosim.blocks.plain_rotation`: the same but for rounding."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from handover.controllers.free_flyer.rotations import (
-    UnusableOrientation,
+    InvalidOrientation,
     from_rotation_vector,
     rotation_matrix,
     unit_quaternion,
@@ -29,5 +29,5 @@ def test_quaternion_is_that_of_the_rotation_vector(angle: float):
 
 def test_quaternion_of_another_length_becomes_unit():
     assert unit_quaternion(np.array([0.0, 0.0, -2.0, 0.0]), "block", "q") == (0.0, 0.0, -1.0, 0.0)
-    with pytest.raises(UnusableOrientation, match=r"block: q = \[0.0, 0.0, 0.0, 0.0\] must be finite and not zero"):
+    with pytest.raises(InvalidOrientation, match=r"block: q = \[0.0, 0.0, 0.0, 0.0\] must be finite and not zero"):
         unit_quaternion(np.zeros(4), "block", "q")

@@ -13,9 +13,9 @@ from handover.controllers.free_flyer.handover_state_machine import (
     HandoverStateMachine,
     HandoverTask,
     Inputs,
+    InvalidHandoverParameters,
     Outputs,
     Params,
-    UnusableHandover,
 )
 from handover.controllers.free_flyer.ports import Behaviour
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
@@ -316,7 +316,7 @@ def test_object_is_approached_straight_ahead():
 
 
 def test_places_out_of_the_workspace_are_refused_all_at_once():
-    with pytest.raises(UnusableHandover) as caught:
+    with pytest.raises(InvalidHandoverParameters) as caught:
         HandoverStateMachine(
             Params(
                 task=HandoverTask.HUMAN_TO_ROBOT,
@@ -336,14 +336,14 @@ def test_places_out_of_the_workspace_are_refused_all_at_once():
 
 def test_waits_that_outlast_the_patience_are_refused_unless_it_only_holds():
     impatient: dict[str, Any] = {"patience": 2.0, "signal_time": 3.0, "pause": 4.0}
-    with pytest.raises(UnusableHandover, match="signal_time = 3 s must not exceed patience = 2 s") as caught:
+    with pytest.raises(InvalidHandoverParameters, match="signal_time = 3 s must not exceed patience = 2 s") as caught:
         HandoverStateMachine(Params(task=HandoverTask.COLLABORATIVE, **impatient))
     assert len(caught.value.faults) == 2
     HandoverStateMachine(Params(task=HandoverTask.HOLD, **impatient))
 
 
 def test_orientation_that_is_none_is_refused():
-    with pytest.raises(UnusableHandover, match="q_WG_handover"):
+    with pytest.raises(InvalidHandoverParameters, match="q_WG_handover"):
         HandoverStateMachine(Params(q_WG_handover=np.zeros(4)))
 
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from handover.controllers.helix.handover_vision import HandoverVision, Inputs, Outputs, Params
 from handover.cosim.blocks.description import describe
-from handover.cosim.blocks.geometry import UnusableCalibration, quaternion_of
+from handover.cosim.blocks.geometry import InvalidCalibration, quaternion_of
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
 from handover.plants.helix.stereo_camera import Inputs as Scene
 from handover.plants.helix.stereo_camera import Params as CameraParams
@@ -220,7 +220,7 @@ def test_outputs_leave_the_state_alone(camera: StereoCamera):
 
 
 def test_bad_calibration_is_refused():
-    with pytest.raises(UnusableCalibration, match="'right': q_WC"):
+    with pytest.raises(InvalidCalibration, match="'right': q_WC"):
         HandoverVision(Params(q_WC_right=np.array([0.5, 0.0, 0.0, 0.0])))
-    with pytest.raises(UnusableCalibration, match="'left': intrinsics"):
+    with pytest.raises(InvalidCalibration, match="'left': intrinsics"):
         HandoverVision(Params(intrinsics_left=np.array([-907.0, 907.0, 640.0, 360.0])))

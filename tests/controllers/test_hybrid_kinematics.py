@@ -10,10 +10,10 @@ from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
     HybridKinematics,
     Inputs,
+    InvalidModel,
     Method,
     Outputs,
     Params,
-    UnusableModel,
 )
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.controllers.vsl.model_text import parse_model
@@ -130,14 +130,14 @@ def test_a_model_is_read_from_a_file(tmp_path: Path):
 def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
     file = tmp_path / "m.json"
     file.write_text("{}")
-    with pytest.raises(UnusableModel, match=r"m\.json: its format is None"):
+    with pytest.raises(InvalidModel, match=r"m\.json: its format is None"):
         HybridKinematics(Params(model=str(file)))
-    with pytest.raises(UnusableModel, match="cannot be read"):
+    with pytest.raises(InvalidModel, match="cannot be read"):
         HybridKinematics(Params(model=str(tmp_path / "none.json")))
     HybridKinematics(Params(method=Method.MODEL_BASED, model="none.json"))
 
 
 @pytest.mark.parametrize("params", [Params(L_2=0.2), Params(elbow=Elbow.DOWN)])
 def test_a_model_of_other_links_is_refused(params: Params):
-    with pytest.raises(UnusableModel, match=r"trained for L_1, L_2, L_3 = 0\.15, 0\.225, 0\.225 m with the elbow up"):
+    with pytest.raises(InvalidModel, match=r"trained for L_1, L_2, L_3 = 0\.15, 0\.225, 0\.225 m with the elbow up"):
         HybridKinematics(params)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.free_flyer.body import UnusableController
+from handover.controllers.free_flyer.body import InvalidControllerParameters
 from handover.controllers.free_flyer.impedance_controller import ImpedanceController, Inputs, Outputs, Params
 from handover.controllers.free_flyer.ports import Behaviour
-from handover.controllers.free_flyer.rotations import UnusableOrientation
+from handover.controllers.free_flyer.rotations import InvalidOrientation
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
 from handover.cosim.blocks.ports import Floats
@@ -213,7 +213,7 @@ def test_published_behaviours_have_their_damping():
 
 
 def test_delay_that_destabilises_is_refused_with_what_would_be_right():
-    with pytest.raises(UnusableController, match=r"62\.5 Hz with a delay of 0\.032 s") as caught:
+    with pytest.raises(InvalidControllerParameters, match=r"62\.5 Hz with a delay of 0\.032 s") as caught:
         ImpedanceController(replace(NO_LAG, delay=0.032))
     assert "|z| = 1.0571" in str(caught.value)
     assert "a delay of at most about 0.027 s" in str(caught.value)
@@ -230,7 +230,7 @@ def test_refused_delay_does_swing_up_and_the_allowed_one_calms_down():
 
 
 def test_cure_named_for_the_gains_is_stable():
-    with pytest.raises(UnusableController) as caught:
+    with pytest.raises(InvalidControllerParameters) as caught:
         ImpedanceController(Params(delay=0.032))
     factor = float(str(caught.value).split("at most about ")[2].split(" times")[0]) * 0.99
     I = np.eye(3)
@@ -248,7 +248,7 @@ def test_cure_named_for_the_gains_is_stable():
 
 def test_matrices_that_are_not_positive_definite_are_refused_all_at_once():
     skew = np.array([[20.0, 5.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 20.0]])
-    with pytest.raises(UnusableController) as caught:
+    with pytest.raises(InvalidControllerParameters) as caught:
         ImpedanceController(
             Params(
                 behaviour=Behaviour.CUSTOM,
@@ -262,7 +262,7 @@ def test_matrices_that_are_not_positive_definite_are_refused_all_at_once():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "text"),
     [
         ({"delay": -0.01}, r"delay = -0\.01 s must be finite and not negative"),
         ({"lag": np.nan}, "lag = nan s must be finite"),
@@ -270,14 +270,14 @@ def test_matrices_that_are_not_positive_definite_are_refused_all_at_once():
         ({"I_B": -np.eye(3)}, "I_B = .* must be symmetric and positive definite"),
     ],
 )
-def test_a_body_or_a_time_that_cannot_be_is_refused(changes: dict[str, Any], told: str):
-    with pytest.raises(UnusableController, match=told):
+def test_a_body_or_a_time_that_cannot_be_is_refused(changes: dict[str, Any], text: str):
+    with pytest.raises(InvalidControllerParameters, match=text):
         ImpedanceController(replace(Params(), **changes))
 
 
 @pytest.mark.parametrize("q", [np.zeros(4), np.array([np.nan, 0.0, 0.0, 1.0])])
 def test_orientation_that_is_none_is_refused(q: Floats):
-    with pytest.raises(UnusableOrientation, match="q_WB_meas"):
+    with pytest.raises(InvalidOrientation, match="q_WB_meas"):
         ImpedanceController(Params()).step(0.0, T, Inputs(q_WB_meas=q))
 
 

@@ -10,14 +10,14 @@ import pytest
 
 from handover.controllers.ir_grasp.ir_reflex import (
     Inputs,
+    InvalidReading,
+    InvalidReflexParameters,
     IrReflex,
     Outputs,
     Params,
     Phase,
     Stop,
     Strategy,
-    UnusableReading,
-    UnusableReflex,
     Visibility,
 )
 from handover.controllers.ir_grasp.visibility import RECOVERY, Action
@@ -230,7 +230,7 @@ def test_it_goes_on_from_any_state_bit_for_bit(literal: bool, p_x: float):
 
 def test_a_reading_that_is_no_number_is_refused_and_leaves_no_trace():
     reflex, other = IrReflex(Params()), IrReflex(Params())
-    with pytest.raises(UnusableReading) as refused:
+    with pytest.raises(InvalidReading) as refused:
         reflex.step(0.0, DT, Inputs(ticks=np.array([0.0, math.nan, 0.0]), p_WH=np.zeros(2), yaw=math.inf))
     assert [fault.split()[0] for fault in refused.value.faults] == ["ticks", "yaw"]
     assert reflex.get_state() == other.get_state()
@@ -253,9 +253,9 @@ def test_all_faults_of_the_parameters_are_told_at_once():
         sigma_pregrasp=0.9,
         recovery_least=0.02,
     )
-    with pytest.raises(UnusableReflex) as refused:
+    with pytest.raises(InvalidReflexParameters) as refused:
         IrReflex(bad)
-    told = "; ".join(refused.value.faults)
+    text = "; ".join(refused.value.faults)
     for name in (
         "probe of sigma",
         "weight",
@@ -266,12 +266,12 @@ def test_all_faults_of_the_parameters_are_told_at_once():
         "sigma_pregrasp",
         "recovery_least",
     ):
-        assert name in told
+        assert name in text
 
 
 @pytest.mark.parametrize(
     ("name", "value"), [("target", 0.003), ("distance_max", 0.09), ("tolerance", np.full(4, 0.01)), ("scans", 0)]
 )
 def test_a_value_with_which_it_cannot_work_is_refused(name: str, value: Any):
-    with pytest.raises(UnusableReflex, match=name):
+    with pytest.raises(InvalidReflexParameters, match=name):
         IrReflex(Params(**{name: value}))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handover.controllers.helix.estimation import PositionFilter, UnusableMeasurement
+from handover.controllers.helix.estimation import InvalidMeasurement, PositionFilter
 
 HERE, THERE = np.array([0.1, -0.2, -0.6]), np.array([0.3, 0.1, -0.5])
 
@@ -58,7 +58,7 @@ def test_covariances_add_as_information():
 
 def test_a_measurement_that_is_not_finite_is_refused_and_changes_nothing():
     f = PositionFilter(HERE, 1.0, 0.1, 0.1)
-    with pytest.raises(UnusableMeasurement, match="seen"):
+    with pytest.raises(InvalidMeasurement, match="seen"):
         f.update(np.array([0.1, np.nan, 0.0]))
     np.testing.assert_array_equal(f.position, HERE)
     np.testing.assert_array_equal(f.covariance, np.eye(3))

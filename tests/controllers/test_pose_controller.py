@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.free_flyer.body import UnusableController
+from handover.controllers.free_flyer.body import InvalidControllerParameters
 from handover.controllers.free_flyer.pose_controller import Inputs, Outputs, Params, PoseController
 from handover.controllers.free_flyer.profile import Bounds, profile_between
 from handover.cosim.blocks.description import describe
@@ -229,13 +229,13 @@ def test_linear_prediction_holds_for_a_small_push():
 
 
 def test_delay_too_long_is_refused_with_what_would_be_right():
-    with pytest.raises(UnusableController, match=r"delay of 0\.5 s.*\|z\| = 1\.0.*at most about 0\.33"):
+    with pytest.raises(InvalidControllerParameters, match=r"delay of 0\.5 s.*\|z\| = 1\.0.*at most about 0\.33"):
         PoseController(Params(delay=0.5))
     PoseController(Params(delay=0.1))
 
 
 def test_what_thrust_cannot_give_is_refused_all_at_once():
-    with pytest.raises(UnusableController) as caught:
+    with pytest.raises(InvalidControllerParameters) as caught:
         PoseController(Params(acceleration=0.1, turning=1.0, k_D=0.0))
     assert len(caught.value.faults) == 3
     assert "at most 0.0407 m/s2" in str(caught.value)
@@ -243,7 +243,9 @@ def test_what_thrust_cannot_give_is_refused_all_at_once():
 
 @pytest.mark.parametrize("k_I", [-0.1, 0.72, np.nan])
 def test_integral_that_no_loop_bears_is_refused(k_I: float):
-    with pytest.raises(UnusableController, match=r"position gains: k_I = .* from 0 to less than k_P k_D = 0\.72"):
+    with pytest.raises(
+        InvalidControllerParameters, match=r"position gains: k_I = .* from 0 to less than k_P k_D = 0\.72"
+    ):
         PoseController(Params(k_I=k_I))
 
 

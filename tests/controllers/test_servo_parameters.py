@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.helix.servo_parameters import Params, UnusableParameters
+from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
 from handover.controllers.helix.visual_servo import VisualServo
 
 
@@ -28,11 +28,11 @@ from handover.controllers.helix.visual_servo import VisualServo
     ],
 )
 def test_unusable_parameters_are_refused_by_name(values: dict[str, Any], message: str):
-    with pytest.raises(UnusableParameters, match=message):
+    with pytest.raises(InvalidServoParameters, match=message):
         VisualServo(Params(**values))
 
 
 def test_all_faults_are_named_at_once():
-    with pytest.raises(UnusableParameters) as caught:
+    with pytest.raises(InvalidServoParameters) as caught:
         VisualServo(Params(alpha=2.0, Q_ball=-1.0, closing_time=-1.0))
     assert len(caught.value.faults) == 3

@@ -10,11 +10,11 @@ from handover.controllers.vsl.paths import Line, QuarterArc
 from handover.controllers.vsl.trajectory_planner import (
     Elbow,
     Inputs,
+    InvalidPath,
     Outputs,
     Params,
     Path,
     TrajectoryPlanner,
-    UnusablePath,
 )
 from handover.cosim.blocks.ports import Floats
 
@@ -186,7 +186,7 @@ def test_a_restored_state_goes_on_bit_for_bit(steps: int):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "entries"),
     [
         ({"x_g": np.array([0.5, 0.0, 0.15])}, ["segment 1 of 1, point 75 of 100, (0.45, 0, 0.125) m", "0 .. 0.45 m"]),
         (
@@ -211,15 +211,15 @@ def test_a_restored_state_goes_on_bit_for_bit(steps: int):
         ({"L_2": 0.4, "L_3": 0.1, "x_g": np.array([0.2, 0.0, 0.15])}, ["|L_2 - L_3| = 0.3 m", "out of reach"]),
     ],
 )
-def test_a_path_that_cannot_be_followed_is_refused(changes: dict[str, Any], told: list[str]):
-    with pytest.raises(UnusablePath) as caught:
+def test_a_path_that_cannot_be_followed_is_refused(changes: dict[str, Any], entries: list[str]):
+    with pytest.raises(InvalidPath) as caught:
         TrajectoryPlanner(dataclasses.replace(Params(path=Path.CUSTOM), **changes))
-    for part in told:
+    for part in entries:
         assert part in str(caught.value)
 
 
 def test_every_bad_segment_is_told():
-    with pytest.raises(UnusablePath) as caught:
+    with pytest.raises(InvalidPath) as caught:
         TrajectoryPlanner(Params(path=Path.CURVE, L_2=0.2, L_3=0.2))
     assert len(caught.value.faults) == 2
     assert "segment 1 of 2" in caught.value.faults[0]
@@ -227,5 +227,5 @@ def test_every_bad_segment_is_told():
 
 
 def test_values_out_of_range_are_refused():
-    with pytest.raises(UnusablePath, match=r"N: 0 is out of range.*V: -1"):
+    with pytest.raises(InvalidPath, match=r"N: 0 is out of range.*V: -1"):
         TrajectoryPlanner(Params(N=0, V=-1.0))

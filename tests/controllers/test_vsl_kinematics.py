@@ -64,11 +64,11 @@ def test_known_poses():
     np.testing.assert_allclose(ARM.inverse(np.array([0.45, 0.0, 0.15])), np.zeros(3), atol=1e-6)
 
 
-@pytest.mark.parametrize(("p_WG", "told"), [([0.4, 0.3, 0.15], "0.5 m"), ([0.05, 0.0, 0.1], "0.05 m")])
-def test_points_out_of_reach_are_told_with_what_is_in_reach(p_WG: list[float], told: str):
+@pytest.mark.parametrize(("p_WG", "text"), [([0.4, 0.3, 0.15], "0.5 m"), ([0.05, 0.0, 0.1], "0.05 m")])
+def test_points_out_of_reach_are_told_with_what_is_in_reach(p_WG: list[float], text: str):
     with pytest.raises(Unreachable, match=r"0\.1 \.\. 0\.5 m|0 \.\. 0\.45 m") as caught:
         (ARM if p_WG[1] else UNEQUAL).inverse(np.array(p_WG))
-    assert told in str(caught.value)
+    assert text in str(caught.value)
     np.testing.assert_array_equal(caught.value.p_WG, p_WG)
 
 
@@ -80,7 +80,7 @@ def test_the_shoulder_itself_is_not_said_to_be_out_of_reach():
 
 
 @pytest.mark.parametrize(
-    ("p_WG", "told"),
+    ("p_WG", "text"),
     [
         ([0.4495, 0.0, 0.15], "stretched"),
         ([0.0005, 0.0, 0.4], "axis of joint 1"),
@@ -88,7 +88,7 @@ def test_the_shoulder_itself_is_not_said_to_be_out_of_reach():
         ([0.3, 0.0, 0.15], None),
     ],
 )
-def test_singular_points_are_told(p_WG: list[float], told: str | None):
-    arm = UNEQUAL if told == "folded" else ARM
+def test_singular_points_are_told(p_WG: list[float], text: str | None):
+    arm = UNEQUAL if text == "folded" else ARM
     fault = arm.singularity(np.array(p_WG), 0.001)
-    assert (fault is None) if told is None else (fault is not None and told in fault)
+    assert (fault is None) if text is None else (fault is not None and text in fault)

@@ -10,8 +10,15 @@ import pytest
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.fit import fit_cubic, rounded
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.controllers.vsl.learned_model import Cubic, VslModel, all_powers, hull_directions, inputs_of, turned
-from handover.controllers.vsl.model_text import UnusableModel, model_text, parse_model, read_model
+from handover.controllers.vsl.learned_model import (
+    Cubic,
+    VslModel,
+    all_powers,
+    hull_directions,
+    inputs_of,
+    rotate_about_z,
+)
+from handover.controllers.vsl.model_text import InvalidModel, model_text, parse_model, read_model
 from handover.cosim.blocks.ports import Floats
 
 RNG = np.random.default_rng(5)
@@ -107,8 +114,8 @@ def test_the_forward_residual_turns_with_joint_1():
     m, p, i = model(), np.array([0.1, 0.2]), np.array([9.0, 0.3, 0.4])
     q = np.array([0.6, 0.5, -1.0])
     residual = m.forward.predict(np.array([0.6, 0.5, -1.0, 0.1, 0.2, 0.3, 0.4]))
-    np.testing.assert_allclose(m.tip(q, p, i), m.kinematics.forward(q) + turned(residual, 0.6), atol=1e-15)
-    np.testing.assert_allclose(turned(np.array([1.0, 0.0, 2.0]), np.pi / 2), [0.0, 1.0, 2.0], atol=1e-15)
+    np.testing.assert_allclose(m.tip(q, p, i), m.kinematics.forward(q) + rotate_about_z(residual, 0.6), atol=1e-15)
+    np.testing.assert_allclose(rotate_about_z(np.array([1.0, 0.0, 2.0]), np.pi / 2), [0.0, 1.0, 2.0], atol=1e-15)
 
 
 def test_the_current_of_joint_1_is_left_out():
@@ -132,9 +139,9 @@ def test_the_model_that_ships_is_one():
     shipped = parse_model(DEFAULT_MODEL, "that ships")
     assert shipped.kinematics == VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
     assert "\n" + model_text(shipped) == "\n" + DEFAULT_MODEL
-    told = shipped.provenance["mean_test_errors_m"]
-    assert told["forward_hybrid"] < told["forward_model_based"] / 5.0
-    assert told["inverse_hybrid"] < told["inverse_model_based"] / 5.0
+    sentence = shipped.provenance["mean_test_errors_m"]
+    assert sentence["forward_hybrid"] < sentence["forward_model_based"] / 5.0
+    assert sentence["inverse_hybrid"] < sentence["inverse_model_based"] / 5.0
 
 
 def cut(*path: str) -> Callable[[dict[str, Any]], None]:
@@ -156,7 +163,7 @@ def put(value: Any, *path: str) -> Callable[[dict[str, Any]], None]:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "sentence"),
     [
         (cut("inverse"), "the file has no 'inverse'"),
         (cut("forward", "hull"), "forward has no 'hull'"),
@@ -183,10 +190,10 @@ def put(value: Any, *path: str) -> Callable[[dict[str, Any]], None]:
         (put(["q"], "inverse", "inputs"), "inverse.inputs are"),
     ],
 )
-def test_what_is_no_model_is_refused(change: Callable[[dict[str, Any]], None], told: str):
+def test_what_is_no_model_is_refused(change: Callable[[dict[str, Any]], None], sentence: str):
     changed = content()
     change(changed)
-    with pytest.raises(UnusableModel, match=told) as caught:
+    with pytest.raises(InvalidModel, match=sentence) as caught:
         parse_model(json.dumps(changed), "x.json")
     assert "model x.json" in str(caught.value)
 
@@ -197,18 +204,18 @@ def test_numbers_within_many_lists_are_refused():
         deep = [deep]
     changed = content()
     put(deep, "forward", "mean")(changed)
-    with pytest.raises(UnusableModel, match=r"forward\.mean must be made of finite numbers"):
+    with pytest.raises(InvalidModel, match=r"forward\.mean must be made of finite numbers"):
         parse_model(json.dumps(changed), "x.json")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 100000, '{"format": 1}'])
 def test_other_text_is_refused(text: str):
-    with pytest.raises(UnusableModel):
+    with pytest.raises(InvalidModel):
         parse_model(text, "x.json")
 
 
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path):
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     for name in ("none.json", "binary", "."):
-        with pytest.raises(UnusableModel, match="cannot be read"):
+        with pytest.raises(InvalidModel, match="cannot be read"):
             read_model(tmp_path / name)

@@ -9,7 +9,7 @@ from native_units import native_fmu
 from handover.cosim.master.checkpoint import Checkpointer, read_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system.signals import FromThenOn, Observer, Signals
+from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
 
 STOP, EVERY = Fraction(20), Fraction(7, 2)
@@ -58,7 +58,7 @@ def go_on(folder: Path) -> float:
         c.restore(master)
         with Recorder(record_of(folder), ["csv"], after=c.rows) as recorder:
             write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
-            master.run(STOP, [FromThenOn(c.time, observe) for observe in (recorder, write)])
+            master.run(STOP, [ObserveAfter(c.time, observe) for observe in (recorder, write)])
     return c.time
 
 

@@ -301,7 +301,7 @@ class TallyOutputs:
     heard: Number = output("sum of the inputs")
 
 
-class Tally:
+class RunCounts:
     """Gives numbers of many widths that grow from step to step."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}

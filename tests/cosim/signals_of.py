@@ -21,7 +21,7 @@ def signals_of(arrays: Mapping[str, NDArray[Any]], **more: Any) -> Signals:
 
 
 def port_of(name: str, values: NDArray[Any], **more: Any) -> FmuPort:
-    told: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "name": name,
         "kind": _KINDS[values.dtype.kind],
         "causality": Causality.OUTPUT,
@@ -30,4 +30,4 @@ def port_of(name: str, values: NDArray[Any], **more: Any) -> FmuPort:
         "shape": () if len(values) == 1 else (len(values),),
         "width": Width.UINT64 if values.dtype == np.uint64 else None,
     }
-    return FmuPort(**(told | more))
+    return FmuPort(**(facts | more))

@@ -19,8 +19,8 @@ MM = '<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:U
 def connectors(**kinds: str) -> str:
     """Return connectors of reals by name and kind; `x="output mm"` has a unit."""
     listed: list[str] = []
-    for name, told in kinds.items():
-        kind, _, unit = told.partition(" ")
+    for name, found in kinds.items():
+        kind, _, unit = found.partition(" ")
         typed = f'<ssc:Real unit="{unit}"/>' if unit else "<ssc:Real/>"
         listed.append(f'<ssd:Connector name="{name}" kind="{kind}">{typed}</ssd:Connector>')
     return f"<ssd:Connectors>{''.join(listed)}</ssd:Connectors>"
@@ -33,9 +33,9 @@ def component(name: str, inside: str = "", source: str = "resources/unit.fmu", m
 def connection(start: str, end: str, inside: str = "", more: str = "") -> str:
     """Return a connection between ends such as `a.x`, or `x` of the system itself."""
     ends: list[str] = []
-    for which, told in (("start", start), ("end", end)):
-        element, dot, name = told.partition(".")
-        ends.append(f'{which}Element="{element}" {which}Connector="{name}"' if dot else f'{which}Connector="{told}"')
+    for which, found in (("start", start), ("end", end)):
+        element, dot, name = found.partition(".")
+        ends.append(f'{which}Element="{element}" {which}Connector="{name}"' if dot else f'{which}Connector="{found}"')
     return f"<ssd:Connection {' '.join(ends)} {more}>{inside}</ssd:Connection>"
 
 
@@ -55,8 +55,8 @@ def described(inside: str, more: str = "", version: str = "1.0") -> str:
 def parameters(*values: str, more: str = "", name: str = "set") -> str:
     """Return a parameter set of `name type value` or `name type value unit`."""
     listed: list[str] = []
-    for told in values:
-        parameter, type_name, value, *unit = told.split("|")
+    for found in values:
+        parameter, type_name, value, *unit = found.split("|")
         with_unit = f' unit="{unit[0]}"' if unit else ""
         typed = f'<ssv:{type_name} value="{value}"{with_unit}/>'
         listed.append(f'<ssv:Parameter name="{parameter}">{typed}</ssv:Parameter>')

@@ -8,7 +8,7 @@ import pytest
 from native_units import native_fmu
 from oscillator import PLAIN, STATES, STIFF
 
-from handover.cosim.exceptions import BadOptions, ScheduleError
+from handover.cosim.exceptions import InvalidOptions, ScheduleError
 from handover.cosim.master.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, StepTooSmall
@@ -128,9 +128,9 @@ def test_units_that_cannot_be_rolled_back_or_vary_their_step_are_all_named():
     s.add("ball", native_fmu("ball"))
     with pytest.raises(ScheduleError) as caught:
         Master(s, following(1e-3))
-    told = str(caught.value)
+    message = str(caught.value)
     faults = ("forgetful cannot save its state", "ball has events, at which steps end", "rigid takes fixed steps only")
-    assert told == f"the step cannot follow the error: {'; '.join(faults)}"
+    assert message == f"the step cannot follow the error: {'; '.join(faults)}"
 
 
 def test_nothing_to_control_is_refused():
@@ -159,7 +159,7 @@ def test_a_step_below_the_smallest_names_the_signal_with_the_largest_error():
 
 
 def test_faulty_tolerances_and_limits_are_told_at_once():
-    with pytest.raises(BadOptions) as caught:
+    with pytest.raises(InvalidOptions) as caught:
         AdaptiveStep(
             relative=-1.0,
             absolute=float("nan"),
@@ -173,7 +173,7 @@ def test_faulty_tolerances_and_limits_are_told_at_once():
         "the largest step, 0.01 s, is below the smallest, 0.1 s",
         "the first step, 0.001 s, is out of the range from 0.1 s to 0.01 s",
     )
-    with pytest.raises(BadOptions, match="both tolerances are 0"):
+    with pytest.raises(InvalidOptions, match="both tolerances are 0"):
         AdaptiveStep(relative=0.0, absolute=0.0)
 
 

@@ -135,7 +135,7 @@ def test_a_block_without_what_a_block_has_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("attribute", "value", "told"),
+    ("attribute", "value", "text"),
     [
         ("period", 0.1, r"0\.1 is not a fraction of seconds; Fraction\(1, 10\) is right, or None"),
         ("period", 2, r"2 is not a fraction of seconds; Fraction\(2, 1\) is right"),
@@ -146,8 +146,8 @@ def test_a_block_without_what_a_block_has_is_refused():
         ("feedthrough", {"phase": 3}, "'phase': 3 is not a tuple"),
     ],
 )
-def test_an_attribute_that_is_not_what_it_is_to_be_is_refused(attribute: str, value: Any, told: str):
-    with pytest.raises(DeclarationError, match=rf"Wrong\.{attribute}: {told}"):
+def test_an_attribute_that_is_not_what_it_is_to_be_is_refused(attribute: str, value: Any, text: str):
+    with pytest.raises(DeclarationError, match=rf"Wrong\.{attribute}: {text}"):
         describe(type("Wrong", (Gripper,), {attribute: value}))
 
 
@@ -184,7 +184,7 @@ def test_start_and_bounds_of_a_single_are_what_a_host_sees_of_them():
 
 
 @pytest.mark.parametrize(
-    ("hint", "field", "told"),
+    ("hint", "field", "text"),
     [
         (Int8, port(128, "x"), r"Made\.x: start 128 does not fit Int8 \(from -128 to 127\)"),
         (Int8, port(0, "x", minimum=-129), "minimum -129 does not fit Int8"),
@@ -217,6 +217,6 @@ def test_start_and_bounds_of_a_single_are_what_a_host_sees_of_them():
         (Vector3[Int8], port(np.zeros(3), "x"), "arrays have real entries"),
     ],
 )
-def test_what_does_not_fit_its_type_is_refused(hint: Any, field: Any, told: str):
-    with pytest.raises(DeclarationError, match=told):
+def test_what_does_not_fit_its_type_is_refused(hint: Any, field: Any, text: str):
+    with pytest.raises(DeclarationError, match=text):
         declared(hint, field)

@@ -41,5 +41,5 @@ def test_outputs_are_fetched_only_after_a_step_or_a_restored_state(options: Mast
 
 def _faults(calls: Sequence[str]) -> list[tuple[str, str]]:
     """Return where a Get follows a Set at once; a state that is set ends what inputs before it ask for."""
-    told = [c for c in calls if not c.startswith(("GetFMU", "FreeFMU"))]
-    return [(a, b) for a, b in pairwise(told) if a.startswith("Set") and a[:6] != "SetFMU" and b.startswith("Get")]
+    entries = [c for c in calls if not c.startswith(("GetFMU", "FreeFMU"))]
+    return [(a, b) for a, b in pairwise(entries) if a.startswith("Set") and a[:6] != "SetFMU" and b.startswith("Get")]

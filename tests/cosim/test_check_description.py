@@ -20,7 +20,7 @@ def checked(file: Path, description: str) -> CheckReport:
     return check_fmu(decay.pack(file, NO_LIBRARY, description), timeout=30.0)
 
 
-def told(report: CheckReport, level: Level = Level.FAULT) -> str:
+def findings_text(report: CheckReport, level: Level = Level.FAULT) -> str:
     return "\n".join(f.line for s in report.sections[:3] for f in s.findings if f.level is level)
 
 
@@ -74,12 +74,12 @@ def test_a_sound_description_has_no_findings(tmp_path: Path):
 )  # fmt: skip
 def test_a_fault_is_told_with_its_place(tmp_path: Path, old: str, new: str, wanted: str):
     report = checked(tmp_path / "a.fmu", decay.edited((old, new)))
-    assert re.search(wanted, told(report)), told(report)
+    assert re.search(wanted, findings_text(report)), findings_text(report)
 
 
 def test_all_faults_are_told_at_once(tmp_path: Path):
     edits = ('causality="input"', 'causality="imput"'), ('<Integer start="0"', '<Integer start="12"')
-    lines = told(checked(tmp_path / "a.fmu", decay.edited(*edits, ('stepSize="0.1"', 'stepSize="0"'))))
+    lines = findings_text(checked(tmp_path / "a.fmu", decay.edited(*edits, ('stepSize="0.1"', 'stepSize="0"'))))
     for wanted in ("imput", "start value 12", "stepSize"):
         assert wanted in lines
 
@@ -93,14 +93,14 @@ def test_all_faults_are_told_at_once(tmp_path: Path):
 )
 def test_what_a_unit_needs_is_noted(tmp_path: Path, flag: str, wanted: str):
     report = checked(tmp_path / "a.fmu", decay.edited(("<CoSimulation ", f'<CoSimulation {flag}="true" ')))
-    assert wanted in told(report, Level.NOTE)
-    assert told(report) == ""
+    assert wanted in findings_text(report, Level.NOTE)
+    assert findings_text(report) == ""
 
 
 def test_an_fmu_for_model_exchange_alone_is_told(tmp_path: Path):
     edits = ("CoSimulation", "ModelExchange"), ('canHandleVariableCommunicationStepSize="true" ', "")
     report = checked(tmp_path / "a.fmu", decay.edited(*edits))
-    assert "an FMU for model exchange, without a co-simulation interface" in told(report)
+    assert "an FMU for model exchange, without a co-simulation interface" in findings_text(report)
     assert [s.reached for s in report.sections] == [True, True, True, False, False, False]
 
 
@@ -129,9 +129,9 @@ def edited_copy(fmu: Path, file: Path, old: str, new: str) -> Path:
 def test_faults_of_fmi_3_are_told(fmu: FmuOf, tmp_path: Path, old: str, new: str, wanted: str | None):
     report = check_fmu(edited_copy(fmu("Echo"), tmp_path / "a.fmu", old, new), 30.0)
     if wanted:
-        assert re.search(wanted, told(report)), told(report)
+        assert re.search(wanted, findings_text(report)), findings_text(report)
     else:
-        assert "a draft of the standard" in told(report, Level.WARNING)
+        assert "a draft of the standard" in findings_text(report, Level.WARNING)
 
 
 def test_start_values_must_fit_the_dimensions(fmu: FmuOf, tmp_path: Path):
@@ -140,7 +140,7 @@ def test_start_values_must_fit_the_dimensions(fmu: FmuOf, tmp_path: Path):
     assert start
     old = f'start="{start[1]}"'
     report = check_fmu(edited_copy(fmu("Echo"), tmp_path / "a.fmu", old, 'start="1 2 3"'), 30.0)
-    assert "3 start values for 2 entries, shape [2]" in told(report)
+    assert "3 start values for 2 entries, shape [2]" in findings_text(report)
 
 
 VALUES = re.findall(r'"([^"]*)"', decay.DESCRIPTION.partition("?>")[2])

@@ -31,7 +31,7 @@ def test_a_sound_unit_passes(decay_library: bytes, tmp_path: Path):
     report = checked(tmp_path, decay_library)
     assert report.passed
     assert all(s.reached and s.level is Level.OK for s in report.sections)
-    assert report.sections[-1].told == "10 steps of 0.1 s, state restored, second instance, reset"
+    assert report.sections[-1].summary == "10 steps of 0.1 s, state restored, second instance, reset"
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_one_instance_is_enough_where_there_may_be_only_one(decay_library: bytes
     once = once.replace('canGetAndSetFMUstate="true"', "").replace('canSerializeFMUstate="true"', "")
     report = checked(tmp_path, decay_library, once)
     assert report.passed
-    assert report.sections[-1].told == "10 steps of 0.1 s, reset"
+    assert report.sections[-1].summary == "10 steps of 0.1 s, reset"
 
 
 @pytest.mark.parametrize(

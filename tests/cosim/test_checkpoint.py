@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from native_units import native_fmu
 
 from handover.cosim.master.checkpoint import (
-    BadCheckpoint,
     Checkpoint,
+    InvalidCheckpoint,
     StateNotSaved,
     check_states,
     read_checkpoint,
@@ -28,7 +28,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.record.stream import complete_record
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.cosim.system.signals import FromThenOn, Signals
+from handover.cosim.system.signals import ObserveAfter, Signals
 from handover.cosim.system.system import System
 
 
@@ -124,7 +124,7 @@ def test_a_plan_that_goes_on_writes_the_record_by_itself(
     with Master(checkpointed.oscillator()) as master, Recorder(tmp_path / "rest.parquet") as recorder:
         c.restore(master)
         for stop in stops:
-            master.run(stop, [FromThenOn(c.time, recorder)])
+            master.run(stop, [ObserveAfter(c.time, recorder)])
     assert len(rows) <= len(stops)
     whole, rest = Record(compare), Record(tmp_path / "rest.parquet")
     assert [*rest.time] == [*whole.time[c.rows :]]
@@ -139,12 +139,12 @@ def test_pictures_and_truths_that_a_buffer_held_are_there_again(fmu: FmuOf):
     with Master(s) as master:
         master.run(Fraction(1, 2))
         c = take_checkpoint(master, 0)
-        told = {n: master.signals[n].tolist() for n in ("counter.picture", "counter.odd", "echo.brightness")}
+        facts = {n: master.signals[n].tolist() for n in ("counter.picture", "counter.odd", "echo.brightness")}
         master.run(Fraction(1))
         later = {n: master.signals[n].tolist() for n in ("counter.picture", "counter.n", "echo.brightness")}
     with Master(s) as master:
         c.restore(master)
-        assert {n: master.signals[n].tolist() for n in told} == told
+        assert {n: master.signals[n].tolist() for n in facts} == facts
         assert master.signals.text("counter.light") == "GREEN"
         master.run(Fraction(1))
         assert {n: master.signals[n].tolist() for n in later} == later
@@ -169,7 +169,7 @@ def test_what_is_read_is_what_was_written(tmp_path: Path):
 
 
 def test_a_missing_checkpoint_is_told(tmp_path: Path):
-    with pytest.raises(BadCheckpoint, match="there is no checkpoint; a run writes them with --checkpoint"):
+    with pytest.raises(InvalidCheckpoint, match="there is no checkpoint; a run writes them with --checkpoint"):
         read_checkpoint(tmp_path / "checkpoint.zip")
 
 
@@ -177,7 +177,7 @@ def test_a_checkpoint_of_another_version_is_told(tmp_path: Path):
     file = tmp_path / "checkpoint.zip"
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("checkpoint.json", '{"format": 2}')
-    with pytest.raises(BadCheckpoint, match="of format 2; format 1 can be read"):
+    with pytest.raises(InvalidCheckpoint, match="of format 2; format 1 can be read"):
         read_checkpoint(file)
 
 
@@ -193,7 +193,7 @@ def test_a_damaged_checkpoint_is_told_or_is_what_was_written(
     else:
         content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
     file.write_bytes(content)
-    with contextlib.suppress(BadCheckpoint):
+    with contextlib.suppress(InvalidCheckpoint):
         assert read_checkpoint(file) == _some()
 
 

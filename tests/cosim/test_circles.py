@@ -75,7 +75,7 @@ def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorit
 @both
 def test_what_does_not_converge_is_told_with_signals_time_and_iterations(algorithm: Algorithm):
     system = TwoMasses(k_c=4000.0).system(PERIOD)
-    options = MasterOptions(algorithm=algorithm, tolerance=1e-15, most_iterations=2)
+    options = MasterOptions(algorithm=algorithm, tolerance=1e-15, max_iterations=2)
     with pytest.raises(NotConverged) as caught, Master(system, options) as master:
         master.run(Fraction(1))
     e = caught.value

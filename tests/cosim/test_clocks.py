@@ -6,7 +6,7 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from handover.cosim.exceptions import UnitRefused
+from handover.cosim.exceptions import InitializationError
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
 
@@ -81,7 +81,7 @@ def test_a_clock_of_parameters_tells_its_interval():
 def test_a_clock_that_cannot_tick_is_refused():
     s = System()
     s.add("metronome", native_fmu("metronome"), beat=0.0)
-    with pytest.raises(UnitRefused, match=r"metronome does not start: its clock 'tick' ticks every 0 s"):
+    with pytest.raises(InitializationError, match=r"metronome does not start: its clock 'tick' ticks every 0 s"):
         seen(s, Fraction(1))
 
 

@@ -12,7 +12,7 @@ from handover.cosim.exceptions import WiringError
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.stepping.transfers import ScaledCopy
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PlacedUnit, System
 
 QUANTITIES = ("angle", "length", "temperature")
@@ -38,8 +38,8 @@ def test_degrees_millimetres_and_celsius_arrive_in_si_units(fmi: int, compiled: 
         master.run(Fraction(1))
         at_end = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]
     assert at_start == at_end == [30 * 0.017453292519943295, 0.125, 293.15]
-    told = [r.getMessage() for r in caplog.records if r.levelno == logging.INFO]
-    assert told == [
+    output = [r.getMessage() for r in caplog.records if r.levelno == logging.INFO]
+    assert output == [
         "a.angle (deg) -> b.angle_in (rad): times 0.0174533",
         "a.length (mm) -> b.length_in (m): times 0.001",
         "a.temperature (degC) -> b.temperature_in (K): plus 273.15",
@@ -57,9 +57,9 @@ def test_other_dimensions_are_refused_with_both_ends():
 
 def test_a_transformation_takes_the_conversions_place():
     s, a, b = pair(3, angle_in=30.0, length_in=125.0)
-    s.connect(a.y.angle, b.u.angle_in, Linear(2.0, -1.0))
-    s.connect(a.y.length, b.u.temperature_in, Linear(0.5))
-    s.connect(a.y.temperature, b.u.length_in, Linear())
+    s.connect(a.y.angle, b.u.angle_in, LinearTransformation(2.0, -1.0))
+    s.connect(a.y.length, b.u.temperature_in, LinearTransformation(0.5))
+    s.connect(a.y.temperature, b.u.length_in, LinearTransformation())
     with Master(s) as master:
         master.run(Fraction(1))
         found = [float(master.signals[f"b.{name}"]) for name in QUANTITIES]
@@ -68,9 +68,9 @@ def test_a_transformation_takes_the_conversions_place():
 
 def test_a_transformation_is_for_finite_reals():
     s, a, b = pair(3)
-    s.connect(a.y.angle, b.u.angle_in, Linear(float("nan")))
+    s.connect(a.y.angle, b.u.angle_in, LinearTransformation(float("nan")))
     c, d = s.add("c", native_fmu("discrete_passer")), s.add("d", native_fmu("discrete_passer"))
-    s.connect(c.y.count, d.u.count_in, Linear(2.0))
+    s.connect(c.y.count, d.u.count_in, LinearTransformation(2.0))
     with pytest.raises(WiringError) as caught:
         s.check()
     first, second = caught.value.faults
@@ -83,6 +83,6 @@ def test_a_transformation_is_for_finite_reals():
 def test_widths_are_met_in_double_precision(source_type: str, target_type: str):
     source = np.array([0.1, -3.7, 1e7], dtype=source_type)
     target = np.zeros(3, dtype=target_type)
-    ScaledCopy(target, source, Linear(1.1, 0.3))()
+    ScaledCopy(target, source, LinearTransformation(1.1, 0.3))()
     expected = [np.dtype(target_type).type(float(x) * 1.1 + 0.3) for x in source]
     assert target.tolist() == [float(x) for x in expected]

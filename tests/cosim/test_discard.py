@@ -50,7 +50,7 @@ def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
         f"short: fmi{fmi}DoStep at t = 0 s answered Discard, having reached t = {came} s; "
         "steps are repeated shorter only with repeat_discarded"
     )
-    assert failure.value.told.startswith("[Discard] a step of 0.1 s is longer than 0.04 s (steps are repeated")
+    assert failure.value.message.startswith("[Discard] a step of 0.1 s is longer than 0.04 s (steps are repeated")
 
 
 def test_a_unit_that_cannot_go_back_is_told():

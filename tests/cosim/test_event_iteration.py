@@ -6,9 +6,9 @@ import pytest
 from native_units import native_fmu
 from seen import grid, seen
 
-from handover.cosim.fmu.failures import UnitEnded, UnsettledEvents
+from handover.cosim.fmu.failures import UnitTerminated, UnsettledEvents
 from handover.cosim.master.master import Master
-from handover.cosim.stepping.event_iteration import MOST_ITERATIONS
+from handover.cosim.stepping.event_iteration import MAX_ITERATIONS
 from handover.cosim.system.system import System
 
 
@@ -33,7 +33,7 @@ def test_units_that_never_settle_are_named():
         seen(followers(10**6), Fraction(1), "a.count")
     assert set(failure.value.units) <= {"a", "b"}
     assert failure.value.t == 0.0
-    assert f"no end of events after {MOST_ITERATIONS} iterations; these do not settle: a, b" in str(failure.value)
+    assert f"no end of events after {MAX_ITERATIONS} iterations; these do not settle: a, b" in str(failure.value)
 
 
 def test_a_unit_that_wants_ever_more_iterations_is_named():
@@ -69,7 +69,7 @@ def test_a_unit_may_end_the_simulation(fmi: int):
     s = System()
     s.add("quitter", native_fmu("quitter", fmi))
     times: list[float] = []
-    with pytest.raises(UnitEnded, match=rf"quitter: fmi{fmi}DoStep at t = 0\.2 s asked to end the simulation"):
+    with pytest.raises(UnitTerminated, match=rf"quitter: fmi{fmi}DoStep at t = 0\.2 s asked to end the simulation"):
         run_into(s, times)
     assert times == [0.0, 0.1, 0.2]
 

@@ -51,9 +51,9 @@ def test_a_sound_archive_is_unpacked(tmp_path: Path):
     "name", ["../x", "a/../../x", "/etc/x", "C:/x", "C:x", "..\\x", "a\\b", "..", "\\\\host\\share\\x", "."]
 )
 def test_a_path_that_leads_out_is_refused(tmp_path: Path, name: str):
-    told = refusal(tmp_path, packed(name))
-    assert "paths that lead out of it" in told
-    assert name in told
+    value = refusal(tmp_path, packed(name))
+    assert "paths that lead out of it" in value
+    assert name in value
 
 
 def test_links_are_refused(tmp_path: Path):
@@ -74,9 +74,9 @@ def test_a_file_that_is_also_a_folder_is_refused(tmp_path: Path):
 
 
 def test_all_kinds_of_faults_are_told_at_once(tmp_path: Path):
-    told = refusal(tmp_path, packed("../x", "a", "a/b"))
-    assert "paths that lead out" in told
-    assert "folders of other files" in told
+    value = refusal(tmp_path, packed("../x", "a", "a/b"))
+    assert "paths that lead out" in value
+    assert "folders of other files" in value
 
 
 def test_encrypted_members_are_refused(tmp_path: Path):
@@ -100,15 +100,15 @@ def test_a_damaged_member_is_refused_before_anything_is_unpacked(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "value"),
     [
         (b"", "the file is empty"),
         (b"\x7fELF and so on", "this file is not one"),
         (packed()[:200], "its end is missing"),
     ],
 )
-def test_what_is_no_archive_is_refused(tmp_path: Path, content: bytes, told: str):
-    assert told in refusal(tmp_path, content)
+def test_what_is_no_archive_is_refused(tmp_path: Path, content: bytes, value: str):
+    assert value in refusal(tmp_path, content)
 
 
 def declared(size: int, name: str = "a") -> zipfile.ZipInfo:
@@ -143,7 +143,7 @@ def test_a_bomb_costs_no_memory(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "value"),
     [
         (["unit/modelDescription.xml"], "zip what is in that folder, not the folder"),
         (["ModelDescription.xml"], "there is ModelDescription.xml; upper and lower case count"),
@@ -151,12 +151,12 @@ def test_a_bomb_costs_no_memory(tmp_path: Path):
         ([], "the archive holds nothing"),
     ],
 )
-def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, names: list[str], told: str):
+def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, names: list[str], value: str):
     file = tmp_path / "a.fmu"
     with zipfile.ZipFile(file, "w") as archive:
         for name in names:
             archive.writestr(name, b"")
-    with pytest.raises(InvalidFmu, match=told):
+    with pytest.raises(InvalidFmu, match=value):
         FmuArchive(file).description()
 
 
@@ -175,6 +175,6 @@ def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path
 
 
 def test_what_is_no_file_is_told(tmp_path: Path):
-    for path, told in ((tmp_path, "zip what is in it"), (Path(os.devnull), "not a regular file")):
-        with pytest.raises(InvalidFmu, match=told):
+    for path, value in ((tmp_path, "zip what is in it"), (Path(os.devnull), "not a regular file")):
+        with pytest.raises(InvalidFmu, match=value):
             FmuArchive(path)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from handover.cosim.fmu.heartbeat import Heartbeat, Stillness
+from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
 
 
 def test_a_call_is_told_by_names_and_time_while_it_is_under_way():
@@ -52,8 +52,8 @@ def test_what_a_process_told_is_known_when_it_is_gone():
     child = os.fork()
     if child == 0:
         beat.tell(folder="runs/x")
-        beat.tell_scratch("a")
-        beat.tell_scratch("b")
+        beat.record_scratch_folder("a")
+        beat.record_scratch_folder("b")
         beat.log("arm", "[Warning] hot")
         beat.begin(beat.code("arm", "fmi2DoStep"), 0.4)
         os._exit(9)
@@ -66,12 +66,12 @@ def test_what_a_process_told_is_known_when_it_is_gone():
 
 def test_only_the_time_of_one_call_adds_up():
     beat, now = Heartbeat(), [0.0]
-    stillness = Stillness(beat, 0.5, lambda: now[0])
+    stall_timer = StallTimer(beat, 0.5, lambda: now[0])
     code = beat.code("arm", "fmi3DoStep")
 
     def after(seconds: float) -> float:
         now[0] += seconds
-        return stillness.look()
+        return stall_timer.elapsed()
 
     assert after(0.2) == 0.0  # no call is under way
     beat.begin(code, 0.0)

@@ -10,9 +10,9 @@ from native_units import native_fmu
 from oscillator import PLAIN, STATES
 
 from handover.cosim.master.master import Master
-from handover.cosim.stepping.extrapolation import Trace
+from handover.cosim.stepping.extrapolation import SampleHistory
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 
@@ -63,7 +63,7 @@ def test_input_derivatives_are_used_where_a_unit_of_fmi2_interpolates(interpolat
     s = System()
     ramp = s.add("ramp", native_fmu("ramp", 2), period=Fraction(1, 4))
     mass = s.add("mass", native_fmu("mass", 2, canInterpolateInputs=interpolates), period=Fraction(1, 4))
-    s.connect(ramp.y.y, mass.u.f, Linear(2.0, 1.0))
+    s.connect(ramp.y.y, mass.u.f, LinearTransformation(2.0, 1.0))
     x = course(s, "mass.x", Fraction(1))[1.0]
     assert x == pytest.approx(1 / 3 + 1 / 2 + error, abs=1e-9)
 
@@ -84,13 +84,13 @@ def test_a_run_goes_on_bit_by_bit_from_a_state():
 
 
 def test_places_on_a_line_do_not_depend_on_how_late_it_is():
-    def line_from(first: int) -> Trace:
+    def line_from(first: int) -> SampleHistory:
         values = np.array([1.0, 2.0])
-        trace = Trace(values)
-        trace.record(first)
+        history = SampleHistory(values)
+        history.record(first)
         values[...] = (1.3, -0.4)
-        trace.record(first + 3)
-        return trace
+        history.record(first + 3)
+        return history
 
     early, late = 21, 21 * 10**13
     for half_ticks in range(-6, 20):

@@ -81,7 +81,7 @@ def test_a_step_that_cannot_be_small_enough_fails_the_run(ssp: Path, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "text"),
     [
         (("--largest-step", "1", "--first-step", "1"), "--first-step, --largest-step: with --adaptive only"),
         (("--adaptive", "0"), "'0' is not a finite number above 0"),
@@ -93,9 +93,9 @@ def test_a_step_that_cannot_be_small_enough_fails_the_run(ssp: Path, tmp_path: P
     ],
 )
 def test_contradictions_are_refused_before_anything_is_made(
-    ssp: Path, tmp_path: Path, options: tuple[str, ...], told: str
+    ssp: Path, tmp_path: Path, options: tuple[str, ...], text: str
 ):
     result = run(ssp, tmp_path / "out", *options)
     assert result.exit_code == 2, result.output
-    assert told in result.output
+    assert text in result.output
     assert not (tmp_path / "out").exists()

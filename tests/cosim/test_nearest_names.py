@@ -6,7 +6,7 @@ from handover.cosim.exceptions import nearest
 
 
 @pytest.mark.parametrize(
-    ("name", "valid", "told"),
+    ("name", "valid", "text"),
     [
         ("p[4]", ["p[3]", "p[1]", "p[2]"], "did you mean p[1] or p[2] or p[3]?"),
         ("p[0]", [f"p[{k}]" for k in (9, 7, 5, 3, 1)], "did you mean p[1] or p[3] or p[5]?"),
@@ -15,5 +15,5 @@ from handover.cosim.exceptions import nearest
         ("x", [], "there are none"),
     ],
 )
-def test_the_nearest_come_first_and_those_as_near_by_name(name: str, valid: list[str], told: str):
-    assert nearest(name, iter(valid)).startswith(told)
+def test_the_nearest_come_first_and_those_as_near_by_name(name: str, valid: list[str], text: str):
+    assert nearest(name, iter(valid)).startswith(text)

@@ -1,7 +1,7 @@
 from handover.cosim.system.ordering import ordered, strongly_connected
 
 
-class Told:
+class DescribeWait:
     def __init__(self) -> None:
         self.soft: list[tuple[str, set[str]]] = []
         self.firm: list[tuple[str, set[str]]] = []
@@ -17,32 +17,32 @@ class Told:
 
 
 def test_things_keep_their_order_where_nothing_is_needed():
-    assert Told().order({"c": "", "a": "", "b": ""}) == "cab"
+    assert DescribeWait().order({"c": "", "a": "", "b": ""}) == "cab"
 
 
 def test_each_follows_what_it_needs_firmly_or_not():
-    assert Told().order({"a": "b", "b": "c", "c": ""}) == "cba"
-    assert Told().order({"a": "", "b": "", "c": ""}, {"a": "b", "b": "c"}) == "cba"
+    assert DescribeWait().order({"a": "b", "b": "c", "c": ""}) == "cba"
+    assert DescribeWait().order({"a": "", "b": "", "c": ""}, {"a": "b", "b": "c"}) == "cba"
 
 
 def test_a_soft_need_gives_way_before_a_firm_one():
-    told = Told()
-    assert told.order({"a": "b", "b": ""}, {"b": "a"}) == "ba"
-    assert told.soft == [("b", {"a"})]
-    assert told.firm == []
+    value = DescribeWait()
+    assert value.order({"a": "b", "b": ""}, {"b": "a"}) == "ba"
+    assert value.soft == [("b", {"a"})]
+    assert value.firm == []
 
 
 def test_a_circle_of_firm_needs_opens_where_nothing_else_holds_it_up():
-    told = Told()
-    assert told.order({"after": "b", "b": "c", "c": "b"}) == "b" + "after" + "c"
-    assert told.firm == [("b", {"c"})]
-    assert told.soft == []
+    value = DescribeWait()
+    assert value.order({"after": "b", "b": "c", "c": "b"}) == "b" + "after" + "c"
+    assert value.firm == [("b", {"c"})]
+    assert value.soft == []
 
 
 def test_what_needs_itself_softly_is_told():
-    told = Told()
-    assert told.order({"a": ""}, {"a": "a"}) == "a"
-    assert told.soft == [("a", {"a"})]
+    value = DescribeWait()
+    assert value.order({"a": ""}, {"a": "a"}) == "a"
+    assert value.soft == [("a", {"a"})]
 
 
 def test_those_that_need_each_other_are_together_in_the_order_given():

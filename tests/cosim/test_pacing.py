@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.exceptions import BadOptions
+from handover.cosim.exceptions import InvalidOptions
 from handover.cosim.master.master import Master
 from handover.cosim.master.pacing import Pacer, PaceReport
 from handover.cosim.stepping.options import MasterOptions
@@ -65,10 +65,10 @@ def test_a_missed_deadline_is_counted_and_the_others_stay_where_they_are():
 
 
 @pytest.mark.parametrize(
-    ("work", "told"), [(0.0604, "at most 10.4 ms late"), (1.11, "at most 1.06 s late"), (2000.0, "1999.95 s late")]
+    ("work", "text"), [(0.0604, "at most 10.4 ms late"), (1.11, "at most 1.06 s late"), (2000.0, "1999.95 s late")]
 )
-def test_lateness_is_told_in_a_unit_that_reads_well(work: float, told: str):
-    assert told in str(paced([work])[0])
+def test_lateness_is_told_in_a_unit_that_reads_well(work: float, text: str):
+    assert text in str(paced([work])[0])
 
 
 def test_it_tells_how_fast_it_went():
@@ -104,5 +104,5 @@ def test_the_master_lets_each_communication_point_wait():
 
 @pytest.mark.parametrize("pace", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_pace_that_is_none_is_refused(pace: float):
-    with pytest.raises(BadOptions, match="above 0 is right"):
+    with pytest.raises(InvalidOptions, match="above 0 is right"):
         MasterOptions(pace=pace)

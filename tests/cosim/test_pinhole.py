@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handover.cosim.blocks.geometry import Pinhole, UnusableCalibration, looking_at, quaternion_of
+from handover.cosim.blocks.geometry import InvalidCalibration, Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import Floats
 
 P_WC = np.array([-0.95, 0.25, -0.6])
@@ -60,6 +60,6 @@ def test_what_is_behind_the_camera_has_no_picture():
 )
 def test_meaningless_calibration_is_refused(quantity: str, value: Floats):
     given = {"p_WC": P_WC, "q_WC": Q_WC, "intrinsics": INTRINSICS, "distortion": DISTORTION} | {quantity: value}
-    with pytest.raises(UnusableCalibration, match=f"'left': {quantity}") as refused:
+    with pytest.raises(InvalidCalibration, match=f"'left': {quantity}") as refused:
         Pinhole("left", **given)
     assert refused.value.quantity == quantity

@@ -146,5 +146,5 @@ def test_nlerp_goes_the_shorter_way_and_meets_its_ends():
 def test_perturb_is_a_small_rotation_in_the_own_frame():
     q, _, R_q, _ = two_rotations(3)
     phi = np.array([2e-4, -3e-4, 1e-4])
-    turned = Rotation.from_matrix(np.transpose(R_q) @ matrix(perturb(q, vector(0.5 * phi))))
-    np.testing.assert_allclose(turned.as_rotvec(), phi, atol=1e-10)
+    rotate = Rotation.from_matrix(np.transpose(R_q) @ matrix(perturb(q, vector(0.5 * phi))))
+    np.testing.assert_allclose(rotate.as_rotvec(), phi, atol=1e-10)

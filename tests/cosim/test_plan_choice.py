@@ -22,7 +22,7 @@ def build(period: Fraction = Fraction(1, 10)) -> System:
     return s
 
 
-def told(options: MasterOptions, caplog: pytest.LogCaptureFixture, period: Fraction = Fraction(1, 10)) -> list[str]:
+def logged(options: MasterOptions, caplog: pytest.LogCaptureFixture, period: Fraction = Fraction(1, 10)) -> list[str]:
     with caplog.at_level(logging.INFO, "handover.cosim.plan"), Master(build(period), options) as master:
         assert isinstance(master.stepper, GridStepper)
         master.run(Fraction(1))
@@ -45,7 +45,7 @@ def test_a_plain_system_is_compiled(caplog: pytest.LogCaptureFixture):
     ],
 )
 def test_what_a_plan_cannot_do(options: MasterOptions, period: Fraction, why: str, caplog: pytest.LogCaptureFixture):
-    (line,) = told(options, caplog, period)
+    (line,) = logged(options, caplog, period)
     assert line.startswith(f"no compiled plan: {why}")
 
 
@@ -66,7 +66,7 @@ def test_without_its_library(monkeypatch: pytest.MonkeyPatch, caplog: pytest.Log
         return None
 
     monkeypatch.setattr(choice, "loop", no_library)
-    assert told(MasterOptions(), caplog) == ["no compiled plan: its library is not compiled for this machine"]
+    assert logged(MasterOptions(), caplog) == ["no compiled plan: its library is not compiled for this machine"]
 
 
 def test_a_compiler_that_refuses_does_not_keep_a_system_from_running(
@@ -78,7 +78,7 @@ def test_a_compiler_that_refuses_does_not_keep_a_system_from_running(
     monkeypatch.setattr(memory, "plan_library", refuse)
     memory.loop.cache_clear()
     try:
-        lines = told(MasterOptions(), caplog)
+        lines = logged(MasterOptions(), caplog)
     finally:
         memory.loop.cache_clear()
     assert lines[0] == "the master's plan does not compile for some-machine:\nno space left"

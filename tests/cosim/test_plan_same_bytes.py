@@ -11,7 +11,7 @@ from native_units import native_fmu
 from handover.cosim.fmu.buffers import SignalBuffer
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import System
 
 SECOND = Fraction(1)
@@ -83,7 +83,7 @@ def test_units_of_measurement_on_their_way(algorithm: Algorithm, tmp_path: Path)
             s.connect(source.y.y, getattr(other.u, f"{name}_in"))
             s.connect(getattr(other.y, name), getattr(si.u, f"{name}_in"))
         reader = s.add("reader", native_fmu("integrator", 2))
-        s.connect(source.y.y, reader.u.u, Linear(0.3, 0.7))
+        s.connect(source.y.y, reader.u.u, LinearTransformation(0.3, 0.7))
         return s
 
     expect_alike(build, 5 * SECOND, tmp_path, algorithm)

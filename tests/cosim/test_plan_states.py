@@ -9,7 +9,7 @@ from native_units import native_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.stepper import GridStepper, Stepper
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import System
 
 
@@ -19,7 +19,7 @@ def build(fmu: FmuOf) -> System:
     eye = s.add("eye", fmu("Echo"), period=Fraction(1, 20), sampled=True)
     mass = s.add("mass", native_fmu("mass", 2), period=Fraction(1, 50), k=2.0)
     s.connect(camera.y.picture, eye.u.picture)
-    s.connect(eye.y.brightness, mass.u.f, Linear(0.5))
+    s.connect(eye.y.brightness, mass.u.f, LinearTransformation(0.5))
     return s
 
 

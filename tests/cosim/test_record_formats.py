@@ -113,9 +113,9 @@ def test_mat_has_the_matrices_of_a_trajectory_in_their_order(tmp_path: Path):
 
 def test_an_enumeration_has_its_items_in_the_description(tmp_path: Path):
     light = np.ones(1, dtype=np.int64)
-    told = {"kind": Kind.ENUMERATION, "items": (("RED", 1), ("GREEN", 2)), "description": "a light"}
+    facts = {"kind": Kind.ENUMERATION, "items": (("RED", 1), ("GREEN", 2)), "description": "a light"}
     with Recorder(tmp_path / "signals.parquet", ["mat", "csv"]) as recorder:
-        recorder(0.0, signals_of({"light": light}, **told))
+        recorder(0.0, signals_of({"light": light}, **facts))
     result: Any = DyMat.DyMatFile(str(tmp_path / "signals.mat"))
     assert result.description("unit.light") == "a light (1 RED, 2 GREEN)"
     assert Record(tmp_path / "signals.parquet").items("unit.light") == {1: "RED", 2: "GREEN"}

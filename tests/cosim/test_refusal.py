@@ -1,7 +1,7 @@
-from handover.cosim.blocks.block import Refusal
+from handover.cosim.blocks.block import InvalidParameters
 
 
-class Hot(Refusal):
+class Hot(InvalidParameters):
     """Too hot."""
 
     block = "Oven"

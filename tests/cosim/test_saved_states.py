@@ -23,7 +23,7 @@ OPTIONS = {
 }
 
 
-def circle(fault: str, fmi: int, at: float = 0.4) -> System:
+def cycle(fault: str, fmi: int, at: float = 0.4) -> System:
     """Return a circle of an integrator and a unit that fails at a time in seconds, and one beside it."""
     s = System()
     steady, bad = s.add("steady", native_fmu("integrator", fmi)), s.add("bad", native_fmu(fault, fmi), at=at)
@@ -46,7 +46,7 @@ def kept(called: Called, fmi: int) -> dict[str, int]:
 @pytest.mark.parametrize("fault", ["errs", "gives_nan", "ends"])
 def test_states_are_freed_after_a_failure(fault: str, fmi: int, options: MasterOptions):
     called = Called()
-    with pytest.raises(UnitFailure), Master(circle(fault, fmi), options, called) as master:
+    with pytest.raises(UnitFailure), Master(cycle(fault, fmi), options, called) as master:
         master.run(Fraction(1))
     assert (("steady", f"fmi{fmi}GetFMU{'s' if fmi == 2 else 'S'}tate")) in called.calls
     assert kept(called, fmi) == {"bad": 0, "beside": 0, "steady": 0}
@@ -56,7 +56,7 @@ def test_states_are_freed_after_a_failure(fault: str, fmi: int, options: MasterO
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_unit_is_not_called_after_fatal_to_free_its_states(fmi: int, options: MasterOptions):
     called = Called()
-    with pytest.raises(UnitFailure), Master(circle("fatal", fmi), options, called) as master:
+    with pytest.raises(UnitFailure), Master(cycle("fatal", fmi), options, called) as master:
         master.run(Fraction(1))
     last = max(i for i, call in enumerate(called.calls) if call == ("bad", f"fmi{fmi}DoStep"))
     assert "bad" not in {unit for unit, _ in called.calls[last + 1 :]}
@@ -75,6 +75,6 @@ def test_states_are_freed_where_a_unit_does_not_save_its_own(options: MasterOpti
         return save(self)
 
     monkeypatch.setattr(Instance, "save_state", save_until_04)
-    with pytest.raises(UnitFailure, match="GetFMUState"), Master(circle("ends", 3, at=10.0), options, called) as master:
+    with pytest.raises(UnitFailure, match="GetFMUState"), Master(cycle("ends", 3, at=10.0), options, called) as master:
         master.run(Fraction(1))
     assert kept(called, 3) == {"bad": 0, "beside": 0, "steady": 0}

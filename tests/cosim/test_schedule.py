@@ -91,7 +91,7 @@ def test_units_of_a_loop_stand_together_between_those_before_and_after():
     schedule = Schedule(s)
     assert schedule.loops
     assert [g.units for g in schedule.groups] == [("b", "c", "a"), ("after",), ("plant",)]
-    assert schedule.groups[0].told.startswith("b.y -> c.u, c.u acts on c.y at once, c.y -> a.u")
+    assert schedule.groups[0].message.startswith("b.y -> c.u, c.u acts on c.y at once, c.y -> a.u")
     assert [str(c.source) for c in schedule.groups[0].back(["a", "b", "c"])] == ["a.y"]
     assert [str(c.source) for c in schedule.groups[0].back(["a", "b"])] == ["a.y"]
     assert schedule.groups[0].back(["b", "c"]) == []
@@ -107,8 +107,8 @@ def test_loops_that_share_a_unit_are_one_group():
     s.connect(PortName("c", "y"), PortName("b", "w"))
     (group,) = Schedule(s).groups
     assert set(group.units) == {"a", "b", "c"}
-    assert len(group.circle) == 4
-    assert "(and 2 more connections between these outputs and inputs)" in group.told
+    assert len(group.cycle) == 4
+    assert "(and 2 more connections between these outputs and inputs)" in group.message
 
 
 def test_a_loop_through_a_plant_is_no_algebraic_loop():

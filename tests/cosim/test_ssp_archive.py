@@ -58,19 +58,19 @@ def test_a_bomb_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("files", "told"),
+    ("files", "text"),
     [
         ({"structure.ssd": SOUND}, "no SystemStructure.ssd at the top of the archive: the archive holds structure.ssd"),
         ({"deep/SystemStructure.ssd": SOUND}, "it is at deep/SystemStructure.ssd; zip what is in that folder"),
         ({"systemstructure.SSD": SOUND}, "upper and lower case count"),
     ],
 )
-def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, files: dict[str, str], told: str):
-    assert told in refusal(pack_ssp(tmp_path / "a.ssp", None, files))
+def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, files: dict[str, str], text: str):
+    assert text in refusal(pack_ssp(tmp_path / "a.ssp", None, files))
 
 
 @pytest.mark.parametrize(
-    ("edits", "told"),
+    ("edits", "text"),
     [
         ({"</ssd:System>": ""}, "SystemStructure.ssd cannot be read: it is not well-formed"),
         ({"?>": '?><!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>'}, "document type"),
@@ -85,16 +85,16 @@ def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, files:
         ({'"1.0" name': '"2.0" name', "ssd:System ": "ssd:S ", "ssd:System>": "ssd:S>"}, "0 outermost systems"),
     ],
 )
-def test_a_malformed_description_is_refused(tmp_path: Path, edits: Mapping[str, str], told: str):
+def test_a_malformed_description_is_refused(tmp_path: Path, edits: Mapping[str, str], text: str):
     changed = SOUND
     for old, new in edits.items():
         assert old in changed
         changed = changed.replace(old, new)
-    assert told in refusal(pack_ssp(tmp_path / "a.ssp", changed, {"resources/unit.fmu": b"x"}))
+    assert text in refusal(pack_ssp(tmp_path / "a.ssp", changed, {"resources/unit.fmu": b"x"}))
 
 
 @pytest.mark.parametrize(
-    ("source", "told"),
+    ("source", "text"),
     [
         ("resources/unti.fmu", "there is no 'resources/unti.fmu' in the SSP; did you mean resources/unit.fmu?"),
         ("../unit.fmu", "'../unit.fmu' leads out of the SSP"),
@@ -107,9 +107,9 @@ def test_a_malformed_description_is_refused(tmp_path: Path, edits: Mapping[str, 
         ("#other", "names no file of the SSP"),
     ],
 )
-def test_a_component_s_source_is_a_file_in_the_archive(tmp_path: Path, source: str, told: str):
+def test_a_component_s_source_is_a_file_in_the_archive(tmp_path: Path, source: str, text: str):
     description = described(system(component("a", source=source)))
-    assert told in refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
+    assert text in refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
 
 
 def test_what_is_wrong_with_an_fmu_is_told_with_its_place_in_the_ssp(tmp_path: Path):
@@ -118,7 +118,7 @@ def test_what_is_wrong_with_an_fmu_is_told_with_its_place_in_the_ssp(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("element", "told"),
+    ("element", "text"),
     [
         (component("a", more='type="application/x-ssp-package"'), "only FMUs (application/x-fmu-sharedlibrary)"),
         (component("a", more='implementation="ModelExchange"'), "only co-simulation is supported"),
@@ -134,8 +134,8 @@ def test_what_is_wrong_with_an_fmu_is_told_with_its_place_in_the_ssp(tmp_path: P
         ),
     ],
 )
-def test_what_is_not_supported_is_named(tmp_path: Path, element: str, told: str):
-    assert told in refusal(pack_ssp(tmp_path / "a.ssp", described(system(element)), {"resources/unit.fmu": b"x"}))
+def test_what_is_not_supported_is_named(tmp_path: Path, element: str, text: str):
+    assert text in refusal(pack_ssp(tmp_path / "a.ssp", described(system(element)), {"resources/unit.fmu": b"x"}))
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

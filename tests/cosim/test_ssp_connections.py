@@ -10,7 +10,7 @@ from ssp_of import MM, component, connection, connectors, described, pack_ssp, s
 
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 
 VARIABLE = (
     '<ScalarVariable name="{}" valueReference="{}" causality="{}" variability="continuous"><Real {}/></ScalarVariable>'
@@ -47,7 +47,7 @@ def opened(tmp_path: Path) -> Open:
     return open_
 
 
-def wires(ssp: SspFile) -> Mapping[str, Linear | None]:
+def wires(ssp: SspFile) -> Mapping[str, LinearTransformation | None]:
     return {f"{c.source} -> {c.target}": c.transformation for c in ssp.system.connections}
 
 
@@ -69,9 +69,9 @@ def test_a_linear_transformation_comes_after_the_conversion_of_units(opened: Ope
     inside = '<ssc:LinearTransformation factor="3" offset="0.5"/>'
     through = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output mm"))
     elements, joined = through + component("b", PLAIN), connection("inner.x", "b.u", inside)
-    assert wires(opened(elements, joined, MM)) == {"inner.a.y -> b.u": Linear(3.0, 0.5)}
+    assert wires(opened(elements, joined, MM)) == {"inner.a.y -> b.u": LinearTransformation(3.0, 0.5)}
     elements = component("a", PLAIN) + component("b", PLAIN)
-    assert wires(opened(elements, connection("a.y", "b.u", inside))) == {"a.y -> b.u": Linear(3.0, 0.5)}
+    assert wires(opened(elements, connection("a.y", "b.u", inside))) == {"a.y -> b.u": LinearTransformation(3.0, 0.5)}
 
 
 def test_a_conversion_can_be_suppressed_on_each_connection(opened: Open):
@@ -79,7 +79,9 @@ def test_a_conversion_can_be_suppressed_on_each_connection(opened: Open):
     inner = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output mm"))
     elements, kept = inner + component("b", PLAIN), 'suppressUnitConversion="true"'
     assert wires(opened(elements, connection("inner.x", "b.u"), MM)) == {"inner.a.y -> b.u": None}
-    assert wires(opened(elements, connection("inner.x", "b.u", more=kept), MM)) == {"inner.a.y -> b.u": Linear(1000.0)}
+    assert wires(opened(elements, connection("inner.x", "b.u", more=kept), MM)) == {
+        "inner.a.y -> b.u": LinearTransformation(1000.0)
+    }
 
 
 def test_entries_that_make_up_a_whole_are_connected_as_a_whole(opened: Open):
@@ -128,7 +130,7 @@ TWO = component("a", PLAIN) + component("b", PLAIN)
 
 
 @pytest.mark.parametrize(
-    ("connections", "told"),
+    ("connections", "value"),
     [
         (connection("c.y", "b.u"), "there is no element 'c'"),
         (connection("a.z", "b.u"), "'a' has no connector 'z'"),
@@ -145,18 +147,18 @@ TWO = component("a", PLAIN) + component("b", PLAIN)
         ),
     ],
 )  # fmt: skip
-def test_a_connection_to_nowhere_or_of_the_wrong_kind_is_refused(opened: Open, connections: str, told: str):
-    assert told in refusal(lambda: opened(TWO, connections))
+def test_a_connection_to_nowhere_or_of_the_wrong_kind_is_refused(opened: Open, connections: str, value: str):
+    assert value in refusal(lambda: opened(TWO, connections))
 
 
 def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: Open):
-    told = refusal(lambda: opened(TWO, connection("c.y", "b.u") + "\n" + connection("a.u", "b.u")))
-    assert told.startswith("SystemStructure.ssd, line 3: there is no element 'c'")
-    assert "; SystemStructure.ssd, line 4: a.u - b.u: both ends take" in told
+    value = refusal(lambda: opened(TWO, connection("c.y", "b.u") + "\n" + connection("a.u", "b.u")))
+    assert value.startswith("SystemStructure.ssd, line 3: there is no element 'c'")
+    assert "; SystemStructure.ssd, line 4: a.u - b.u: both ends take" in value
 
 
 @pytest.mark.parametrize(
-    ("inside", "told"),
+    ("inside", "value"),
     [
         (connectors(z="output"), "the FMU of 'a' has no variable 'z'; "),
         (connectors(y="input"), "a.y is of kind input here and of causality output in its FMU"),
@@ -169,15 +171,15 @@ def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: O
         (connectors(u="input") * 2, "Element 'ssd:Connectors'"),
     ],
 )
-def test_a_connector_is_what_its_fmu_says(opened: Open, inside: str, told: str):
-    assert told in refusal(lambda: opened(component("a", inside), more=MM))
+def test_a_connector_is_what_its_fmu_says(opened: Open, inside: str, value: str):
+    assert value in refusal(lambda: opened(component("a", inside), more=MM))
 
 
 def test_units_that_do_not_fit_are_refused(opened: Open):
     seconds = '<ssd:Units><ssc:Unit name="s"><ssc:BaseUnit s="1"/></ssc:Unit></ssd:Units>'
     inner = system(component("a", PLAIN), connection("a.y", "x"), name="inner", before=connectors(x="output s"))
-    told = refusal(lambda: opened(inner + component("b", PLAIN), connection("inner.x", "b.u"), seconds))
-    assert "inner.a.y -> b.u: 'm' cannot be converted to 's': they differ in dimension" in told
+    value = refusal(lambda: opened(inner + component("b", PLAIN), connection("inner.x", "b.u"), seconds))
+    assert "inner.a.y -> b.u: 'm' cannot be converted to 's': they differ in dimension" in value
 
 
 def test_a_unit_that_is_not_defined_is_refused_unless_the_fmu_has_it(opened: Open):
@@ -185,8 +187,8 @@ def test_a_unit_that_is_not_defined_is_refused_unless_the_fmu_has_it(opened: Ope
     assert opened(component("a", connectors(y="output m")), more=MM).system.units
     a, whole = component("a", PLAIN), connection("a.y", "y")
     assert opened(system(a, whole, name="inner", before=connectors(y="output m"))).system.units
-    told = refusal(lambda: opened(system(a, whole, name="inner", before=connectors(y="output bogus"))))
-    assert "line 3: inner.a.y -> inner.y: 'm' cannot be converted to 'bogus': the unit 'bogus' is not defined" in told
+    value = refusal(lambda: opened(system(a, whole, name="inner", before=connectors(y="output bogus"))))
+    assert "line 3: inner.a.y -> inner.y: 'm' cannot be converted to 'bogus': the unit 'bogus' is not defined" in value
 
 
 def test_a_value_that_feeds_itself_is_refused(opened: Open):
@@ -205,10 +207,10 @@ def test_the_stop_time_is_the_default_experiment_s(opened: Open, start: str, sto
     assert str(opened(TWO, more=more).stop) == wanted
 
 
-@pytest.mark.parametrize(("start", "stop", "told"), [("1", "2", "only 0 s can be run"), ("0", "-1", "ends at -1 s")])
-def test_an_experiment_that_cannot_be_run_is_refused(opened: Open, start: str, stop: str, told: str):
+@pytest.mark.parametrize(("start", "stop", "value"), [("1", "2", "only 0 s can be run"), ("0", "-1", "ends at -1 s")])
+def test_an_experiment_that_cannot_be_run_is_refused(opened: Open, start: str, stop: str, value: str):
     more = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
-    assert told in refusal(lambda: opened(TWO, more=more))
+    assert value in refusal(lambda: opened(TWO, more=more))
 
 
 def test_an_fmu_that_proposes_no_step_needs_one(tmp_path: Path):
@@ -223,5 +225,5 @@ def test_an_fmu_that_proposes_no_step_needs_one(tmp_path: Path):
 def test_an_annotated_step_is_a_fraction(opened: Open, period: str):
     step = f'<Step xmlns="urn:handover:communication" period="{period}" sampled="true"/>'
     annotated = f'<ssc:Annotation type="handover.communication">{step}</ssc:Annotation>'
-    told = refusal(lambda: opened(component("a", f"<ssd:Annotations>{annotated}</ssd:Annotations>")))
-    assert f"period={period!r} is not a number of seconds such as 1/30" in told
+    value = refusal(lambda: opened(component("a", f"<ssd:Annotations>{annotated}</ssd:Annotations>")))
+    assert f"period={period!r} is not a number of seconds such as 1/30" in value

@@ -151,13 +151,13 @@ def test_a_parameter_of_the_system_gives_its_value_to_those_of_units(started: Op
 def test_a_name_that_nothing_has_is_left_out_and_told(started: Open, caplog: pytest.LogCaptureFixture):
     with caplog.at_level(logging.WARNING):
         assert started(one("y|Real|1", "nothing|Real|1", "mode|Integer|2")) == {"a": {"mode": 2}}
-    told = caplog.text
-    assert "SystemStructure.ssd, line 3: no variable is called 'nothing'" in told
-    assert "'y'" in told
+    text = caplog.text
+    assert "SystemStructure.ssd, line 3: no variable is called 'nothing'" in text
+    assert "'y'" in text
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "text"),
     [
         ("u|Integer|x", "u: 'x' is not a number"),
         ("u|String|1.5", "u: it is real, and the value given is of type String"),
@@ -169,8 +169,8 @@ def test_a_name_that_nothing_has_is_left_out_and_told(started: Open, caplog: pyt
         ("u|Real|1|s", "u: 's' cannot be converted to 'm': the unit 's' is not defined"),
     ],
 )
-def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: str, told: str):
-    assert told in refusal(lambda: started(one(given)))
+def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: str, text: str):
+    assert text in refusal(lambda: started(one(given)))
 
 
 def test_a_name_that_nothing_has_is_told_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):
@@ -186,7 +186,7 @@ def bound(inside: str, more: str = "") -> str:
 
 
 @pytest.mark.parametrize(
-    ("inside", "told"),
+    ("inside", "text"),
     [
         (bound("", 'source="gone.ssv"'), "there is no 'gone.ssv' in the SSP; "),
         (bound("", 'source="bad.ssv"'), "bad.ssv cannot be read: it is not well-formed"),
@@ -202,10 +202,10 @@ def bound(inside: str, more: str = "") -> str:
         (one("u|Real|1 2"), "u: 2 values where 1 is right"),
     ],
 )  # fmt: skip
-def test_a_bad_binding_is_refused(started: Open, inside: str, told: str):
+def test_a_bad_binding_is_refused(started: Open, inside: str, text: str):
     twice = parameters("u|Real|1", "u|Real|2")
     files = {"bad.ssv": "<a>", "dtd.ssv": "<!DOCTYPE a><a/>", "twice.ssv": twice}
-    assert told in refusal(lambda: started(inside, files=files))
+    assert text in refusal(lambda: started(inside, files=files))
 
 
 def test_a_mapping_of_two_to_one_name_is_refused(started: Open):

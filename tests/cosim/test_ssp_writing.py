@@ -17,7 +17,7 @@ from handover.cosim.exceptions import NotExportable, WiringError
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system.conversion import Linear
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System
 from handover.fmus.build import build_block
@@ -56,7 +56,7 @@ def test_signals_are_the_same(fmu: FmuOf, tmp_path: Path, fmi: int):
     if fmi == 2:  # which knows no pictures
         s = System()
         mass, spring = s.add("mass", built("Mass"), x_0=1 / 3, m=0.7), s.add("spring", built("Spring"), k=2.5)
-        s.connect(mass.y.x, spring.u.x, Linear(1.5, -0.1))
+        s.connect(mass.y.x, spring.u.x, LinearTransformation(1.5, -0.1))
         s.connect(spring.y.f, mass.u.f)
     else:
         s = echoing(built, *names)
@@ -114,7 +114,7 @@ def test_transformations_and_conversions_are_written_out(tmp_path: Path):
     s = System()
     a, b, c = s.add("a", metres), s.add("b", millimetres), s.add("c", metres)
     s.connect(a.y.y, b.u.u)
-    s.connect(b.y.y, c.u.u, Linear(0.25, -2.0))
+    s.connect(b.y.y, c.u.u, LinearTransformation(0.25, -2.0))
     s.connect(c.y.y, a.u.u)
     file = write_ssp(s, tmp_path / "a.ssp", "a")
     expect_valid(file, "1.0")
@@ -125,7 +125,7 @@ def test_transformations_and_conversions_are_written_out(tmp_path: Path):
     assert written.count('suppressUnitConversion="true"') == 2
     with SspFile(file) as ssp:
         changes = {str(w.target): w.transformation for w in ssp.system.connections}
-    assert changes == {"b.u": None, "c.u": Linear(0.25, -2.0), "a.u": None}
+    assert changes == {"b.u": None, "c.u": LinearTransformation(0.25, -2.0), "a.u": None}
 
 
 def test_what_stands_in_the_way_is_told_and_nothing_is_written(fmu: FmuOf, tmp_path: Path):

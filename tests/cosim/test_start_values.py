@@ -23,7 +23,7 @@ def variable(kind: Kind, **facts: Any) -> Variable:
 
 
 @pytest.mark.parametrize(
-    ("given", "value", "told"),
+    ("given", "value", "text"),
     [
         (variable(Kind.REAL, unit=METRE, minimum=0.0, maximum=2.0), 2.5, "out of range: from 0 to 2 m"),
         (variable(Kind.REAL, unit=METRE, minimum=0.0), -1, "at least 0 m"),
@@ -39,10 +39,10 @@ def variable(kind: Kind, **facts: Any) -> Variable:
         (variable(Kind.STRING), 5, "5 is not a string"),
     ],
 )
-def test_a_bad_value_is_told_with_what_would_be_right(given: Variable, value: Any, told: str):
+def test_a_bad_value_is_told_with_what_would_be_right(given: Variable, value: Any, text: str):
     fault = fault_of(given, value)
     assert fault is not None
-    assert told in fault
+    assert text in fault
 
 
 @pytest.mark.parametrize(

@@ -50,12 +50,12 @@ def test_unknown_names_are_told_with_the_nearest_valid_ones(fmu: FmuOf):
     s.connect(mass.y.x, spring.u.stretch)
     s.connect(mass.u.f, spring.u.x)
     s.connect(mass.y.x, spring.y.f)
-    told = "\n".join(faults_of(s))
-    assert "mass has no parameter or input 'mas'; did you mean m" in told
-    assert "mass has no output 'xx'; did you mean x?" in told
-    assert "spring has no input 'stretch'; valid: x" in told
-    assert "mass.f is an input, not an output" in told
-    assert "spring.f is an output, not an input" in told
+    text = "\n".join(faults_of(s))
+    assert "mass has no parameter or input 'mas'; did you mean m" in text
+    assert "mass has no output 'xx'; did you mean x?" in text
+    assert "spring has no input 'stretch'; valid: x" in text
+    assert "mass.f is an input, not an output" in text
+    assert "spring.f is an output, not an input" in text
 
 
 def test_a_connection_to_a_unit_that_is_not_there_is_told(fmu: FmuOf):
@@ -63,8 +63,8 @@ def test_a_connection_to_a_unit_that_is_not_there_is_told(fmu: FmuOf):
     s.add("spring", fmu("Spring"))
     spring = other.add("sprint", fmu("Spring"))
     s.connect(spring.y.f, spring.u.x)
-    told = "\n".join(faults_of(s))
-    assert "there is no unit 'sprint'; did you mean spring?" in told
+    text = "\n".join(faults_of(s))
+    assert "there is no unit 'sprint'; did you mean spring?" in text
 
 
 def test_an_input_is_fed_once(fmu: FmuOf):
@@ -80,11 +80,11 @@ def test_values_out_of_range_or_of_the_wrong_kind_are_told(fmu: FmuOf):
     s.add("a", fmu("Mass"), m=-1.0)
     s.add("b", fmu("Mass"), m="heavy")
     s.add("a", fmu("Mass"), period=Fraction(0))
-    told = "\n".join(faults_of(s))
-    assert "a.m" not in told  # the second a took its place, and is what is wrong
-    assert "b.m: 'heavy' is not a number in kg" in told
-    assert "two units are called 'a'" in told
-    assert "give one that is above 0 s" in told
+    text = "\n".join(faults_of(s))
+    assert "a.m" not in text  # the second a took its place, and is what is wrong
+    assert "b.m: 'heavy' is not a number in kg" in text
+    assert "two units are called 'a'" in text
+    assert "give one that is above 0 s" in text
 
 
 def test_range_faults_name_the_range(fmu: FmuOf):
@@ -94,14 +94,14 @@ def test_range_faults_name_the_range(fmu: FmuOf):
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "text"),
     [(None, "no such file"), (b"no zip", "not an FMU"), (b"", "not an FMU")],
 )
-def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path, content: bytes | None, told: str):
+def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path, content: bytes | None, text: str):
     file = tmp_path / "some.fmu"
     if content is not None:
         file.write_bytes(content)
-    with pytest.raises(InvalidFmu, match=told):
+    with pytest.raises(InvalidFmu, match=text):
         System().add("x", file)
 
 
@@ -139,11 +139,11 @@ def test_units_are_compared_by_what_they_mean(a: Unit, b: Unit, fault: str | Non
 
 
 @pytest.mark.parametrize(
-    ("told", "meant"),
+    ("text", "meant"),
     [(0.0333333, Fraction(1, 30)), (0.02, Fraction(1, 50)), (0.012, Fraction(3, 250)), (1e-7, Fraction(1, 10**7))],
 )
-def test_a_proposed_step_is_taken_as_it_is_meant(told: float, meant: Fraction):
-    assert proposed_step(told) == meant
+def test_a_proposed_step_is_taken_as_it_is_meant(text: float, meant: Fraction):
+    assert proposed_step(text) == meant
 
 
 def test_large_integers_keep_their_digits():

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from handover.cosim.blocks.units import BaseExponents, Unit
-from handover.cosim.system.conversion import Linear, conversion, meant_by
+from handover.cosim.system.conversion import LinearTransformation, conversion, meant_by
 
 ANGLE, LENGTH, TEMPERATURE = BaseExponents(rad=1), BaseExponents(m=1), BaseExponents(K=1)
 RAD, METRE, KELVIN = Unit("rad", ANGLE), Unit("m", LENGTH), Unit("K", TEMPERATURE)
@@ -17,22 +17,22 @@ CELSIUS, FAHRENHEIT = Unit("degC", TEMPERATURE, 1.0, 273.15), Unit("degF", TEMPE
 @pytest.mark.parametrize(
     ("source", "target", "expected"),
     [
-        (DEG, RAD, Linear(0.017453292519943295)),
-        (RAD, DEG, Linear(57.29577951308232)),
-        (DEG, GRAD, Linear(10 / 9)),
-        (Unit("deg", ANGLE, 0.0174532925199433), RAD, Linear(0.017453292519943295)),
-        (MILLIMETRE, METRE, Linear(0.001)),
-        (METRE, MILLIMETRE, Linear(1000.0)),
-        (MILLIMETRE, MICROMETRE, Linear(1000.0)),
-        (CELSIUS, KELVIN, Linear(1.0, 273.15)),
-        (KELVIN, CELSIUS, Linear(1.0, -273.15)),
-        (FAHRENHEIT, CELSIUS, Linear(5 / 9, -17.77777777777778)),
-        (CELSIUS, FAHRENHEIT, Linear(1.8, 32.0)),
-        (Unit("km/h", LENGTH, 0.277777777777778), METRE, Linear(5 / 18)),
+        (DEG, RAD, LinearTransformation(0.017453292519943295)),
+        (RAD, DEG, LinearTransformation(57.29577951308232)),
+        (DEG, GRAD, LinearTransformation(10 / 9)),
+        (Unit("deg", ANGLE, 0.0174532925199433), RAD, LinearTransformation(0.017453292519943295)),
+        (MILLIMETRE, METRE, LinearTransformation(0.001)),
+        (METRE, MILLIMETRE, LinearTransformation(1000.0)),
+        (MILLIMETRE, MICROMETRE, LinearTransformation(1000.0)),
+        (CELSIUS, KELVIN, LinearTransformation(1.0, 273.15)),
+        (KELVIN, CELSIUS, LinearTransformation(1.0, -273.15)),
+        (FAHRENHEIT, CELSIUS, LinearTransformation(5 / 9, -17.77777777777778)),
+        (CELSIUS, FAHRENHEIT, LinearTransformation(1.8, 32.0)),
+        (Unit("km/h", LENGTH, 0.277777777777778), METRE, LinearTransformation(5 / 18)),
     ],
     ids=lambda x: x.symbol if isinstance(x, Unit) else "",
 )
-def test_a_conversion_is_rounded_once(source: Unit, target: Unit, expected: Linear):
+def test_a_conversion_is_rounded_once(source: Unit, target: Unit, expected: LinearTransformation):
     assert conversion(source, target) == expected
 
 
@@ -43,8 +43,12 @@ def test_a_number_that_is_near_nothing_is_taken_as_it_stands():
 
 
 @pytest.mark.parametrize(
-    ("linear", "told"),
-    [(Linear(2.0), "times 2"), (Linear(1.0, 273.15), "plus 273.15"), (Linear(1.8, 32.0), "times 1.8, plus 32")],
+    ("linear", "text"),
+    [
+        (LinearTransformation(2.0), "times 2"),
+        (LinearTransformation(1.0, 273.15), "plus 273.15"),
+        (LinearTransformation(1.8, 32.0), "times 1.8, plus 32"),
+    ],
 )
-def test_a_conversion_tells_what_it_does(linear: Linear, told: str):
-    assert str(linear) == told
+def test_a_conversion_tells_what_it_does(linear: LinearTransformation, text: str):
+    assert str(linear) == text

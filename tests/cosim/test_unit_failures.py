@@ -11,15 +11,15 @@ import pytest
 from called import Called, fed_by
 from native_units import native_fmu
 
-from handover.cosim.exceptions import UnitFailure, UnitRefused
+from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.fmu.failures import (
     NotFinite,
     UnitCrashed,
     UnitDiscarded,
-    UnitEnded,
     UnitError,
     UnitFatal,
     UnitHung,
+    UnitTerminated,
 )
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
@@ -40,19 +40,19 @@ def failed(bad: str, fmi: int, record: Path, *, compiled: bool) -> tuple[UnitFai
 @COMPILED
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize(
-    ("bad", "kind", "text", "told"),
+    ("bad", "kind", "text", "line"),
     [
         ("errs", UnitError, "bad: fmi{0}DoStep at t = 0.2 s answered Error", "the solver failed at t = 0.2"),
         ("fatal", UnitFatal, "bad: fmi{0}DoStep at t = 0.2 s answered Fatal", "memory is corrupt at t = 0.2"),
     ],
 )
 def test_an_answer_of_error_is_told_with_call_time_and_log(
-    bad: str, kind: type, text: str, told: str, fmi: int, compiled: bool, tmp_path: Path
+    bad: str, kind: type, text: str, line: str, fmi: int, compiled: bool, tmp_path: Path
 ):
     failure, _ = failed(bad, fmi, tmp_path / "r.parquet", compiled=compiled)
     assert type(failure) is kind
     assert failure.headline == text.format(fmi)
-    assert told in str(failure)
+    assert line in str(failure)
     data = failure.as_data()
     assert data == {
         "kind": kind.kind,
@@ -60,7 +60,7 @@ def test_an_answer_of_error_is_told_with_call_time_and_log(
         "call": f"fmi{fmi}DoStep",
         "time": 0.2,
         "status": {"errs": "Error", "fatal": "Fatal"}[bad],
-        "log": [f"[{data['status']}] {told}"],
+        "log": [f"[{data['status']}] {line}"],
     }
     assert json.loads(json.dumps(data)) == data
     assert Record(tmp_path / "r.parquet").time.tolist() == [0.0, 0.1, 0.2]
@@ -105,7 +105,7 @@ def test_a_unit_that_ends_the_simulation_is_told_and_terminated_like_the_others(
     fmi: int, compiled: bool, tmp_path: Path
 ):
     failure, called = failed("ends", fmi, tmp_path / "r.parquet", compiled=compiled)
-    assert type(failure) is UnitEnded
+    assert type(failure) is UnitTerminated
     assert str(failure) == f"bad: fmi{fmi}DoStep at t = 0.2 s asked to end the simulation"
     assert Record(tmp_path / "r.parquet").time.tolist() == [0.0, 0.1, 0.2]
     ends = [(unit, call) for unit, call in called.calls if call.endswith(("Terminate", "FreeInstance"))]
@@ -150,7 +150,7 @@ def test_a_unit_that_gives_infinity_as_it_is_initialised_is_refused():
     )
     s.connect(source.y.y, reader.u.u)
     with (
-        pytest.raises(UnitRefused, match=r"source does not start: y = infinity") as caught,
+        pytest.raises(InitializationError, match=r"source does not start: y = infinity") as caught,
         Master(s, heartbeat=called),
     ):
         pass
@@ -164,7 +164,7 @@ def test_every_failure_has_a_kind_of_its_own_and_its_data():
         UnitFatal("u", "fmi3DoStep", 1.0, "Fatal"),
         UnitDiscarded("u", "fmi2DoStep", 1.0, ["no"], reached=1.25),
         NotFinite("u", "fmi3GetFloat64", 1.0, "p", (2, 3), float("inf"), readers=["v.x", "w.x"]),
-        UnitEnded("u", "fmi3DoStep", 1.0),
+        UnitTerminated("u", "fmi3DoStep", 1.0),
         UnitHung("u", "fmi3DoStep", 1.0, 2.5),
         UnitCrashed("u", "fmi3DoStep", 1.0, "segmentation fault"),
     ]

@@ -36,10 +36,10 @@ def raising(error: BaseException) -> Callable[[], None]:
 @pytest.mark.parametrize("limit", [None, 60.0])
 def test_results_and_errors_come_through(limit: float | None):
     watchdog = Watchdog(Heartbeat(), limit)
-    assert watchdog.carry_out(lambda: 3) == 3
+    assert watchdog.run_job(lambda: 3) == 3
     error = ValueError("wrong")
     with pytest.raises(ValueError, match="wrong") as caught:
-        watchdog.carry_out(raising(error))
+        watchdog.run_job(raising(error))
     assert caught.value is error
     watchdog.close()
 
@@ -49,11 +49,11 @@ def test_a_call_that_does_not_return_is_named_and_left_and_work_goes_on():
     watchdog, unit = Watchdog(beat, 0.1), Unit(beat)
     beat.log("arm", "[Warning] stiff")
     with pytest.raises(UnitHung) as caught:
-        watchdog.carry_out(unit.call)
+        watchdog.run_job(unit.call)
     assert (caught.value.unit, caught.value.call, caught.value.t, caught.value.limit) == ("arm", "fmi3DoStep", 0.4, 0.1)
     assert caught.value.log == ("[Warning] stiff",)
     assert (beat.abandoned, beat.stopped) == ({"arm"}, True)
-    assert watchdog.carry_out(lambda: "freed") == "freed"
+    assert watchdog.run_job(lambda: "freed") == "freed"
     unit.go_on.set()
     watchdog.close()
 
@@ -66,7 +66,7 @@ def test_what_is_no_call_of_a_unit_may_take_its_time():
         looks.wait(0.2)  # ten times the limit
         return "done"
 
-    assert watchdog.carry_out(job) == "done"
+    assert watchdog.run_job(job) == "done"
     watchdog.close()
 
 
@@ -85,7 +85,7 @@ def test_an_interrupt_of_the_caller_stops_the_work(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(Watchdog, "_watch", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        watchdog.carry_out(job)
+        watchdog.run_job(job)
     assert stopped.is_set()
     assert beat.abandoned == set()
     watchdog.close()

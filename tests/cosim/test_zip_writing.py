@@ -53,7 +53,7 @@ def test_an_interrupt_leaves_nothing_and_says_nothing(tmp_path: Path, monkeypatc
             file.unlink()
         at += 1
     gc.collect()
-    assert [told for told in said if told.exc_type is not KeyboardInterrupt] == []  # which may strike in a finalizer
+    assert [value for value in said if value.exc_type is not KeyboardInterrupt] == []  # which may strike in a finalizer
     assert at > 50
     assert path.stat().st_mode & 0o777 == 0o644
 

@@ -56,8 +56,8 @@ def run(program: Path, unit: str, fmi: int, folder: Path) -> Record:
     """Let the program make a unit's run; return what it printed and wrote."""
     reader: Any = fmpy
     reader.extract(str(cached(unit, fmi)), str(folder / "unpacked"))
-    told = reader.read_model_description(str(folder / "unpacked"))
-    calls = Calls(unit, fmi, {v.name: v.valueReference for v in told.modelVariables}, folder)
+    result = reader.read_model_description(str(folder / "unpacked"))
+    calls = Calls(unit, fmi, {v.name: v.valueReference for v in result.modelVariables}, folder)
     (folder / "calls.txt").write_text("\n".join(calls.lines()) + "\n")
     platform = FMI2_FOLDERS[host_platform()] if fmi == 2 else host_platform()
     file = unit + library(host_platform(), fmi).suffix
@@ -67,7 +67,7 @@ def run(program: Path, unit: str, fmi: int, folder: Path) -> Record:
             program,
             str(fmi),
             folder.joinpath("unpacked", "binaries", platform, file),
-            told.guid,
+            result.guid,
             resources.as_uri() if fmi == 2 else f"{resources}/",
             folder / "calls.txt",
         ],

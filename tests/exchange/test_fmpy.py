@@ -75,9 +75,9 @@ def simulated(unit: str, fmu: Path) -> list[Mapping[str, float]]:
 def called(unit: str, fmu: Path, folder: Path) -> Record:
     """Drive an FMI 3 unit through FMPy's class, arrays and pictures whole."""
     HOST.extract(str(fmu), str(folder))
-    told = HOST.read_model_description(str(folder))
-    slave = HOST.instantiate_fmu(str(folder), told, "CoSimulation")
-    references = {v.name: v.valueReference for v in told.modelVariables}
+    item = HOST.read_model_description(str(folder))
+    slave = HOST.instantiate_fmu(str(folder), item, "CoSimulation")
+    references = {v.name: v.valueReference for v in item.modelVariables}
     d, step = description(unit), float(UNITS[unit].step)
     known = variables(unit)
     rows: list[Mapping[str, float]] = []

@@ -20,7 +20,7 @@ from legal_calls import Effort, LegalCalls, performance
 from subject import Fault, Saved, Subject
 
 INSTANCES = 3
-MOST_FAULTS = 5
+MAX_FAULTS = 5
 EFFORTS = {
     "StereoCamera": Effort(from_scratch=0.03, steps=1, bytes=0.1),
     "HandoverVision": Effort(from_scratch=0.1, steps=1, bytes=0.1),
@@ -128,7 +128,7 @@ def main() -> int:
             sequence(k)
         except Fault as fault:
             faults.append({"sequence": k, "fault": str(fault), "calls": ring.lines()})
-            if len(faults) == MOST_FAULTS:
+            if len(faults) == MAX_FAULTS:
                 break
             driver.replace_all()
     driver.close()

@@ -252,9 +252,9 @@ class Subject:
         if early and not self.t <= last <= self.t + dt:
             raise Fault(f"a step from {self.t!r} s by {dt!r} s returned early at {last!r} s")
         self.t = last if early else self.t + dt
-        told = self.time()
-        if abs(told - self.t) > 1e-9 * max(1.0, abs(self.t)):
-            raise Fault(f"the time is {told!r} after a step to {self.t!r}")
+        result = self.time()
+        if abs(result - self.t) > 1e-9 * max(1.0, abs(self.t)):
+            raise Fault(f"the time is {result!r} after a step to {self.t!r}")
         return True
 
     def step_arguments(self, t: float, dt: float) -> tuple[Any, ...]:

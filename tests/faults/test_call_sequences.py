@@ -80,7 +80,7 @@ class Job:
         return {"faults": [{"sequence": sequence, "fault": fault, "calls": calls}], "calls": len(calls)}
 
 
-class Crew:
+class WorkerPool:
     """Runs jobs two at a time and ends what is left of them."""
 
     def __init__(self, folder: Path) -> None:
@@ -98,18 +98,18 @@ class Crew:
         """Run the jobs, print a line for each, and expect no fault."""
         with ThreadPoolExecutor(2) as pool:
             found = list(pool.map(Job.run, self.jobs))
-        told: list[str] = []
+        entries: list[str] = []
         for job, result in zip(self.jobs, found, strict=True):
             apart = " with Python apart" if job.environment else ""
             line = f"{job.fmu.name} {job.kind}{apart}: {job.count} sequences of seed {SEED}, {result['calls']} calls"
             print(f"{line}, {result.get('refused', 0)} refused by the block, {result.get('cpu', 0.0):.1f} s of CPU")
             for fault in result["faults"]:
                 calls = "\n    ".join(fault["calls"])
-                told.append(f"{line}; sequence {fault['sequence']}: {fault['fault']}\n    {calls}")
+                entries.append(f"{line}; sequence {fault['sequence']}: {fault['fault']}\n    {calls}")
             enough = job.kind == "illegal" or result.get("refused", 0) <= 0.02 * result["calls"]
             if not enough:
-                told.append(f"{line}: {result['refused']} legal calls were refused")
-        assert not told, "\n".join(told)
+                entries.append(f"{line}: {result['refused']} legal calls were refused")
+        assert not entries, "\n".join(entries)
 
     def end(self) -> None:
         """Kill what still runs."""
@@ -120,8 +120,8 @@ class Crew:
 
 
 @pytest.fixture
-def crew(tmp_path: Path) -> Iterator[Crew]:
-    made = Crew(tmp_path)
+def crew(tmp_path: Path) -> Iterator[WorkerPool]:
+    made = WorkerPool(tmp_path)
     yield made
     made.end()
 
@@ -134,13 +134,13 @@ def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
     return [(cached(n, fmi), fmi) for n in names for fmi in ((3,) if n in ONLY_FMI3 else (2, 3))]
 
 
-def test_a_few_sequences_on_light_units(crew: Crew, tmp_path: Path):
+def test_a_few_sequences_on_light_units(crew: WorkerPool, tmp_path: Path):
     crew.add([*sample_fmus(tmp_path), *catalog_fmus(LIGHT)], FEW)
     crew.add(catalog_fmus(LIGHT[:1]), FEW_APART, apart=True)
     crew.run()
 
 
-def test_a_unit_that_crashes_or_hangs_is_told_with_its_last_calls(crew: Crew, tmp_path: Path):
+def test_a_unit_that_crashes_or_hangs_is_told_with_its_last_calls(crew: WorkerPool, tmp_path: Path):
     for name in ("Crashing", "Hanging"):
         fmu = build_block(f"sample_units.fatal:{name}", 3, tmp_path)
         crew.jobs.append(Job(fmu, 3, "legal", MANY, tmp_path / f"{name}.ring", hung=SOON))
@@ -149,14 +149,16 @@ def test_a_unit_that_crashes_or_hangs_is_told_with_its_last_calls(crew: Crew, tm
     crash, hang = str(caught.value).split("Hanging.fmi3.fmu", 1)
     assert re.search(r"the process ended with -?\d+: Fatal Python error", crash), crash
     assert f"no call ended for {SOON:g} s" in hang
-    for told in (crash, hang):
-        assert re.search(rf"sequence --- legal sequence \d+ of seed {SEED}: ", told), told
-        assert re.fullmatch(r"x\d \[stepping\] DoStep\(.+", re.findall(r"^ +(x\d .+)$", told, re.MULTILINE)[-1]), told
+    for entries in (crash, hang):
+        assert re.search(rf"sequence --- legal sequence \d+ of seed {SEED}: ", entries), entries
+        assert re.fullmatch(r"x\d \[stepping\] DoStep\(.+", re.findall(r"^ +(x\d .+)$", entries, re.MULTILINE)[-1]), (
+            entries
+        )
     assert [job.process.poll() is None for job in crew.jobs if job.process] == [False, False]
 
 
 @pytest.mark.slow
-def test_thousands_of_sequences_on_every_unit(crew: Crew, tmp_path: Path):
+def test_thousands_of_sequences_on_every_unit(crew: WorkerPool, tmp_path: Path):
     slowest_first = sorted(UNITS, key=lambda n: (n not in ONLY_FMI3, n != "TendonArm"))
     crew.add([*catalog_fmus(tuple(slowest_first)), *sample_fmus(tmp_path)], MANY)
     crew.add(catalog_fmus(LIGHT[:1]), MANY // 5, apart=True)

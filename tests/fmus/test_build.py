@@ -9,7 +9,7 @@ from workshop import Workshop
 from written_blocks import write_block
 
 from handover.fmus.binaries import universal
-from handover.fmus.build import UnknownVersion, UnusableName, UnusableStep, build_block, cached
+from handover.fmus.build import InvalidName, InvalidStep, UnknownVersion, build_block, cached
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit
 from handover.fmus.compile import UnknownPlatform, host_platform
 from handover.fmus.sources import closure
@@ -34,7 +34,7 @@ def test_an_unknown_block_is_refused(path: str, tmp_path: Path):
 
 
 def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_path: Path):
-    with pytest.raises(UnusableName, match="two words"):
+    with pytest.raises(InvalidName, match="two words"):
         build_block("sample_units.every_kind:EveryKind", 3, tmp_path, name="two words")
     with pytest.raises(UnknownVersion, match="there are 2"):
         build_block("sample_units.every_kind:EveryKind", 1, tmp_path)
@@ -42,7 +42,7 @@ def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_pat
 
 @pytest.mark.parametrize("step", [Fraction(0), Fraction(-1), 0, 0.1, "soon", Fraction("1e400"), Fraction("1e-400")])
 def test_a_step_that_is_none_is_refused_before_anything_is_written(tmp_path: Path, step: Any):
-    with pytest.raises(UnusableStep, match=r"such as Fraction\(1, 100\), is right") as caught:
+    with pytest.raises(InvalidStep, match=r"such as Fraction\(1, 100\), is right") as caught:
         build_block("sample_units.every_kind:EveryKind", 3, tmp_path / "out", step=step)
     assert f"step of {step!r} s" in str(caught.value)
     assert not (tmp_path / "out").exists()

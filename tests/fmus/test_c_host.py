@@ -160,9 +160,9 @@ def test_a_program_that_is_no_interpreter_is_told_with_one_cure(
     program: Path, unpacked: CtypesHost, place: str, command: str
 ):
     done = run(program, unpacked, PATH="/bin:/usr/bin", FMU_PYTHON=command, FMU_PYTHON_PROCESS=place)
-    told = {"0": "cannot be run, or is no Python", "1": "before the unit had started; is it a Python 3.10 or later?"}
+    facts = {"0": "cannot be run, or is no Python", "1": "before the unit had started; is it a Python 3.10 or later?"}
     assert command in done.stdout
-    assert told[place] in done.stdout
+    assert facts[place] in done.stdout
     assert done.stdout.count("Cure: ") == 1
     assert "saved state" not in done.stdout
     assert done.returncode == 1

@@ -43,15 +43,15 @@ def test_the_variables_of_the_environment_are_those_that_the_runtime_reads(tmp_p
     assert read == set(re.findall(r"<dt><code>(FMU_\w+)</code></dt>", page_of("scalars:Scalars", tmp_path, 3)))
 
 
-@pytest.mark.parametrize(("time", "told"), [(Fraction(2, 125), "0.016 s"), (Fraction(1, 30), "1/30 s")])
-def test_times_are_decimal_where_that_is_exact(time: Fraction, told: str):
-    assert seconds(time) == told
+@pytest.mark.parametrize(("time", "content"), [(Fraction(2, 125), "0.016 s"), (Fraction(1, 30), "1/30 s")])
+def test_times_are_decimal_where_that_is_exact(time: Fraction, content: str):
+    assert seconds(time) == content
 
 
 def test_papers_are_called_as_where_their_numbers_are():
-    told = [" ".join(file.read_text().replace("\n# ", " ").split()) for file in HOUSE.glob("scenarios/*/paper.toml")]
+    content = [" ".join(file.read_text().replace("\n# ", " ").split()) for file in HOUSE.glob("scenarios/*/paper.toml")]
     for key, paper in PAPERS.items():
-        assert any(f"# {paper} [{key}]." in text for text in told), key
+        assert any(f"# {paper} [{key}]." in text for text in content), key
 
 
 def test_every_paper_that_a_block_cites_is_known():

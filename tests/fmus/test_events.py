@@ -15,7 +15,7 @@ from sample_units.scalars import Scalars
 from saved_states import deserialise, save, serialised
 from workshop import Workshop
 
-from handover.cosim.blocks.block import EndlessEvents, UnfitAdvance, step_through_events
+from handover.cosim.blocks.block import InvalidAdvance, TooManyEvents, step_through_events
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
 
@@ -230,7 +230,7 @@ class Hasty(BouncingBall):
 
 
 def test_events_without_end_and_impossible_progress_are_errors():
-    with pytest.raises(EndlessEvents, match=r"Stuck has had 1000 events at t = 1\.0 s"):
+    with pytest.raises(TooManyEvents, match=r"Stuck has had 1000 events at t = 1\.0 s"):
         step_through_events(Stuck(Params()), 1.0, 0.1, Inputs())
-    with pytest.raises(UnfitAdvance, match=r"Hasty.advance came 0\.2 s far; it was to advance by at most 0\.1 s"):
+    with pytest.raises(InvalidAdvance, match=r"Hasty.advance came 0\.2 s far; it was to advance by at most 0\.1 s"):
         step_through_events(Hasty(Params()), 1.0, 0.1, Inputs())

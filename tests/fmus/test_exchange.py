@@ -9,7 +9,7 @@ from sample_units import every_kind, eye
 
 from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers
-from handover.fmus.exchange import UnfitOutput, output_writer
+from handover.fmus.exchange import InvalidOutput, output_writer
 from handover.fmus.layout import Layout
 
 
@@ -49,19 +49,19 @@ def every_kind_with(**changed: Any) -> Buffers:
     ],
 )
 def test_an_output_of_another_type_is_refused(name: str, value: Any):
-    with pytest.raises(UnfitOutput, match=f"output '{name}' is declared as"):
+    with pytest.raises(InvalidOutput, match=f"output '{name}' is declared as"):
         every_kind_with(**{name: value})
 
 
 @pytest.mark.parametrize("value", ["text", bytearray(b"x"), None, bytes(1 << 17)])
 def test_bytes_of_another_type_or_without_room_are_refused(value: Any):
     y = eye.Outputs(brighter=np.zeros((720, 1280, 3), np.uint8), note_back=b"")
-    with pytest.raises(UnfitOutput, match="output 'note_back' is declared as binary"):
+    with pytest.raises(InvalidOutput, match="output 'note_back' is declared as binary"):
         write(eye.Eye, y, note_back=value)
 
 
 def test_the_items_of_an_enumeration_are_named():
-    with pytest.raises(UnfitOutput, match="one of 0 CALM, 1 KEEN, 5 WILD; the block gave int: 3"):
+    with pytest.raises(InvalidOutput, match="one of 0 CALM, 1 KEEN, 5 WILD; the block gave int: 3"):
         every_kind_with(mood_out=3)
 
 

@@ -8,7 +8,7 @@ from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from sample_units.trouble import Deed
 from workshop import Workshop
 
-from handover.cosim.exceptions import UnitRefused
+from handover.cosim.exceptions import InitializationError
 from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
 
@@ -84,7 +84,7 @@ def test_while_logging_is_off_only_errors_are_told(workshop: Workshop, fmi: int)
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize(
-    ("on", "chosen", "told"),
+    ("on", "chosen", "entries"),
     [
         (True, (), ["logAll", "logStatusError", "logAll"]),
         (True, (b"logAll",), ["logAll", "logStatusError", "logAll"]),
@@ -95,14 +95,16 @@ def test_while_logging_is_off_only_errors_are_told(workshop: Workshop, fmi: int)
         (False, (b"logAll",), ["logStatusError"]),
     ],
 )
-def test_a_host_chooses_categories(workshop: Workshop, fmi: int, on: bool, chosen: tuple[bytes, ...], told: list[str]):
+def test_a_host_chooses_categories(
+    workshop: Workshop, fmi: int, on: bool, chosen: tuple[bytes, ...], entries: list[str]
+):
     host = workshop.host(BLOCK, fmi)
     assert choose(host, not on) == OK
     assert choose(host, on, *chosen) == OK
     assert host.initialise() == OK
     assert host.step(7.0, 0.1) == ERROR
     assert host.call("Terminate") == OK
-    assert host.categories == told
+    assert host.categories == entries
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -135,7 +137,7 @@ def test_a_warning_is_told_while_logging_is_on(workshop: Workshop, fmi: int, on:
 def test_our_own_master_tells_a_units_name_once(workshop: Workshop, fmi: int):
     s = System()
     s.add("walker", workshop.fmu(BLOCK, fmi), gain=10.0, a=1e308)
-    with pytest.raises(UnitRefused) as raised, Master(s):
+    with pytest.raises(InitializationError) as raised, Master(s):
         pass
     assert str(raised.value) == "walker does not start: output 'b' is inf"
     assert raised.value.failure.log[-1] == f"[Error] fmi{fmi}GetReal: output 'b' is inf".replace(

@@ -22,7 +22,7 @@ from handover.cosim.fmu.description import describe_fmu
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import DuplicateName, Form, Layout
-from handover.fmus.model_description import AmbiguousName, Model, UnusableText
+from handover.fmus.model_description import AmbiguousName, InvalidText, Model
 
 ALL, WITHOUT_DATA = "declarations:Declarations", "declarations:WithoutData"
 
@@ -222,5 +222,5 @@ def test_what_an_fmu_could_not_tell_apart_is_refused():
 
 @pytest.mark.parametrize("describe_in_xml", [fmi2_description, fmi3_description])
 def test_a_text_that_xml_cannot_carry_is_refused(describe_in_xml: Any):
-    with pytest.raises(UnusableText, match=r"description of bell: 'rings \\x07' has control characters"):
+    with pytest.raises(InvalidText, match=r"description of bell: 'rings \\x07' has control characters"):
         describe_in_xml(model_of(bell=(Number, parameter(0.0, "rings \x07"))))

@@ -150,9 +150,9 @@ def test_two_processes_compile_at_once(sources: Path):
     root = str(RUNTIME.parents[1])
     call = [sys.executable, "-c", COMPILE, root, str(sources)]
     both = [subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) for _ in range(2)]
-    told = {process.communicate(timeout=150)[0].strip() for process in both}
+    line = {process.communicate(timeout=150)[0].strip() for process in both}
     assert [process.returncode for process in both] == [0, 0]
-    assert told == {str(library(host_platform(), 3))}
+    assert line == {str(library(host_platform(), 3))}
     assert is_current(host_platform())
     assert (
         library(host_platform(), 3).read_bytes()

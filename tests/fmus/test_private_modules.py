@@ -113,7 +113,7 @@ def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
 
 
 def test_an_explanation_of_a_refusal_has_no_traceback():
-    assert loader.explain(loader.Refusal("why")) == "why"
+    assert loader.explain(loader.HostError("why")) == "why"
 
 
 def test_the_prefix_of_a_units_modules_is_told_nowhere(workshop: Workshop):

@@ -13,7 +13,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from workshop import Workshop
 
-from handover.cosim.exceptions import UnitRefused, WiringError
+from handover.cosim.exceptions import InitializationError, WiringError
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.system import System
@@ -133,7 +133,7 @@ def test_our_own_master_lets_no_number_lose_its_upper_bits(workshop: Workshop):
     s = System()
     first, second = s.add("first", workshop.fmu(BLOCK, 3), i64=300), s.add("second", workshop.fmu(BLOCK, 3))
     s.connect(first.y.i64_out, second.u.u8)
-    with pytest.raises(UnitRefused, match=r"first\.i64_out is 300, which does not fit UInt8 \(from 0 to 255\)"):
+    with pytest.raises(InitializationError, match=r"first\.i64_out is 300, which does not fit UInt8 \(from 0 to 255\)"):
         Master(s).__enter__()
 
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.plain_rotation import quaternion, quaternion_multiply, row_major, vector
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, Outputs, Params, UnusableFlyer
+from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
 from handover.plants.free_flyer.rigid_body import TurnsTooFast, momentum_rates
 
 KNOWING = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
@@ -220,7 +220,7 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "text"),
     [
         ({"I_B": np.diag([0.1, 0.1, -0.1])}, "positive definite"),
         ({"I_B": np.diag([0.1, 0.1, 0.3])}, "largest may not exceed"),
@@ -233,13 +233,13 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored():
         ({"I_B": np.full((3, 3), np.nan)}, "must be finite"),
     ],
 )
-def test_what_no_body_has_is_refused(changes: dict[str, Any], told: str):
-    with pytest.raises(UnusableFlyer, match=told):
+def test_what_no_body_has_is_refused(changes: dict[str, Any], text: str):
+    with pytest.raises(InvalidFlyerParameters, match=text):
         FreeFlyer(replace(Params(), **changes))
 
 
 def test_all_faults_are_told_at_once():
-    with pytest.raises(UnusableFlyer) as caught:
+    with pytest.raises(InvalidFlyerParameters) as caught:
         FreeFlyer(Params(mass=0.0, I_B=-np.eye(3), q_WB_0=np.zeros(4)))
     assert len(caught.value.faults) == 3
 

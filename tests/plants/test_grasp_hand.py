@@ -13,13 +13,13 @@ from handover.plants.ir_grasp.hand import (
     palm_outline,
     sensor_rays,
 )
-from handover.plants.ir_grasp.world import GEARS, PULLEYS, STIFFNESS, resting_posture, taken_up
+from handover.plants.ir_grasp.world import GEARS, PULLEYS, STIFFNESS, resting_posture, tendon_excursion
 
 BENT = np.array([0.3, 0.5, 0.2, 0.4, 0.1, 0.6, 0.2, 0.3])
 ORIGIN = np.zeros(2)
 
 
-def turned(p: Floats, yaw: float) -> Floats:
+def rotate(p: Floats, yaw: float) -> Floats:
     c, s = math.cos(yaw), math.sin(yaw)
     return p @ np.array([[c, s], [-s, c]])
 
@@ -41,12 +41,12 @@ def test_thumb_is_on_the_right_and_bending_closes_the_hand():
 def test_hand_moves_rigidly_with_the_wrist():
     p_WH, yaw = np.array([0.3, -0.2]), 0.7
     for here, there in zip(finger_points(ORIGIN, 0.0, BENT), finger_points(p_WH, yaw, BENT), strict=True):
-        np.testing.assert_allclose(p_WH + turned(here, yaw), there)
-    np.testing.assert_allclose(p_WH + turned(np.array(PALM), yaw), palm_outline(p_WH, yaw))
+        np.testing.assert_allclose(p_WH + rotate(here, yaw), there)
+    np.testing.assert_allclose(p_WH + rotate(np.array(PALM), yaw), palm_outline(p_WH, yaw))
     origins, directions = sensor_rays(ORIGIN, 0.0, BENT)
     there, looking = sensor_rays(p_WH, yaw, BENT)
-    np.testing.assert_allclose(p_WH + turned(origins, yaw), there)
-    np.testing.assert_allclose(turned(directions, yaw), looking, atol=1e-15)
+    np.testing.assert_allclose(p_WH + rotate(origins, yaw), there)
+    np.testing.assert_allclose(rotate(directions, yaw), looking, atol=1e-15)
 
 
 def test_sensors_lie_on_the_pads_and_look_square_to_them_inwards():
@@ -85,5 +85,5 @@ def test_tendon_taken_up_is_the_sum_over_the_joints():
     for f, first in zip(FINGERS, (0, 2, 5), strict=True):
         q = BENT[first : first + len(f.lengths)]
         angles.extend(yaw + f.spread + f.flexion * np.cumsum(q, dtype=np.float64))
-    assert taken_up(angles, yaw) == pytest.approx(float(PULLEYS @ BENT), abs=1e-15)
+    assert tendon_excursion(angles, yaw) == pytest.approx(float(PULLEYS @ BENT), abs=1e-15)
     assert len(GEARS) == JOINTS

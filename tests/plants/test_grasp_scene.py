@@ -10,8 +10,8 @@ from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.hand import FINGERS, JOINTS, finger_points, sensor_rays
 from handover.plants.ir_grasp.objects import SOLIDS, Thing
-from handover.plants.ir_grasp.parameters import SEES_NOTHING, Params, UnusableScene
-from handover.plants.ir_grasp.scene import GraspScene, Inputs, Outputs, StepSizeError, UnusableCommand
+from handover.plants.ir_grasp.parameters import SEES_NOTHING, InvalidSceneParameters, Params
+from handover.plants.ir_grasp.scene import GraspScene, Inputs, InvalidCommand, Outputs, StepSizeError
 from handover.plants.ir_grasp.world import DT, PULLEYS, STIFFNESS, GraspWorld, beginning, resting_posture
 
 STEP = 0.015
@@ -72,11 +72,11 @@ def test_range_is_where_the_sensors_ray_meets_the_object(thing: Thing, aside: fl
     y = GraspScene(p).outputs(0.0, Inputs())
     origins, directions = sensor_rays(y.p_WH, y.yaw, y.q)
     c, s = math.cos(y.yaw_O), math.sin(y.yaw_O)
-    for o, d, told in zip(origins, directions, y.range, strict=True):
+    for o, d, value in zip(origins, directions, y.range, strict=True):
         x_O, y_O = np.array([[c, s], [-s, c]]) @ (o - y.p_WO)
         d_x, d_y = np.array([[c, s], [-s, c]]) @ d
         met = SOLIDS[thing].met(x_O, y_O, d_x, d_y)
-        assert told == pytest.approx(met[0] if met else SEES_NOTHING, abs=1e-9)
+        assert value == pytest.approx(met[0] if met else SEES_NOTHING, abs=1e-9)
 
 
 def test_noise_free_readings_of_a_narrow_beam_follow_range_and_incidence():
@@ -142,10 +142,10 @@ def test_a_step_that_is_no_multiple_of_a_millisecond_is_refused(dt: float):
 
 def test_a_command_that_is_no_number_is_refused_and_leaves_no_trace():
     scene, other = GraspScene(AROUND), GraspScene(AROUND)
-    with pytest.raises(UnusableCommand) as refused:
+    with pytest.raises(InvalidCommand) as refused:
         scene.step(0.0, STEP, inputs(x=math.nan, sigma=math.inf))
     assert [fault.split()[0] for fault in refused.value.faults] == ["p_WH_cmd", "sigma_cmd"]
-    with pytest.raises(UnusableCommand, match="yaw_cmd"):
+    with pytest.raises(InvalidCommand, match="yaw_cmd"):
         scene.step(0.0, STEP, inputs(yaw=-math.inf))
     assert scene.get_state() == other.get_state()
 
@@ -264,21 +264,21 @@ def test_an_object_before_the_fingertips_is_left_behind(thing: Thing):
     ],
 )
 def test_a_hand_in_the_object_is_refused(changes: dict[str, Any], part: str):
-    with pytest.raises(UnusableScene, match=part):
+    with pytest.raises(InvalidSceneParameters, match=part):
         GraspScene(replace(AROUND, **changes))
 
 
 def test_faults_of_the_parameters_are_told_at_once():
-    with pytest.raises(UnusableScene) as caught:
+    with pytest.raises(InvalidSceneParameters) as caught:
         GraspScene(Params(p_WO_0=np.array([0.58, 0.0]), b=0.003, nearest=0.07))
     assert len(caught.value.faults) == 4
     assert "the cylinder stands out 13 mm beyond the table" in caught.value.faults[0]
-    with pytest.raises(UnusableScene, match=r"mass_O 1e-12 kg must be 0.* or at least 0\.001 kg"):
+    with pytest.raises(InvalidSceneParameters, match=r"mass_O 1e-12 kg must be 0.* or at least 0\.001 kg"):
         GraspScene(Params(mass_O=1e-12))
-    with pytest.raises(UnusableScene, match="wrist_speed"):
+    with pytest.raises(InvalidSceneParameters, match="wrist_speed"):
         GraspScene(Params(wrist_speed=-1.0))
     handle = Params(thing=Thing.BABY_CUP_B, p_WO_0=np.array([0.55, 0.0]))
-    with pytest.raises(UnusableScene, match="4 mm beyond"):
+    with pytest.raises(InvalidSceneParameters, match="4 mm beyond"):
         GraspScene(handle)
     GraspScene(replace(handle, yaw_O_0=math.pi / 2.0))
 

@@ -28,12 +28,12 @@ def command(k: int) -> Inputs:
     return Inputs(p_WH_cmd=np.array([x, y]), yaw_cmd=0.1 * t, sigma_cmd=min(1.0, 0.1 + t))
 
 
-def told(y: Outputs) -> bytes:
+def packed(y: Outputs) -> bytes:
     return b"".join(np.asarray(getattr(y, v.name)).tobytes() for v in describe(GraspScene).outputs)
 
 
 def course(scene: GraspScene, first: int, last: int = STEPS) -> list[bytes]:
-    return [told(scene.step(k * STEP, STEP, command(k))) for k in range(first, last)]
+    return [packed(scene.step(k * STEP, STEP, command(k))) for k in range(first, last)]
 
 
 @pytest.mark.parametrize(("thing", "steps"), [(0, 0), (0, 55), (1, 90), (2, 101), (3, 67), (4, 120)])
@@ -56,7 +56,7 @@ def test_outputs_after_set_state_are_those_of_the_state():
     y = scene.outputs(90 * STEP, command(90))
     other.set_state(scene.get_state())
     assert y.touching > 2
-    assert told(other.outputs(90 * STEP, command(90))) == told(y)
+    assert packed(other.outputs(90 * STEP, command(90))) == packed(y)
 
 
 def test_states_between_readings_of_the_sensors_are_complete_too():
@@ -67,7 +67,7 @@ def test_states_between_readings_of_the_sensors_are_complete_too():
     other.set_state(scene.get_state())
     for k in range(1203, 1300):
         y, y_other = (s.step(k * 1e-3, 1e-3, command(k // 15)) for s in (scene, other))
-        assert told(y) == told(y_other)
+        assert packed(y) == packed(y_other)
         touching = y.touching
     assert touching > 2
 
@@ -78,7 +78,7 @@ def test_a_rejected_step_leaves_no_trace():
         state = rejecting.get_state()
         rejecting.step(k * STEP, STEP, Inputs(p_WH_cmd=np.array([0.1, 0.1]), sigma_cmd=0.0))
         rejecting.set_state(state)
-        assert told(rejecting.step(k * STEP, STEP, command(k))) == told(kept.step(k * STEP, STEP, command(k)))
+        assert packed(rejecting.step(k * STEP, STEP, command(k))) == packed(kept.step(k * STEP, STEP, command(k)))
 
 
 def test_the_state_stays_small():

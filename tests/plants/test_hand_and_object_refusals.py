@@ -8,10 +8,10 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand_and_object import (
     HandAndObject,
     Inputs,
+    InvalidHandParameters,
     Motion,
     Params,
     StartHolder,
-    UnusableHand,
 )
 
 
@@ -20,7 +20,7 @@ def begun(p_WG: Floats, **changes: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "text"),
     [
         ({"motion": Motion.GIVE}, "needs the object in the hand"),
         ({"object_with": StartHolder.HAND}, "needs the object elsewhere"),
@@ -38,22 +38,22 @@ def begun(p_WG: Floats, **changes: Any) -> None:
         ({"tremor_bandwidth": 20.0}, "tremor_bandwidth 20 Hz"),
     ],
 )
-def test_contradictions_are_refused(changes: dict[str, Any], told: str):
-    with pytest.raises(UnusableHand, match=told):
+def test_contradictions_are_refused(changes: dict[str, Any], text: str):
+    with pytest.raises(InvalidHandParameters, match=text):
         HandAndObject(replace(Params(), **changes))
 
 
 def test_all_faults_are_told_at_once():
-    with pytest.raises(UnusableHand) as caught:
+    with pytest.raises(InvalidHandParameters) as caught:
         HandAndObject(Params(motion=Motion.GIVE, aperture=0.01, pull_direction=np.zeros(3)))
     assert len(caught.value.faults) >= 3
 
 
 def test_a_robot_that_starts_in_the_hand_is_refused():
-    with pytest.raises(UnusableHand, match="hand starts in the gripper"):
+    with pytest.raises(InvalidHandParameters, match="hand starts in the gripper"):
         begun(np.array([-0.40, 0.13, -0.05]))
-    with pytest.raises(UnusableHand, match="object starts in the gripper's palm"):
+    with pytest.raises(InvalidHandParameters, match="object starts in the gripper's palm"):
         begun(np.array([-0.03, -0.07, 0.0]))
-    with pytest.raises(UnusableHand, match=r"between fingers .* angle_0 0\.6 rad; open them to 0\.785 rad"):
+    with pytest.raises(InvalidHandParameters, match=r"between fingers .* angle_0 0\.6 rad; open them to 0\.785 rad"):
         begun(np.array([0.0, -0.07, 0.0]), angle_0=0.60)
     begun(np.array([0.0, -0.07, 0.0]), angle_0=0.80)

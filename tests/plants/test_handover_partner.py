@@ -11,9 +11,9 @@ from handover.plants.helix.handover_partner import (
     HandoverPartner,
     Holder,
     Inputs,
+    InvalidPartnerParameters,
     Outputs,
     Params,
-    UnusablePartner,
 )
 from handover.plants.helix.tendon_arm import Inputs as ArmInputs
 from handover.plants.helix.tendon_arm import TendonArm
@@ -220,7 +220,7 @@ def test_inputs_are_not_kept():
 
 
 def test_contradicting_parameters_are_refused_all_at_once():
-    with pytest.raises(UnusablePartner) as caught:
+    with pytest.raises(InvalidPartnerParameters) as caught:
         HandoverPartner(Params(tremor_bandwidth=16.0, release_grip=0.95, floor=-0.5))
     assert len(caught.value.faults) == 3
     assert "release_grip 0.95 must be less than capture_grip" in str(caught.value)

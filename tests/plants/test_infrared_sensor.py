@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, UnusableSensor
+from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
 
 USUAL = {
     "a": 0.062,
@@ -59,9 +59,9 @@ def test_nothing_comes_back_from_afar_or_from_a_surface_that_looks_away():
 
 def test_readings_fold_back_near_contact():
     x = [SENSOR.ticks(d, 1.0, 1.0) for d in np.linspace(0.004, 0.0, 9)]
-    told = [SENSOR.distance(t) for t in x]
+    entries = [SENSOR.distance(t) for t in x]
     assert all(np.diff(x) < 0.0)
-    assert all(np.diff(told) > 0.0)
+    assert all(np.diff(entries) > 0.0)
     assert x[0] == pytest.approx(max(SENSOR.ticks(d, 1.0, 1.0) for d in np.linspace(0.0, 0.065, 1001)), rel=6e-3)
     assert x[-1] == pytest.approx(0.4 * x[0])
     assert SENSOR.ticks(-0.001, 1.0, 1.0) == x[-1]
@@ -85,11 +85,11 @@ def test_a_reading_is_a_whole_number_of_12_bits(ticks: float):
     ],
 )
 def test_a_characteristic_that_cannot_be_inverted_is_refused(changes: dict[str, float], fault: str):
-    with pytest.raises(UnusableSensor, match=fault):
+    with pytest.raises(InvalidSensorParameters, match=fault):
         sensor(**changes)
 
 
 def test_all_faults_are_told_at_once():
-    with pytest.raises(UnusableSensor) as caught:
+    with pytest.raises(InvalidSensorParameters) as caught:
         sensor(b=0.003, nearest=0.0)
     assert len(caught.value.faults) == 3

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.description import describe
-from handover.cosim.blocks.geometry import Pinhole, UnusableCalibration
+from handover.cosim.blocks.geometry import InvalidCalibration, Pinhole
 from handover.plants.helix.shapes import Pixels
-from handover.plants.helix.stereo_camera import BadCover, Inputs, Params, StereoCamera
+from handover.plants.helix.stereo_camera import Inputs, InvalidCover, Params, StereoCamera
 
 HOUSE = Path(__file__).parents[2]
 FAR = np.array([0.3, 1.5, -1.2])  # out of both pictures
@@ -148,15 +148,15 @@ def test_a_scene_out_of_sight_leaves_the_backdrop(clean: StereoCamera):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_quaternion_not_of_unit_length_is_refused(side: str):
-    with pytest.raises(UnusableCalibration, match=f"'{side}': q_WC"):
+    with pytest.raises(InvalidCalibration, match=f"'{side}': q_WC"):
         StereoCamera(replace(Params(), **{f"q_WC_{side}": np.array([1.0, 1.0, 0.0, 0.0])}))
 
 
 def test_a_focal_length_that_is_not_positive_is_refused():
-    with pytest.raises(UnusableCalibration, match="fx and fy positive"):
+    with pytest.raises(InvalidCalibration, match="fx and fy positive"):
         StereoCamera(Params(intrinsics_right=np.array([907.0, 0.0, 640.0, 360.0])))
 
 
 def test_a_cover_that_ends_before_it_begins_is_refused():
-    with pytest.raises(BadCover, match=r"'right'.*from 3\.0 s until 2\.0 s"):
+    with pytest.raises(InvalidCover, match=r"'right'.*from 3\.0 s until 2\.0 s"):
         StereoCamera(Params(cover_right_from=3.0, cover_right_until=2.0))

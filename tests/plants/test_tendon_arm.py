@@ -13,7 +13,7 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.exudyn_edge import SolverFailure
 from handover.plants.helix.tendon_arm import Inputs, Outputs, StepSizeError, TendonArm
-from handover.plants.helix.tendon_design import Params, UnusableArm
+from handover.plants.helix.tendon_design import InvalidArmParameters, Params
 
 CALIBRATED = np.repeat([0.12, 0.24, 0.24], 3)
 ANGLES = np.deg2rad([0.0, 120.0, 240.0])
@@ -249,7 +249,7 @@ def test_failure_names_the_time_and_leaves_the_arm_where_it_was():
 
 
 def test_bad_parameters_are_refused_all_at_once():
-    with pytest.raises(UnusableArm) as caught:
+    with pytest.raises(InvalidArmParameters) as caught:
         TendonArm(Params(discs_1=0, EA=-1.0, natural_length=np.array([0.14, math.nan, 0.262])))
     assert len(caught.value.faults) == 3
     for name in ("discs_1", "EA", "natural_length"):
@@ -257,7 +257,7 @@ def test_bad_parameters_are_refused_all_at_once():
 
 
 def test_an_arm_with_slack_tendons_at_rest_is_refused():
-    with pytest.raises(UnusableArm, match="segment 2 would hang slack"):
+    with pytest.raises(InvalidArmParameters, match="segment 2 would hang slack"):
         TendonArm(Params(natural_length=np.array([0.14, 0.20, 0.262])))
 
 

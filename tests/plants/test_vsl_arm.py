@@ -9,9 +9,9 @@ import pytest
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.arm import Inputs as ArmInputs
+from handover.plants.vsl.arm import InvalidInput, VslArm
 from handover.plants.vsl.arm import Outputs as ArmOutputs
-from handover.plants.vsl.arm import UnusableInput, VslArm
-from handover.plants.vsl.parameters import Link, Motion, Params, UnusableVslArm
+from handover.plants.vsl.parameters import InvalidVslArmParameters, Link, Motion, Params
 from handover.plants.vsl.statics import NoEquilibrium
 
 EXACT = Params(servo_noise=0.0, current_noise=0.0, tracker_noise=0.0, pressure_noise=0.0)
@@ -304,22 +304,24 @@ def test_unusable_inputs_are_refused_and_change_nothing(changes: dict[str, Any],
     walk(arm, ArmInputs(), 2)
     state = arm.get_state()
     u = replace(ArmInputs(), **changes)
-    with pytest.raises(UnusableInput, match=fault):
+    with pytest.raises(InvalidInput, match=fault):
         arm.step(0.04, 0.02, u)
-    with pytest.raises(UnusableInput, match=fault):
+    with pytest.raises(InvalidInput, match=fault):
         VslArm(EXACT).outputs(0.0, u)
     assert arm.get_state() == state
 
 
 def test_contradicting_parameters_are_refused_all_at_once():
-    with pytest.raises(UnusableVslArm) as caught:
+    with pytest.raises(InvalidVslArmParameters) as caught:
         VslArm(Params(motion=Motion.DYNAMIC, L_2=0.06, cap=0.04, valve_tolerance=2000.0, link_mass=0.0))
     assert len(caught.value.faults) == 3
     assert "two caps of 0.04 m leave nothing flexible of L_2 0.06 m: cap must be less than 0.03 m" in str(caught.value)
 
 
 def test_values_out_of_range_are_refused_all_at_once():
-    with pytest.raises(UnusableVslArm, match=r"L_2: -1\.0 is out of range: from 0\.01 to 2 m; hinges: 0") as caught:
+    with pytest.raises(
+        InvalidVslArmParameters, match=r"L_2: -1\.0 is out of range: from 0\.01 to 2 m; hinges: 0"
+    ) as caught:
         VslArm(Params(L_2=-1.0, hinges=0))
     assert len(caught.value.faults) == 2
 

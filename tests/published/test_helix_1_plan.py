@@ -2,7 +2,7 @@ from collections import Counter
 
 import pytest
 
-from handover.scenarios.campaign.statistics import FEWEST
+from handover.scenarios.campaign.statistics import MIN_SAMPLES
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.published.helix_1 import Helix1
@@ -24,7 +24,7 @@ def test_runs_may_take_longer_than_the_longest_published_one():
 
 def test_a_quick_one_has_each_step_size_as_often_as_intervals_need():
     plan = Helix1().plan(quick=True)
-    assert Counter(p["alpha"] for p in plan.points) == dict.fromkeys(PERIODS, FEWEST)
+    assert Counter(p["alpha"] for p in plan.points) == dict.fromkeys(PERIODS, MIN_SAMPLES)
     assert plan.repetitions == 1
     assert {p["tuning"] for p in plan.points} == {"thesis"}
 

@@ -21,7 +21,7 @@ TUNED = range(1000, 1008)
 """Seeds with which the scenario was tuned."""
 
 
-def told(run: PlannedRun) -> bool:
+def has_summary(run: PlannedRun) -> bool:
     """All hold but the blind hand, and the one that goes 35 mm forward to moved objects."""
     short = run.parameters.get("forward") == "0.035" and run.parameters["perturbed"] == "true"
     return run.parameters["strategy"] != "blind" and not short
@@ -29,7 +29,7 @@ def told(run: PlannedRun) -> bool:
 
 @pytest.fixture(scope="module")
 def table() -> CampaignTable:
-    return grasp_table(told)
+    return grasp_table(has_summary)
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_what_was_chosen_to_fit_the_table_is_not_comparable(claims: Sequence[Cla
 
 
 def test_a_hand_that_fails_as_often_as_theirs_reproduces_their_rate():
-    table = grasp_table(lambda run: told(run) and run.repetition % 4 != 0)
+    table = grasp_table(lambda run: has_summary(run) and run.repetition % 4 != 0)
     claim = one(rate_claims(IrTableRuns(table)), "The IR-guided hand holds 11 of 15")
     assert (claim.measured, claim.verdict) == ("60/80 (75 %)", Verdict.REPRODUCED)
 
@@ -119,14 +119,14 @@ def test_distances_that_no_run_of_ours_has_are_not_reproduced(claims: Sequence[C
     def spread(run: PlannedRun) -> float:
         return 0.010 + 0.001 * run.repetition
 
-    spread_out = grasp_table(told, final_distance_thumb=spread, final_distance_ring=spread)
+    spread_out = grasp_table(has_summary, final_distance_thumb=spread, final_distance_ring=spread)
     assert one(distance_claims(IrTableRuns(spread_out)), begin).verdict is Verdict.REPRODUCED
 
 
 def test_objects_pushed_before_closing_refute_that_there_is_no_premature_contact(claims: Sequence[Claim]):
     begin = "The IR-guided hand does not touch"
     assert one(claims, begin).verdict is Verdict.REPRODUCED
-    pushed = grasp_table(told, displacement=lambda run: 0.002 if run.repetition < 2 else 0.0)
+    pushed = grasp_table(has_summary, displacement=lambda run: 0.002 if run.repetition < 2 else 0.0)
     assert one(closing_claims(IrTableRuns(pushed)), begin).verdict is Verdict.NOT_REPRODUCED
 
 
@@ -142,13 +142,13 @@ def test_table_1_puts_counts_beside_the_published_and_stars_those_that_differ(ta
 
 
 def test_runs_that_did_not_come_to_their_end_do_not_count():
-    table = grasp_table(told, status=lambda run: "failed" if run.repetition == 0 else "done")
+    table = grasp_table(has_summary, status=lambda run: "failed" if run.repetition == 0 else "done")
     assert IrTableRuns(table).count(REFLEX, False) == (75, 75)
     assert "40 runs did not come to their end" in IrTable().tables(table)[0].note
 
 
 def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path):
-    table = grasp_table(told, quick=True, status=lambda _run: "lost")
+    table = grasp_table(has_summary, quick=True, status=lambda _run: "lost")
     assert {claim.verdict for claim in IrTable().claims(table)} == {Verdict.NOT_COMPARABLE}
     assert IrTable().tables(table)
     assert IrTable().draw(table, tmp_path, tmp_path)

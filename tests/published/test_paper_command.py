@@ -28,7 +28,7 @@ def test_without_a_name_it_lists_the_experiments():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "content"),
     [
         (["ir-tabel"], "no experiment 'ir-tabel': did you mean ir-table?"),
         (["ir-table", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "one of both is right"),
@@ -37,11 +37,11 @@ def test_without_a_name_it_lists_the_experiments():
     ],
 )
 def test_a_call_that_cannot_be_carried_out_is_refused_and_leaves_nothing(
-    arguments: list[str], told: str, tmp_path: Path
+    arguments: list[str], content: str, tmp_path: Path
 ):
     result = paper(*arguments, "--out", tmp_path / "c")
     assert result.exit_code == 2
-    assert told in result.output
+    assert content in result.output
     assert not (tmp_path / "c").exists()
 
 
@@ -92,6 +92,6 @@ def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
 def test_table_1_of_luberto_at_full_size(tmp_path: Path):
     result = paper("ir-table", "--out", tmp_path / "c")
     assert result.exit_code == 0, result.output
-    told = {c["claim"]: c["verdict"] for c in json.loads((tmp_path / "c/claims.json").read_text(encoding="utf-8"))}
+    content = {c["claim"]: c["verdict"] for c in json.loads((tmp_path / "c/claims.json").read_text(encoding="utf-8"))}
     for pose in ("nominal", "perturbed"):
-        assert told[f"In {pose} poses the IR-guided hand succeeds more often than the blind one."] == "reproduced"
+        assert content[f"In {pose} poses the IR-guided hand succeeds more often than the blind one."] == "reproduced"

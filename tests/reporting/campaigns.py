@@ -9,18 +9,18 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.campaign.run_job import carry_out_order
+from handover.scenarios.campaign.run_job import run_job
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 
 
 @dataclass
-class PlainCrew:
+class PlainPool:
     """Carries runs out one after another in this process, and loses those that are named."""
 
     lost: Sequence[str] = ()
@@ -28,23 +28,25 @@ class PlainCrew:
     def check(self, folder: Path) -> None:
         assert folder.is_dir()
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
-        for order in orders:
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+        for order in jobs:
             if order.name in self.lost:
-                yield RunAnswer(name=order.name, lost="its worker went away")
+                yield JobResult(name=order.name, lost="its worker went away")
                 continue
-            carry_out_order(order, Path(order.runs, order.name))
-            yield RunAnswer(name=order.name)
+            run_job(order, Path(order.runs, order.name))
+            yield JobResult(name=order.name)
 
 
 def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:
     """Carry a campaign out and return its folder."""
     folder = CampaignFolder(path)
-    carry_out_campaign(prepared(plan), folder, PlainCrew(lost), lambda _tally: None)
+    run_campaign(prepared(plan), folder, PlainPool(lost), lambda _tally: None)
     return folder
 
 
-def told(scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Any) -> dict[str, Any]:
+def campaign_metadata(
+    scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Any
+) -> dict[str, Any]:
     """Return what a campaign's file says."""
     plan: dict[str, Any] = {
         "scenario": scenario,
@@ -84,7 +86,7 @@ def results_of(
     scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Sequence[Any]
 ) -> CampaignResults:
     """Return what came out at points; columns of parameters are texts."""
-    return CampaignResults(told(scenario, points, repetitions), table_of(points, repetitions, **more))
+    return CampaignResults(campaign_metadata(scenario, points, repetitions), table_of(points, repetitions, **more))
 
 
 def folder_of(path: Path, plan: Mapping[str, Any], table: CampaignTable) -> CampaignFolder:

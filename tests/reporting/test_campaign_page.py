@@ -8,12 +8,12 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from campaigns import folder_of, table_of, told
+from campaigns import campaign_metadata, folder_of, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 
@@ -32,20 +32,20 @@ def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTa
 
 
 def test_a_campaign_that_is_not_complete_says_how_far_it_is(tmp_path: Path):
-    html = page_of(tmp_path, told("ir_grasp", POINTS, repetitions=30), table_of(POINTS, repetitions=2))
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=30), table_of(POINTS, repetitions=2))
     assert "<b>4 of 60 runs so far</b>; the same call goes on." in html
     assert "In 2 of 4 runs done the task succeeded." in html
 
 
 def test_a_campaign_without_a_run_has_a_page(tmp_path: Path):
-    html = page_of(tmp_path, told("ir_grasp", POINTS), CampaignTable(table_of(POINTS).table.slice(0, 0)))
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), CampaignTable(table_of(POINTS).table.slice(0, 0)))
     assert "<b>0 of 4 runs so far</b>" in html
     assert 'id="success"' not in html
     assert 'id="runs"' not in html
 
 
 def test_failures_are_one_if_but_their_numbers_differ(tmp_path: Path):
-    html = page_of(tmp_path, told("ir_grasp", POINTS), table_of(POINTS))
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table_of(POINTS))
     part = html[html.index('id="failures"') : html.index('id="runs"')]
     assert part.count("slipped at") == part.count("slipped at 0.1 s") == 1
     assert "000_r0001, 001_r0001" in part
@@ -53,19 +53,22 @@ def test_failures_are_one_if_but_their_numbers_differ(tmp_path: Path):
 
 def test_failures_are_one_if_but_a_numbers_sign_differs(tmp_path: Path):
     table = replaced(table_of(POINTS), "reason", ["held", "-35 mm beside it", "held", "+22 mm beside it"])
-    html = page_of(tmp_path, told("ir_grasp", POINTS), table)
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
     part = html[html.index('id="failures"') : html.index('id="runs"')]
     assert part.count("mm beside it") == part.count("-35 mm beside it") == 1
 
 
 def test_what_runs_tell_is_no_html(tmp_path: Path):
     table = replaced(table_of(POINTS), "reason", ["</script><script>alert(1)</script>"] * 4)
-    assert "<script>alert" not in page_of(tmp_path, told("ir_grasp", POINTS), table)
+    assert "<script>alert" not in page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
 
 
 def test_metrics_that_are_not_numbers_leave_gaps(tmp_path: Path):
     table = table_of(POINTS, moved=[math.nan, 0.1, math.inf, None])
-    assert "NaN" not in page_of(tmp_path, told("ir_grasp", POINTS), table).split("</nav>")[1].split("</main>")[0]
+    assert (
+        "NaN"
+        not in page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table).split("</nav>")[1].split("</main>")[0]
+    )
 
 
 def test_a_parameter_that_some_points_leave_alone_is_told_as_a_gap(tmp_path: Path):
@@ -75,7 +78,7 @@ def test_a_parameter_that_some_points_leave_alone_is_told_as_a_gap(tmp_path: Pat
         {"strategy": "forward", "thing": "cylinder", "forward": "0.03"},
         {"strategy": "forward", "thing": "cylinder", "forward": "0.04"},
     ]
-    html = page_of(tmp_path, told("ir_grasp", points, paired=True), table_of(points))
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", points, paired=True), table_of(points))
     assert "<td>reflex</td><td>cylinder</td><td>–</td>" in html
     assert "<td>forward</td><td>cylinder</td><td data-key='0.04'>40 mm</td>" in html
     assert "<td>reflex</td><td>cylinder</td><td>baby cup a</td>" in html
@@ -83,13 +86,13 @@ def test_a_parameter_that_some_points_leave_alone_is_told_as_a_gap(tmp_path: Pat
 
 def test_points_of_a_paired_campaign_are_compared(tmp_path: Path):
     table = replaced(table_of(POINTS, repetitions=6), "success", [True] * 6 + [False] * 6)
-    html = page_of(tmp_path, told("ir_grasp", POINTS, repetitions=6, paired=True), table)
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=6, paired=True), table)
     part = html[html.index('id="pairs"') : html.index('id="failures"')]
     assert "<td class=\"number\" data-key='0.03125'>0.031</td>" in part
 
 
 def test_claims_stand_with_their_verdicts(tmp_path: Path):
-    folder = folder_of(tmp_path, told("ir_grasp", POINTS), table_of(POINTS))
+    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table_of(POINTS))
     claim = Claim(
         claim="it holds <more>", published="2", measured="3", verdict=Verdict.NOT_REPRODUCED, reason="3 is not 2"
     )
@@ -103,7 +106,7 @@ def test_claims_stand_with_their_verdicts(tmp_path: Path):
 
 
 def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Path):
-    html = page_of(tmp_path, told("helix_handover", POINTS, experiment="helix-1"), table_of(POINTS))
+    html = page_of(tmp_path, campaign_metadata("helix_handover", POINTS, experiment="helix-1"), table_of(POINTS))
     part = html[html.index('id="comparison"') : html.index('id="success"')]
     assert "The campaign is of another version of helix-1, so this is left out: its runs have no tuning." in part
 
@@ -119,8 +122,8 @@ def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Pa
     ],
 )
 def test_of_a_damaged_folder_nothing_is_written(tmp_path: Path, file: str, content: str, fault: str):
-    folder = folder_of(tmp_path, told("ir_grasp", POINTS), table_of(POINTS))
+    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table_of(POINTS))
     (tmp_path / file).write_text(content, encoding="utf-8")
-    with pytest.raises(BadRunFolder, match=fault):
+    with pytest.raises(InvalidRunFolder, match=fault):
         write_campaign_page(folder)
     assert not folder.report.exists()

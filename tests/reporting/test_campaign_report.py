@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from campaigns import folder_of, table_of, told
+from campaigns import campaign_metadata, folder_of, table_of
 from click.testing import CliRunner
 
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -15,7 +15,7 @@ POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
 
 @pytest.fixture
 def campaign(tmp_path: Path) -> CampaignFolder:
-    return folder_of(tmp_path / "c", told("ir_grasp", POINTS), table_of(POINTS))
+    return folder_of(tmp_path / "c", campaign_metadata("ir_grasp", POINTS), table_of(POINTS))
 
 
 def report(*arguments: object) -> tuple[int, str]:

@@ -10,7 +10,7 @@ import pytest
 
 from handover.scenarios.reporting.graph import bent, graph_section, places, rate
 from handover.scenarios.reporting.run_page import write_run_page
-from handover.scenarios.results.run_folder import BadRunFolder, RunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 
 LOOP = [("camera", "vision"), ("vision", "servo"), ("servo", "arm"), ("arm", "camera"), ("arm", "hand"),
         ("hand", "arm"), ("hand", "camera")]  # fmt: skip
@@ -98,16 +98,16 @@ def test_without_a_system_there_is_no_section():
 
 
 @pytest.mark.parametrize(
-    ("period", "sampled", "told"),
+    ("period", "sampled", "text"),
     [(0.02, False, "20 ms"), (1 / 30, True, "33.3 ms, sampled"), (2.0, False, "2 s"), (None, False, "steps vary")],
 )
-def test_rates_are_told_as_one_reads_them(period: float | None, sampled: bool, told: str):
-    assert rate(unit("u", period=period, sampled=sampled)) == told
+def test_rates_are_told_as_one_reads_them(period: float | None, sampled: bool, text: str):
+    assert rate(unit("u", period=period, sampled=sampled)) == text
 
 
 def test_a_damaged_system_is_told_as_the_runs_fault(tmp_path: Path):
     (tmp_path / "run.json").write_text(json.dumps({"scenario": "x", "parameters": {}, "system": {"units": [1]}}))
     (tmp_path / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
-    with pytest.raises(BadRunFolder, match="what it tells of its units is damaged"):
-        write_run_page(RunFolder.left_at(tmp_path))
+    with pytest.raises(InvalidRunFolder, match="what it tells of its units is damaged"):
+        write_run_page(RunFolder.of_run(tmp_path))
     assert not (tmp_path / "report.html").exists()

@@ -32,8 +32,8 @@ def loaded_by(*arguments: str) -> set[str]:
 
 
 def test_what_carries_runs_out_loads_neither_pages_nor_statistics():
-    told = "import sys, handover.scenarios.cli.run, handover.scenarios.cli.sweep; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    line = "import sys, handover.scenarios.cli.run, handover.scenarios.cli.sweep; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
     assert not (PAGES | {"matplotlib"}) & set(done.stdout.split())
 
 

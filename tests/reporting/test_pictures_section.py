@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.reporting.pictures_section import pictures_section
-from handover.scenarios.results.pictures import write_pictures
+from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_folder import RunFolder
 
 BALL = Mark(label="ball, as measured", shape="circle", u=319.5, v=359.5, radius=32.0, colour="#ffd23f")
@@ -29,8 +29,8 @@ def html_of(folder: Path, moments: int, noise: int) -> str:
         for k in range(moments)
         for camera in ("left", "right")
     ]
-    write_pictures(folder / "pictures", pictures)
-    section = pictures_section(RunFolder.left_at(folder))
+    write_picture_files(folder / "pictures", pictures)
+    section = pictures_section(RunFolder.of_run(folder))
     assert section is not None
     return str(section.html)
 
@@ -63,4 +63,4 @@ def test_pictures_become_smaller_until_they_have_room(tmp_path: Path):
 
 
 def test_without_pictures_there_is_no_section(tmp_path: Path):
-    assert pictures_section(RunFolder.left_at(tmp_path)) is None
+    assert pictures_section(RunFolder.of_run(tmp_path)) is None

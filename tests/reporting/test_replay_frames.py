@@ -9,15 +9,15 @@ import pytest
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.reporting.replay_section import MOST, frame_rows, phase_changes
+from handover.scenarios.reporting.replay_section import MAX_FRAMES, frame_rows, phase_changes
 
 
 def test_moments_lie_evenly_in_time_where_rows_do_not():
     time = np.concatenate([np.linspace(0.0, 1.0, 5000), np.linspace(1.001, 100.0, 5000)])
     rows = frame_rows(time)
-    assert len(rows) <= MOST
+    assert len(rows) <= MAX_FRAMES
     assert (rows[0], rows[-1]) == (0, len(time) - 1)
-    assert np.diff(time[rows]).max() == pytest.approx(100.0 / (MOST - 1), rel=0.1)
+    assert np.diff(time[rows]).max() == pytest.approx(100.0 / (MAX_FRAMES - 1), rel=0.1)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 100])

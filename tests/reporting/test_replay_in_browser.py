@@ -53,9 +53,9 @@ def test_the_slider_moves_the_hand_to_where_it_was(page: Page, record: Record):
         row = rows[frame]
         turned = Rotation.from_quat(palm.q_WB[row], scalar_first=True).apply(palm.mesh.vertices)
         np.testing.assert_allclose(points(page, "palm"), palm.p_WB[row] + turned, atol=1e-6)
-        told = page.locator(".replay-told").inner_text()
+        value = page.locator(".replay-told").inner_text()
         phase = record.items("reflex.phase")[int(record["reflex.phase"][row])]
-        assert told == f"{record.time[row]:.1f} s, {phase.replace('_', ' ').lower()}"
+        assert value == f"{record.time[row]:.1f} s, {phase.replace('_', ' ').lower()}"
     assert np.abs(points(page, "palm") - before).max() > 0.02
 
 

@@ -65,10 +65,10 @@ def test_orientations_follow_each_other_the_short_way(record: Record):
 
 def test_the_axes_hold_everything_at_all_times(record: Record):
     tube = Line(label="tube", colour="#ffffff", points=MOVING[:, None] + [[0, 0, 0], [0, 3, 0]], radii=np.full(2, 0.5))
-    told = data(Replay(bodies=[CUBE], lines=[tube]), record)
-    assert np.all(np.array(told["low"]) <= [-0.5, -0.5, -0.5])
-    assert np.all(np.array(told["high"]) >= [2.5, 3.5, 0.5])
-    assert np.all(np.array(told["high"]) - told["low"] < [3.4, 4.4, 1.4])
+    value = data(Replay(bodies=[CUBE], lines=[tube]), record)
+    assert np.all(np.array(value["low"]) <= [-0.5, -0.5, -0.5])
+    assert np.all(np.array(value["high"]) >= [2.5, 3.5, 0.5])
+    assert np.all(np.array(value["high"]) - value["low"] < [3.4, 4.4, 1.4])
 
 
 def test_a_body_with_more_or_fewer_rows_than_the_record_is_refused(record: Record):

@@ -29,8 +29,8 @@ def report(*arguments: object) -> tuple[int, str]:
 
 
 def change(file: Path, **changes: Any) -> None:
-    told = json.loads(file.read_text())
-    file.write_text(json.dumps({k: v for k, v in {**told, **changes}.items() if v is not ...}))
+    value = json.loads(file.read_text())
+    file.write_text(json.dumps({k: v for k, v in {**value, **changes}.items() if v is not ...}))
 
 
 def test_page_and_figures_are_those_that_the_run_wrote(grasp: Path, copy: Path):
@@ -64,9 +64,9 @@ def test_a_run_of_another_version_of_its_scenario_says_what_is_left_out(copy: Pa
     page = (copy / "report.html").read_text()
     assert "ir_grasp has no parameter &#39;colour&#39;" in page
     assert 'id="replay"' not in page
-    status, told = report(copy, "--figures")
+    status, value = report(copy, "--figures")
     assert status == 2
-    assert "another version of ir_grasp" in told
+    assert "another version of ir_grasp" in value
 
 
 def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
@@ -78,7 +78,7 @@ def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
 
 
 @pytest.mark.parametrize(
-    ("file", "content", "told"),
+    ("file", "content", "value"),
     [
         ("run.json", None, " is the folder of neither a run (no run.json) nor a campaign (no campaign.json)"),
         ("run.json", "{", "its run.json is damaged"),
@@ -87,20 +87,20 @@ def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
         ("signals.parquet", "PAR1", "its signals.parquet is damaged"),
     ],
 )
-def test_what_is_damaged_is_told_in_a_line(copy: Path, file: str, content: str | None, told: str):
+def test_what_is_damaged_is_told_in_a_line(copy: Path, file: str, content: str | None, value: str):
     if content is None:
         (copy / file).unlink()
     else:
         (copy / file).write_text(content)
     status, printed = report(copy)
     assert (status, printed.count("\n")) == (2, 1)
-    assert told in printed
+    assert value in printed
     assert not (copy / "report.html").exists()
 
 
 def test_no_folder_and_a_full_disk(copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    status, told = report(tmp_path / "nothing")
-    assert (status, told) == (2, f"Error: {tmp_path / 'nothing'} is no folder; name that of a run or of a campaign\n")
+    status, value = report(tmp_path / "nothing")
+    assert (status, value) == (2, f"Error: {tmp_path / 'nothing'} is no folder; name that of a run or of a campaign\n")
 
     def refuse(source: Any, target: Any) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(source), str(target))
@@ -125,9 +125,9 @@ def test_a_folder_that_may_not_be_written_to(copy: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(Path, "write_text", refuse)
     monkeypatch.setattr(Path, "mkdir", refuse)
     assert report(copy) == (3, f"Error: {copy / 'report.html'} cannot be written: Permission denied\n")
-    status, told = report(copy, "--figures")
-    assert (status, told.count("\n")) == (3, 1)
-    assert "cannot be written: Permission denied" in told
+    status, value = report(copy, "--figures")
+    assert (status, value.count("\n")) == (3, 1)
+    assert "cannot be written: Permission denied" in value
 
 
 def test_a_run_of_an_ssp_has_a_page_and_figures(tmp_path: Path):

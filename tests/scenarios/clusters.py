@@ -32,11 +32,11 @@ def running(folder: Path, *command: str, **environment: str) -> Generator["subpr
 @contextlib.contextmanager
 def scheduler(folder: Path) -> Generator[str, None, None]:
     """Run a scheduler; give its address."""
-    told = folder / "scheduler.json"
-    command = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told)]
+    text = folder / "scheduler.json"
+    command = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(text)]
     with running(folder, *command) as process:
-        until(lambda: (told.exists() and told.read_text().endswith("}")) or process.poll() is not None)
-        yield json.loads(told.read_text())["address"]
+        until(lambda: (text.exists() and text.read_text().endswith("}")) or process.poll() is not None)
+        yield json.loads(text.read_text())["address"]
 
 
 @contextlib.contextmanager

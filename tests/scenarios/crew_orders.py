@@ -6,23 +6,23 @@ from pathlib import Path
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import build_block, cached
-from handover.scenarios.campaign.worker_pool import RunOrder
+from handover.scenarios.campaign.worker_pool import RunJob
 from handover.scenarios.catalog import SCENARIOS
 
 
-def order(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_grasp", seed: int = 3) -> RunOrder:
+def job(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_grasp", seed: int = 3) -> RunJob:
     """Return an order of a run that goes well."""
     runs.mkdir(exist_ok=True)
     fmus = {unit: str(cached(block, 3)) for unit, block in SCENARIOS[scenario].units.items()}
     options = MasterOptions()
-    return RunOrder(
+    return RunJob(
         name=name, scenario=scenario, parameters=parameters, seed=seed, fmus=fmus, runs=str(runs), options=options
     )
 
 
-def bad_order(runs: Path, reflex: str, built: Path, name: str = "bad", call_limit: float | None = None) -> RunOrder:
+def bad_job(runs: Path, reflex: str, built: Path, name: str = "bad", call_limit: float | None = None) -> RunJob:
     """Return an order of a run with a reflex of `failing_reflex`, whose FMU is built into a folder."""
-    good = order(runs, name)
+    good = job(runs, name)
     fmu = built / f"{reflex}.fmu"
     if not fmu.exists():
         fmu = build_block(f"failing_reflex:{reflex}", 3, built, step=Fraction(3, 200))

@@ -5,12 +5,12 @@ import sys
 from pathlib import Path
 
 if __name__ == "__main__":
-    from handover.scenarios.campaign.local_cluster import crew_at, embedded_crew
+    from handover.scenarios.campaign.local_cluster import connect_cluster, local_cluster
 
-    orders = pickle.loads(Path(sys.argv[1]).read_bytes())
+    jobs = pickle.loads(Path(sys.argv[1]).read_bytes())
     try:
-        with crew_at(sys.argv[2]) if sys.argv[2:] else embedded_crew(2) as crew:
-            for answer in crew.carry_out(orders):
-                print(answer.name, answer.lost, flush=True)
+        with connect_cluster(sys.argv[2]) if sys.argv[2:] else local_cluster(2) as pool:
+            for result in pool.run_jobs(jobs):
+                print(result.name, result.lost, flush=True)
     except KeyboardInterrupt:
         sys.exit(130)

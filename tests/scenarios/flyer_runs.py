@@ -5,17 +5,17 @@ from typing import Any
 
 from handover.fmus.build import cached
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.summary import metric_of
-from handover.scenarios.results.task import Ended, Task
+from handover.scenarios.results.summary import RunResult, metric_of
+from handover.scenarios.results.task import Task
 
 
-def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Ended:
+def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> RunResult:
     """Run a scenario with parameters as the command takes them; without figures and report unless `drawn`."""
-    return carry_out(task_of(scenario, out, *given, seed=seed, drawn=drawn), _tell_nobody, Interruption())
+    return run_task(task_of(scenario, out, *given, seed=seed, drawn=drawn), _tell_nobody, Interruption())
 
 
 def task_of(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Task:
@@ -30,7 +30,7 @@ def task_of(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int =
     )
 
 
-def metric(ended: Ended, name: str) -> float:
+def metric(ended: RunResult, name: str) -> float:
     """Return a figure of a run."""
     return metric_of(ended.summary["metrics"][name]).value
 

@@ -8,11 +8,11 @@ from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.variable import Causality
 
 
-def assert_every_default_has_its_origin(told: dict[str, dict[str, Any]], params: type[Any]) -> None:
+def assert_every_default_has_its_origin(facts: dict[str, dict[str, Any]], params: type[Any]) -> None:
     """All parameters but the seed are told, with the code's values and units."""
     declared = {v.name: v for v in declared_variables(params, Causality.PARAMETER)}
-    assert set(told) == set(declared) - {"seed"}
-    for name, entry in told.items():
+    assert set(facts) == set(declared) - {"seed"}
+    for name, entry in facts.items():
         default: Any = getattr(params(), name)
         value = default.name.lower() if declared[name].items else default
         assert np.array_equal(value, entry["value"]), name

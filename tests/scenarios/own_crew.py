@@ -5,34 +5,34 @@ import shutil
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from handover.scenarios.campaign.run_job import carry_out_order
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder
+from handover.scenarios.campaign.run_job import run_job
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 
 
-class OwnCrew:
+class InProcessPool:
     """Carries out real runs; `before` is called with each order and may raise, or return why the run is lost."""
 
-    def __init__(self, before: Callable[[RunOrder], str] = lambda _order: "") -> None:
+    def __init__(self, before: Callable[[RunJob], str] = lambda _order: "") -> None:
         self.begun: list[str] = []
         self._before = before
 
     def check(self, folder: Path) -> None:
         assert folder.is_dir()
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
-        for order in orders:
-            self.begun.append(order.name)
-            lost = self._before(order)
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+        for job in jobs:
+            self.begun.append(job.name)
+            lost = self._before(job)
             if not lost:
-                _run(order)
-            yield RunAnswer(name=order.name, lost=lost)
+                _run(job)
+            yield JobResult(name=job.name, lost=lost)
 
 
-def _run(order: RunOrder) -> None:
-    unfinished = Path(order.runs) / f".{order.name}"
+def _run(job: RunJob) -> None:
+    unfinished = Path(job.runs) / f".{job.name}"
     try:
-        carry_out_order(order, unfinished)
+        run_job(job, unfinished)
     except BaseException:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
-    os.replace(unfinished, Path(order.runs) / order.name)
+    os.replace(unfinished, Path(job.runs) / job.name)

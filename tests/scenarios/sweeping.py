@@ -52,8 +52,8 @@ def workers_of(process: int) -> list[psutil.Process]:
 def runs_in(folder: Path) -> dict[str, tuple[int, int]]:
     """Return the runs that are done, and what changes when one is done again."""
     runs = [p for p in (folder / "runs").glob("[!.]*") if p.is_dir()]
-    told = {p.name: (p / "summary.json").stat() for p in runs}
-    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in told.items()}
+    facts = {p.name: (p / "summary.json").stat() for p in runs}
+    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in facts.items()}
 
 
 def wait_for(condition: Callable[[], Any], going: Going) -> None:

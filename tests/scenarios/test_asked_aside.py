@@ -5,7 +5,7 @@ from collections.abc import Generator
 
 import pytest
 
-from handover.scenarios.campaign.cluster import asked_aside
+from handover.scenarios.campaign.cluster import call_with_timeout
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def never() -> Generator[threading.Event, None, None]:
 
 
 def test_the_answer_is_that_of_another_thread():
-    assert asked_aside(threading.get_ident, 60.0) != threading.get_ident()
+    assert call_with_timeout(threading.get_ident, 60.0) != threading.get_ident()
 
 
 def test_what_it_raises_is_raised_here():
@@ -25,9 +25,9 @@ def test_what_it_raises_is_raised_here():
         raise ValueError("no such worker")
 
     with pytest.raises(ValueError, match="no such worker"):
-        asked_aside(ask, 60.0)
+        call_with_timeout(ask, 60.0)
 
 
 def test_who_does_not_answer_is_left(never: threading.Event):
     with pytest.raises(TimeoutError, match=r"^no answer within 0\.1 s$"):
-        asked_aside(lambda: never.wait(60.0), 0.1)
+        call_with_timeout(lambda: never.wait(60.0), 0.1)

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
-from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder, Tally
+from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
 
 PLAN = CampaignPlan(
     scenario="ir_grasp",
@@ -30,7 +30,7 @@ NAMES = [run.name for run in PLAN.runs()]
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "done"
-    carry_out_campaign(prepared(PLAN), CampaignFolder(path), OwnCrew(), lambda _tally: None)
+    run_campaign(prepared(PLAN), CampaignFolder(path), InProcessPool(), lambda _tally: None)
     return path
 
 
@@ -41,12 +41,12 @@ def folder(finished: Path, tmp_path: Path) -> CampaignFolder:
 
 
 def go_on(
-    folder: CampaignFolder, plan: CampaignPlan = PLAN, crew: OwnCrew | None = None
-) -> tuple[list[str], list[Tally]]:
+    folder: CampaignFolder, plan: CampaignPlan = PLAN, pool: InProcessPool | None = None
+) -> tuple[list[str], list[RunCounts]]:
     """Return which runs were begun, and what was told."""
-    crew, told = crew or OwnCrew(), list[Tally]()
-    carry_out_campaign(prepared(plan), folder, crew, told.append)
-    return crew.begun, told
+    pool, value = pool or InProcessPool(), list[RunCounts]()
+    run_campaign(prepared(plan), folder, pool, value.append)
+    return pool.begun, value
 
 
 def without_times(table: Path) -> list[dict[str, Any]]:
@@ -64,45 +64,45 @@ def test_each_run_has_a_row_in_the_plans_order(finished: Path):
 
 
 def test_what_is_done_is_not_begun_again(folder: CampaignFolder):
-    begun, told = go_on(folder)
+    begun, value = go_on(folder)
     assert begun == []
-    assert told == [Tally(total=4, kept=4, ended=4)]
+    assert value == [RunCounts(total=4, kept=4, ended=4)]
 
 
 def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path, tmp_path: Path):
-    def interrupt(order: RunOrder) -> str:
-        if order.name == NAMES[1]:  # the third, as first repetitions of all points come first
+    def interrupt(job: RunJob) -> str:
+        if job.name == NAMES[1]:  # the third, as first repetitions of all points come first
             raise KeyboardInterrupt
         return ""
 
     folder = CampaignFolder(tmp_path / "c")
     with pytest.raises(KeyboardInterrupt):
-        go_on(folder, crew=OwnCrew(interrupt))
+        go_on(folder, pool=InProcessPool(interrupt))
     assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0], NAMES[2]]
-    begun, told = go_on(folder)
+    begun, value = go_on(folder)
     assert begun == [NAMES[1], NAMES[3]]
-    assert told[0] == Tally(total=4, kept=2, ended=2)
+    assert value[0] == RunCounts(total=4, kept=2, ended=2)
     assert without_times(folder.table) == without_times(finished)
 
 
 def test_a_run_whose_answer_did_not_come_is_in_the_table_all_the_same(tmp_path: Path):
-    class Mute(OwnCrew):
-        def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
-            for _ in super().carry_out(orders[:1]):
+    class Mute(InProcessPool):
+        def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+            for _ in super().run_jobs(jobs[:1]):
                 raise KeyboardInterrupt
             yield from ()
 
-    folder, told = CampaignFolder(tmp_path / "c"), list[Tally]()
+    folder, value = CampaignFolder(tmp_path / "c"), list[RunCounts]()
     with pytest.raises(KeyboardInterrupt):
-        carry_out_campaign(prepared(PLAN), folder, Mute(), told.append)
+        run_campaign(prepared(PLAN), folder, Mute(), value.append)
     assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0]]
-    assert told[-1] == Tally(total=4, ended=1)
+    assert value[-1] == RunCounts(total=4, ended=1)
 
 
 def test_a_lost_run_is_a_row_with_its_reason_and_tried_again(tmp_path: Path):
     folder = CampaignFolder(tmp_path / "c")
-    _, told = go_on(folder, crew=OwnCrew(lambda order: "its machine burnt" if order.name == NAMES[0] else ""))
-    assert told[-1] == Tally(total=4, ended=3, lost=1)
+    _, value = go_on(folder, pool=InProcessPool(lambda job: "its machine burnt" if job.name == NAMES[0] else ""))
+    assert value[-1] == RunCounts(total=4, ended=3, lost=1)
     row = CampaignTable.read(folder.table).rows[0]
     assert (row["status"], row["success"], row["reason"]) == ("lost", None, "its machine burnt")
     assert (row["forward"], row["simulated_seconds"], row["steps"]) == (0.03, None, None)
@@ -132,9 +132,9 @@ def test_a_run_in_which_a_unit_failed_is_done(folder: CampaignFolder):
     summary = folder.runs / NAMES[2] / "summary.json"
     failed = {"complete": False, "success": False, "failure": {"kind": "x"}, "reason": "the hand broke"}
     summary.write_text(json.dumps({**json.loads(summary.read_text()), **failed}))
-    begun, told = go_on(folder)
+    begun, value = go_on(folder)
     assert begun == []
-    assert told == [Tally(total=4, kept=4, ended=4, failed=1)]
+    assert value == [RunCounts(total=4, kept=4, ended=4, failed=1)]
     row = CampaignTable.read(folder.table).rows[2]
     assert (row["status"], row["success"], row["reason"]) == ("failed", None, "the hand broke")
 

@@ -11,10 +11,10 @@ import pytest
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.record.file_lock import folder_locked
 from handover.cosim.stepping.options import Algorithm, MasterOptions
-from handover.scenarios.campaign.folder import CampaignFolder, place_of
+from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.execution.errors import BadCrew
-from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.execution.errors import PoolError
+from handover.scenarios.results.run_folder import InvalidRunFolder
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"thing": "cylinder"}, repetitions=2
@@ -48,7 +48,7 @@ def content(folder: CampaignFolder) -> dict[str, bytes]:
 
 def refusal(folder: CampaignFolder, plan: CampaignPlan, fmus: dict[str, Path]) -> str:
     before = content(folder)
-    with pytest.raises(BadRunFolder) as caught:
+    with pytest.raises(InvalidRunFolder) as caught:
         begin(folder, plan, fmus)
     assert content(folder) == before
     return caught.value.fault
@@ -76,7 +76,7 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "text"),
     [
         ({"scenario": "flyer_impedance"}, "scenario is ir_grasp there, flyer_impedance in this call"),
         ({"points": [{"forward": "0.03"}]}, "forward is 0.03,0.1 there, 0.03 in this call"),
@@ -97,10 +97,10 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
         ({"options": MasterOptions(pace=1)}, "master's pace is not given there, 1 in this call"),
     ],
 )
-def test_another_campaign_is_refused(folder: CampaignFolder, fmus: dict[str, Path], change: dict[str, Any], told: str):
+def test_another_campaign_is_refused(folder: CampaignFolder, fmus: dict[str, Path], change: dict[str, Any], text: str):
     fault = refusal(folder, replace(PLAN, **change), fmus)
     assert fault.startswith("it is of another campaign: ")
-    assert told in fault
+    assert text in fault
 
 
 def test_points_of_the_same_values_that_are_combined_otherwise(tmp_path: Path, fmus: dict[str, Path]):
@@ -116,19 +116,19 @@ def test_another_fmu_and_another_version_are_refused(folder: CampaignFolder, fmu
     fmus["scene"].write_text("another")
     assert "unit scene is scene.fmu (sha256 " in refusal(folder, PLAN, fmus)
     fmus["scene"].write_text("scene")
-    told = folder.read()
-    told["versions"]["numpy"] = "1.0"
-    (folder.path / "campaign.json").write_text(json.dumps(told))
+    text = folder.read()
+    text["versions"]["numpy"] = "1.0"
+    (folder.path / "campaign.json").write_text(json.dumps(text))
     assert "version of numpy is 1.0 there, " in refusal(folder, PLAN, fmus)
 
 
 @pytest.mark.parametrize(
-    ("damage", "told"),
+    ("damage", "text"),
     [("{", "its campaign.json is damaged: "), ("[]", "it holds no JSON object"), ("{}", "not given")],
 )
-def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[str, Path], damage: str, told: str):
+def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[str, Path], damage: str, text: str):
     (folder.path / "campaign.json").write_text(damage)
-    assert told in refusal(folder, PLAN, fmus)
+    assert text in refusal(folder, PLAN, fmus)
 
 
 def test_files_in_place_of_folders_and_folders_in_place_of_files_are_refused(
@@ -164,10 +164,10 @@ def test_a_call_killed_before_it_told_its_campaign_is_no_obstacle(tmp_path: Path
 def test_workers_that_are_refused_leave_no_folder(tmp_path: Path, fmus: dict[str, Path]):
     def refuse(path: Path) -> None:
         assert path.is_dir()
-        raise BadCrew("no")
+        raise PoolError("no")
 
     folder = CampaignFolder(tmp_path / "a" / "b" / "c")
-    with pytest.raises(BadCrew), folder.opened(PLAN, fmus, refuse):
+    with pytest.raises(PoolError), folder.opened(PLAN, fmus, refuse):
         pass
     assert not (tmp_path / "a").exists()
 
@@ -189,15 +189,15 @@ def test_without_a_folder_the_newest_incomplete_campaign_of_the_plan_goes_on(
     tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
-    assert place_of(PLAN, fmus).path.parent == Path("campaigns")
+    assert default_folder(PLAN, fmus).path.parent == Path("campaigns")
     for name, plan in (("2026-01-01", PLAN), ("2026-01-02", PLAN), ("2026-01-03", replace(PLAN, seed=1))):
         begin(CampaignFolder(Path(f"campaigns/{name}_ir_grasp")), plan, fmus)
     Path("campaigns/2026-01-04_ir_grasp").mkdir()
     newest = CampaignFolder(Path("campaigns/2026-01-02_ir_grasp"))
-    assert place_of(PLAN, fmus).path == newest.path
+    assert default_folder(PLAN, fmus).path == newest.path
     for run in PLAN.runs():
         (newest.runs / run.name).mkdir()
         assert not newest.is_done(run)
         (newest.runs / run.name / "summary.json").touch()
     assert newest.has_all(PLAN)
-    assert not place_of(PLAN, fmus).path.exists()
+    assert not default_folder(PLAN, fmus).path.exists()

@@ -12,14 +12,14 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.campaign import local_cluster
-from handover.scenarios.campaign.cluster import ClusterCrew
+from handover.scenarios.campaign import local_cluster as dask_crew
+from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.run_server import RunServer
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import Crew, RunAnswer, RunOrder
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution import supervisor
 
@@ -34,24 +34,24 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def sweep(monkeypatch: pytest.MonkeyPatch, crew: Crew) -> Result:
+def sweep(monkeypatch: pytest.MonkeyPatch, pool: WorkerPool) -> Result:
     """Return how the command ended with a crew."""
 
     @contextlib.contextmanager
-    def given(_workers: int | None) -> Generator[Crew, None, None]:
-        yield crew
+    def given(_workers: int | None) -> Generator[WorkerPool, None, None]:
+        yield pool
 
-    monkeypatch.setattr(local_cluster, "embedded_crew", given)
+    monkeypatch.setattr(dask_crew, "local_cluster", given)
     return CliRunner().invoke(main, CALL)
 
 
-def interrupt(_order: RunOrder) -> str:
+def interrupt(_order: RunJob) -> str:
     raise KeyboardInterrupt
 
 
 def test_a_mark_for_workers_that_cannot_be_written_is_told(here: Path, monkeypatch: pytest.MonkeyPatch):
     """It is the first that a campaign which goes on writes."""
-    assert sweep(monkeypatch, OwnCrew(interrupt)).exit_code == 1
+    assert sweep(monkeypatch, InProcessPool(interrupt)).exit_code == 1
     before = sorted(here.rglob("*"))
 
     def refuse(file: Path, *_text: Any, **_options: Any) -> None:
@@ -59,28 +59,28 @@ def test_a_mark_for_workers_that_cannot_be_written_is_told(here: Path, monkeypat
         raise OSError(errno.ENOSPC, FULL, str(file))
 
     monkeypatch.setattr(Path, "write_text", refuse)
-    monkeypatch.setattr(ClusterCrew, "_ask", lambda *_question: dict[str, Any]())  # pyright: ignore
-    result = sweep(monkeypatch, ClusterCrew(None, "nowhere"))  # type: ignore[arg-type]
-    told = f"{BEGINNING}Error: c cannot be written: No space left on device\n"
-    assert (result.exit_code, result.output) == (3, told)
+    monkeypatch.setattr(ClusterPool, "_ask", lambda *_question: dict[str, Any]())  # pyright: ignore
+    result = sweep(monkeypatch, ClusterPool(None, "nowhere"))  # type: ignore[arg-type]
+    text = f"{BEGINNING}Error: c cannot be written: No space left on device\n"
+    assert (result.exit_code, result.output) == (3, text)
     assert sorted(here.rglob("*")) == before
 
 
 def test_a_run_without_room_stops_it_and_what_is_done_stays(monkeypatch: pytest.MonkeyPatch):
-    class Full(OwnCrew):
-        def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
-            yield from super().carry_out(orders[:1])
-            yield RunAnswer(name=orders[1].name, lost="it was lost", no_room="Disk quota exceeded")
+    class Full(InProcessPool):
+        def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+            yield from super().run_jobs(jobs[:1])
+            yield JobResult(name=jobs[1].name, lost="it was lost", no_room="Disk quota exceeded")
             raise AssertionError("no other run is waited for")
 
     result = sweep(monkeypatch, Full())
-    told = "c/runs/000_r0001 cannot be written: Disk quota exceeded; 1 of 3 runs done; the same call goes on"
-    assert (result.exit_code, result.output) == (3, f"{BEGINNING}Error: {told}\n")
+    text = "c/runs/000_r0001 cannot be written: Disk quota exceeded; 1 of 3 runs done; the same call goes on"
+    assert (result.exit_code, result.output) == (3, f"{BEGINNING}Error: {text}\n")
     assert CampaignTable.read(Path("c")).column("run").tolist() == ["000_r0000"]
 
 
 def test_words_of_a_full_disk_stop_nothing(monkeypatch: pytest.MonkeyPatch):
-    result = sweep(monkeypatch, OwnCrew(lambda _order: f"its camera says: {FULL}"))
+    result = sweep(monkeypatch, InProcessPool(lambda _order: f"its camera says: {FULL}"))
     assert result.exit_code == 3
     assert "3 lost" in result.output
     assert "cannot be written" not in result.output
@@ -94,13 +94,13 @@ def test_a_run_server_without_room_for_what_a_run_prints_answers(
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
-    order = RunOrder(name="r", scenario="none", parameters=(), seed=0, fmus={}, runs=str(here), options=MasterOptions())
-    orders, answers = io.BytesIO(pickle.dumps((order, here / ".r"))), io.BytesIO()
+    job = RunJob(name="r", scenario="none", parameters=(), seed=0, fmus={}, runs=str(here), options=MasterOptions())
+    jobs, results = io.BytesIO(pickle.dumps((job, here / ".r"))), io.BytesIO()
     monkeypatch.setattr(supervisor, "can_supervise", lambda: False)
-    RunServer(orders, answers).serve()
+    RunServer(jobs, results).serve()
     said = os.strerror(number)
-    told = RunAnswer(name="r", lost=f"{here} cannot be written: {said}", no_room=said if full else "")
-    assert pickle.loads(answers.getvalue()) == told
+    text = JobResult(name="r", lost=f"{here} cannot be written: {said}", no_room=said if full else "")
+    assert pickle.loads(results.getvalue()) == text
 
 
 def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
@@ -112,7 +112,7 @@ def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
         replace(source, target)
 
     monkeypatch.setattr(os, "replace", refuse)
-    result = sweep(monkeypatch, OwnCrew())
+    result = sweep(monkeypatch, InProcessPool())
     assert (result.exit_code, result.output) == (
         3,
         f"{BEGINNING}Error: c/runs.parquet cannot be written: No space left on device; "

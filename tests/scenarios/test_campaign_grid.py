@@ -3,7 +3,7 @@
 import pytest
 
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.handovers import RobotToHuman
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
@@ -11,7 +11,7 @@ from handover.scenarios.vsl.path_experiments import VslHybrid
 
 
 def faults(*given: str) -> list[str]:
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         parse_grid(HelixHandover, given)
     return list(caught.value.faults)
 
@@ -49,7 +49,7 @@ def test_values_have_one_text_whatever_was_written(text: str, wanted: list[str])
 
 def test_a_range_of_whole_numbers():
     assert parse_grid(VslHybrid, ["points=10:30:3"]) == [{"points": "10"}, {"points": "20"}, {"points": "30"}]
-    with pytest.raises(BadParameter, match=r"points: 12\.5 is not a whole number"):
+    with pytest.raises(InvalidParameter, match=r"points: 12\.5 is not a whole number"):
         parse_grid(VslHybrid, ["points=10:15:3"])
 
 
@@ -93,8 +93,8 @@ def test_arrays_stand_between_semicolons():
     ],
 )
 def test_what_means_nothing_is_told_in_a_line(text: str, fault: str):
-    (told,) = faults(text)
-    assert told.startswith(fault)
+    (value,) = faults(text)
+    assert value.startswith(fault)
 
 
 def test_all_faults_are_told_at_once():
@@ -110,7 +110,7 @@ def test_a_grid_too_large_is_refused_before_it_is_made():
 def test_a_parameter_cannot_be_varied_and_set():
     points = parse_grid(HelixHandover, ["alpha=0.1,0.2"])
     assert set_parameters(HelixHandover, ["patience=1"], points) == {"patience": "1"}
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         set_parameters(HelixHandover, ["alpha=0.3", "patience=1", "patience=2", "alhpa=1", "x"], points)
     assert list(caught.value.faults) == [
         "patience is given twice",

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
-from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunAnswer, RunOrder, Tally
+from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
 from handover.scenarios.cli.campaign import CampaignInterruption, call_campaign
 
 PLAN = CampaignPlan(
@@ -30,11 +30,11 @@ def interrupt() -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
-class MuteCrew(OwnCrew):
+class SilentPool(InProcessPool):
     """Carries runs out and answers for none, as one that was lost just then."""
 
-    def carry_out(self, orders: Sequence[RunOrder]) -> Generator[RunAnswer, None, None]:
-        for _ in super().carry_out(orders):
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+        for _ in super().run_jobs(jobs):
             pass
         yield from ()
 
@@ -52,20 +52,20 @@ class InterruptedEnd:
         pass
 
     @contextlib.contextmanager
-    def start(self) -> Generator[OwnCrew, None, None]:
-        yield OwnCrew()
+    def start(self) -> Generator[InProcessPool, None, None]:
+        yield InProcessPool()
         interrupt()
         self.ended = True
 
 
 def test_as_the_table_is_completed(tmp_path: Path):
-    def progress(tally: Tally) -> None:
-        if tally.ended == len(NAMES):  # told as the runs are found that have ended without an answer
+    def progress(counts: RunCounts) -> None:
+        if counts.ended == len(NAMES):  # told as the runs are found that have ended without an answer
             interrupt()
 
     folder = CampaignFolder(tmp_path / "c")
     with CampaignInterruption() as interruption, pytest.raises(KeyboardInterrupt):
-        carry_out_campaign(prepared(PLAN), folder, MuteCrew(), progress, interruption.held_back)
+        run_campaign(prepared(PLAN), folder, SilentPool(), progress, interruption.deferred_signals)
     assert CampaignTable.read(folder.table).column("run").tolist() == NAMES
 
 

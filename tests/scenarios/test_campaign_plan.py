@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 
-from handover.scenarios.campaign.plan import MOST_REPETITIONS, CampaignPlan
+from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 
 PLAN = CampaignPlan(
     scenario="ir_grasp",
@@ -42,7 +42,7 @@ def test_all_runs_of_a_large_campaign_differ_in_seed_and_name():
 
 def test_names_are_those_of_files_whatever_the_values_are():
     values = {"model": "/home/x/my model.json", "load": "0.1", "pressure": "1" * 90}
-    (run, *_, last) = CampaignPlan(scenario="vsl_hybrid", points=[values], repetitions=MOST_REPETITIONS).runs()
+    (run, *_, last) = CampaignPlan(scenario="vsl_hybrid", points=[values], repetitions=MAX_REPETITIONS).runs()
     assert run.name.startswith("000_model=-home-x-my-model.json_load=0.1_pressure=111")
     assert re.fullmatch(r"[A-Za-z0-9.,=+_-]{80}", run.name)
     assert last.name.endswith("_r9999")

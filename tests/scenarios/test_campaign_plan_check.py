@@ -6,8 +6,8 @@ import pytest
 
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import checked_plan, unit_fmus
-from handover.scenarios.execution.errors import BadCall
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.experiment.parameters import InvalidParameter
 
 
 def plan(**given: object) -> CampaignPlan:
@@ -22,7 +22,7 @@ def test_texts_of_the_same_values_make_the_same_plan():
 
 def test_values_that_do_not_fit_each_other_are_told_with_their_point():
     wrong = plan(points=[{"shift_least": "0.04"}, {"shift_least": "0.06"}, {"shift_least": "9"}])
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         checked_plan(wrong)
     assert list(caught.value.faults) == [
         "at shift_least=0.06: shift_least 0.06 m must be at most shift_most 0.05 m",
@@ -32,7 +32,7 @@ def test_values_that_do_not_fit_each_other_are_told_with_their_point():
 
 def test_of_many_faults_the_first_are_told_and_how_many_more():
     wrong = plan(points=[{"shift_least": f"0.0{n}"} for n in range(51, 75)])
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         checked_plan(wrong)
     assert len(caught.value.faults) == 9
     assert caught.value.faults[-1] == "and 16 faults more"
@@ -48,12 +48,12 @@ SIZES: list[tuple[int, int, str]] = [
 
 @pytest.mark.parametrize(("points", "repetitions", "fault"), SIZES)
 def test_sizes_out_of_bounds(points: int, repetitions: int, fault: str):
-    with pytest.raises(BadParameter, match=re.escape(fault)):
+    with pytest.raises(InvalidParameter, match=re.escape(fault)):
         checked_plan(plan(points=[dict[str, str]()] * points, repetitions=repetitions))
 
 
 def test_unknown_scenario_and_unit():
-    with pytest.raises(BadCall, match="did you mean ir_grasp"):
+    with pytest.raises(UsageError, match="did you mean ir_grasp"):
         checked_plan(plan(scenario="ir_gasp"))
-    with pytest.raises(BadCall, match="ir_grasp has no unit 'sceen': did you mean scene"):
+    with pytest.raises(UsageError, match="ir_grasp has no unit 'sceen': did you mean scene"):
         unit_fmus(plan(units={"sceen": "x.fmu"}))

@@ -6,41 +6,41 @@ import threading
 
 import pytest
 
-from handover.scenarios.campaign.worker_pool import Tally
-from handover.scenarios.cli.campaign import CampaignProgress, told_done, told_left
+from handover.scenarios.campaign.worker_pool import RunCounts
+from handover.scenarios.cli.campaign import CampaignProgress, format_progress, format_time_left
 
 
 @pytest.mark.parametrize(
-    ("tally", "elapsed", "told"),
+    ("counts", "elapsed", "text"),
     [
-        (Tally(total=60), 5.0, ""),
-        (Tally(total=60, ended=60), 5.0, ""),
-        (Tally(total=60, ended=30), 30.0, "30 s left"),
-        (Tally(total=60, kept=20, ended=30), 30.0, "2 min left"),
-        (Tally(total=60, ended=5, lost=5), 1200.0, "1.7 h left"),
-        (Tally(total=60, ended=59), 1.0, "1 s left"),
+        (RunCounts(total=60), 5.0, ""),
+        (RunCounts(total=60, ended=60), 5.0, ""),
+        (RunCounts(total=60, ended=30), 30.0, "30 s left"),
+        (RunCounts(total=60, kept=20, ended=30), 30.0, "2 min left"),
+        (RunCounts(total=60, ended=5, lost=5), 1200.0, "1.7 h left"),
+        (RunCounts(total=60, ended=59), 1.0, "1 s left"),
     ],
 )
-def test_what_is_left_is_reckoned_from_the_runs_of_this_call(tally: Tally, elapsed: float, told: str):
-    assert told_left(tally, elapsed) == told
+def test_what_is_left_is_reckoned_from_the_runs_of_this_call(counts: RunCounts, elapsed: float, text: str):
+    assert format_time_left(counts, elapsed) == text
 
 
 def test_failed_and_lost_runs_are_told_where_there_are_any():
-    assert told_done(Tally(total=60, ended=12)) == "12 of 60 runs done"
-    assert told_done(Tally(total=60, ended=12, failed=2, lost=1)) == "12 of 60 runs done, 2 failed, 1 lost"
+    assert format_progress(RunCounts(total=60, ended=12)) == "12 of 60 runs done"
+    assert format_progress(RunCounts(total=60, ended=12, failed=2, lost=1)) == "12 of 60 runs done, 2 failed, 1 lost"
 
 
 def test_a_log_gets_a_line_every_half_minute():
     now, stream = [0.0], io.StringIO()
     with CampaignProgress(stream, lambda: now[0]) as progress:
         for ended in range(11):
-            progress(Tally(total=10, ended=ended))
+            progress(RunCounts(total=10, ended=ended))
             now[0] += 8.0
     assert stream.getvalue().splitlines() == [
         "4 of 10 runs done, 48 s left",
         "8 of 10 runs done, 16 s left",
     ]
-    assert progress.tally == Tally(total=10, ended=10)
+    assert progress.counts == RunCounts(total=10, ended=10)
 
 
 def test_a_log_gets_lines_also_before_the_first_run_has_ended():
@@ -48,7 +48,7 @@ def test_a_log_gets_lines_also_before_the_first_run_has_ended():
     with CampaignProgress(stream, lambda: now[0]) as progress:
         now[0] = 30.0
         progress.tell()
-        progress(Tally(total=10))
+        progress(RunCounts(total=10))
         now[0] = 59.0
         progress.tell()
         now[0] = 60.0
@@ -57,15 +57,15 @@ def test_a_log_gets_lines_also_before_the_first_run_has_ended():
 
 
 def test_nobody_has_to_ask_for_a_line():
-    told = threading.Event()
+    text = threading.Event()
 
     class Stream(io.StringIO):
         def flush(self) -> None:
-            told.set()
+            text.set()
 
     ticks = itertools.count(0.0, 31.0)
     with CampaignProgress(Stream(), lambda: next(ticks)):
-        assert told.wait(60)
+        assert text.wait(60)
 
 
 class Terminal(io.StringIO):
@@ -77,9 +77,9 @@ def test_a_terminal_gets_a_bar_that_goes_at_the_end(monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("TERM", "xterm")
     now, stream = [0.0], Terminal()
     with CampaignProgress(stream, lambda: now[0]) as progress:
-        progress(Tally(total=10))
+        progress(RunCounts(total=10))
         now[0] = 5.0
-        progress(Tally(total=10, ended=5, failed=1))
+        progress(RunCounts(total=10, ended=5, failed=1))
     assert "5 of 10 runs done, 1 failed" in stream.getvalue()
     assert "5 s left" in stream.getvalue()
     assert stream.getvalue().endswith("\x1b[2K")

@@ -10,15 +10,15 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import table_of
-from handover.scenarios.campaign.worker_pool import Tally
+from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign_summary import print_campaign
 from handover.scenarios.experiment.experiment import Metric
 
 
 def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixture[str]) -> str:
-    told = {"scenario": plan.scenario, "points": plan.points, "repetitions": plan.repetitions}
-    results = CampaignResults(told, CampaignTable(table_of(plan, rows)))
-    print_campaign(results, Tally(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
+    output = {"scenario": plan.scenario, "points": plan.points, "repetitions": plan.repetitions}
+    results = CampaignResults(output, CampaignTable(table_of(plan, rows)))
+    print_campaign(results, RunCounts(total=plan.size, ended=len(rows)), CampaignFolder(Path("c")))
     return capsys.readouterr().out
 
 
@@ -34,8 +34,8 @@ def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest
         )
         for run in plan.runs()
     ]
-    told = printed(plan, rows, capsys)
-    (row,) = [line.split() for line in told.splitlines() if " of 10 " in line and "runs" not in line]
+    output = printed(plan, rows, capsys)
+    (row,) = [line.split() for line in output.splitlines() if " of 10 " in line and "runs" not in line]
     # Clopper and Pearson of 9 of 10, as in tables: 0.555 to 0.997
     assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
 
@@ -46,11 +46,11 @@ def test_of_many_points_and_reasons_the_first_are_told(capsys: pytest.CaptureFix
         RunRow(run=run, status="failed", success=None, reason=f"the hand broke {run.point % 10} times")
         for run in plan.runs()
     ]
-    told = printed(plan, rows, capsys)
-    assert "and 88 points more" in told
-    assert "10 failed: the hand broke 3 times" in told
-    assert "and 5 reasons more, in the table" in told
-    assert len(told.splitlines()) <= 24
+    output = printed(plan, rows, capsys)
+    assert "and 88 points more" in output
+    assert "10 failed: the hand broke 3 times" in output
+    assert "and 5 reasons more, in the table" in output
+    assert len(output.splitlines()) <= 24
 
 
 def test_a_page_that_is_older_than_the_table_is_not_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -58,10 +58,10 @@ def test_a_page_that_is_older_than_the_table_is_not_told(tmp_path: Path, capsys:
     results = CampaignResults({"scenario": "ir_grasp", "points": [{}]}, CampaignTable(table_of(plan, [])))
     for file in (folder.table, folder.report):
         file.touch()
-    for age, told in ((-1, True), (1, False)):
+    for age, output in ((-1, True), (1, False)):
         os.utime(folder.table, (0, folder.report.stat().st_mtime + age))
-        print_campaign(results, Tally(total=1, ended=1), folder)
-        assert ("report: " in capsys.readouterr().out) == told
+        print_campaign(results, RunCounts(total=1, ended=1), folder)
+        assert ("report: " in capsys.readouterr().out) == output
 
 
 def test_a_campaign_that_varies_nothing_has_one_row(capsys: pytest.CaptureFixture[str]):

@@ -60,9 +60,9 @@ def test_a_command_that_is_killed_goes_on_with_the_same_call(worker_killed: Path
     with sweeping(*CALL, "--workers", "2", "--out", out) as going:
         wait_for(lambda: len(runs_in(out)) >= 40, going)
         workers_of(going.pid)[0].kill()
-        status, told, errors = ended(going)
+        status, value, errors = ended(going)
     assert status == 0, errors
-    assert "60 of 60 runs done" in told
+    assert "60 of 60 runs done" in value
     assert before.items() <= runs_in(out).items()
     assert without_times(out) == without_times(worker_killed)
     assert list((out / "runs").glob(".*")) == []

@@ -12,7 +12,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import TableWriter, table_of
 from handover.scenarios.experiment.experiment import Metric
-from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder
 
 PLAN = CampaignPlan(
     scenario="vsl_hybrid",
@@ -113,9 +113,9 @@ def test_it_is_written_seldom_while_runs_come_fast(tmp_path: Path, monkeypatch: 
 
 
 def test_a_table_that_is_none_or_torn_is_told(tmp_path: Path, table: CampaignTable):
-    with pytest.raises(BadRunFolder, match=r"it has no runs\.parquet"):
+    with pytest.raises(InvalidRunFolder, match=r"it has no runs\.parquet"):
         CampaignTable.read(tmp_path)
     pq.write_table(table.table, tmp_path / "runs.parquet")
     (tmp_path / "runs.parquet").write_bytes((tmp_path / "runs.parquet").read_bytes()[:900])
-    with pytest.raises(BadRunFolder, match=r"its runs\.parquet is damaged"):
+    with pytest.raises(InvalidRunFolder, match=r"its runs\.parquet is damaged"):
         CampaignTable.read(tmp_path)

@@ -109,8 +109,8 @@ def test_a_source_that_python_cannot_read_is_told_with_file_and_line(
     result = check(file)
     assert result.exit_code == 1
     place = source.removeprefix("resources/sources/")
-    told = re.search(rf"- instantiation: SyntaxError: {fault}.*\({place}, line 2\)", result.output, re.DOTALL)
-    assert told, result.output
+    output = re.search(rf"- instantiation: SyntaxError: {fault}.*\({place}, line 2\)", result.output, re.DOTALL)
+    assert output, result.output
     lines = result.output.splitlines()
     assert any(line.startswith(" " * 13 + "|   File ") and line.endswith(f'{source}", line 2') for line in lines)
     assert any(line.startswith(" " * 13 + f"| SyntaxError: {fault}") for line in lines)

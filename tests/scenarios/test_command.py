@@ -21,9 +21,9 @@ def call(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
-def assert_refused(result: Result, told: str, *untouched: Path) -> None:
+def assert_refused(result: Result, sentence: str, *untouched: Path) -> None:
     assert result.exit_code == 2, result.output
-    assert told in result.output
+    assert sentence in result.output
     assert "Traceback" not in result.output
     assert not re.search(r"_fmu_[0-9a-f]{16}", result.output)  # the private name of a unit's modules
     for path in untouched:
@@ -79,7 +79,7 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "sentence"),
     [
         (("run", "helix_hand"), "did you mean helix_handover?"),
         (("list", "nothing_like_it"), "valid: FreeFlyer, "),
@@ -120,9 +120,9 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
     ],
 )
-def test_a_bad_call_is_refused_with_what_would_be_right(tmp_path: Path, arguments: tuple[str, ...], told: str):
+def test_a_bad_call_is_refused_with_what_would_be_right(tmp_path: Path, arguments: tuple[str, ...], sentence: str):
     out = tmp_path / "out"
-    assert_refused(call(*arguments, "--out", out) if arguments[0] != "list" else call(*arguments), told, out)
+    assert_refused(call(*arguments, "--out", out) if arguments[0] != "list" else call(*arguments), sentence, out)
 
 
 def test_a_folder_in_use_is_refused_before_anything_runs(tmp_path: Path):

@@ -13,12 +13,12 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from clusters import scheduler, worker
-from crew_orders import bad_order, order
+from crew_orders import bad_job, job
 from living import lives, parent, servers, until
 
-from handover.scenarios.campaign.local_cluster import crew_at
+from handover.scenarios.campaign.local_cluster import connect_cluster
 from handover.scenarios.campaign.scheduler import scheduler_address
-from handover.scenarios.execution.errors import BadCrew
+from handover.scenarios.execution.errors import PoolError
 
 pytestmark = [
     pytest.mark.slow,
@@ -34,22 +34,22 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str, None, No
 
 def test_threads_of_a_worker_carry_out_runs_side_by_side(address: str, tmp_path: Path):
     runs = tmp_path / "runs"
-    orders = [order(runs, f"run_{i}", seed=i) for i in range(4)]
-    orders.append(bad_order(runs, "Crashes", tmp_path))
+    jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
+    jobs.append(bad_job(runs, "Crashes", tmp_path))
     with worker(tmp_path, address, threads=2) as process:
-        with crew_at(scheduler_address(address.removeprefix("tcp://"))) as crew:
-            assert crew.workers == 2
-            crew.check(runs)
-            answers = [(answer.name, answer.lost) for answer in crew.carry_out(orders)]
+        with connect_cluster(scheduler_address(address.removeprefix("tcp://"))) as pool:
+            assert pool.workers == 2
+            pool.check(runs)
+            results = [(result.name, result.lost) for result in pool.run_jobs(jobs)]
             assert len(servers(process)) == 2
-        assert sorted(answers) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
+        assert sorted(results) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
         assert servers(process) == []  # though the cluster lives on
 
 
 def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp_path: Path):
     runs = tmp_path / "runs"
-    orders = [bad_order(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
-    (tmp_path / "orders").write_bytes(pickle.dumps(orders))
+    jobs = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
+    (tmp_path / "orders").write_bytes(pickle.dumps(jobs))
     program = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders"), address]
     with worker(tmp_path, address, threads=2) as process:
         with subprocess.Popen(program) as command:
@@ -65,8 +65,8 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp
 
 def test_a_cluster_without_workers_is_refused(address: str):
     with (
-        pytest.raises(BadCrew, match=f"{address} has no workers; `dask worker {address}` starts some"),
-        crew_at(address),
+        pytest.raises(PoolError, match=f"{address} has no workers; `dask worker {address}` starts some"),
+        connect_cluster(address),
     ):
         pass
 
@@ -78,10 +78,10 @@ def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path):
     places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     with (
         worker(tmp_path, address, PYTHONPATH=places),
-        crew_at(address) as crew,
-        pytest.raises(BadCrew, match=r"worker tcp://[\d.:]+ has other versions: handover-cosim 9\.9 \(here "),
+        connect_cluster(address) as pool,
+        pytest.raises(PoolError, match=r"worker tcp://[\d.:]+ has other versions: handover-cosim 9\.9 \(here "),
     ):
-        crew.check(tmp_path)
+        pool.check(tmp_path)
 
 
 def test_a_worker_without_this_package_is_refused(address: str, tmp_path: Path):
@@ -90,33 +90,33 @@ def test_a_worker_without_this_package_is_refused(address: str, tmp_path: Path):
     places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     with (
         worker(tmp_path, address, PYTHONPATH=places),
-        crew_at(address) as crew,
-        pytest.raises(BadCrew, match=r"worker tcp://[\d.:]+ cannot run this package: .*scenarios\.campaign"),
+        connect_cluster(address) as pool,
+        pytest.raises(PoolError, match=r"worker tcp://[\d.:]+ cannot run this package: .*scenarios\.campaign"),
     ):
-        crew.check(tmp_path)
+        pool.check(tmp_path)
 
 
 def test_a_worker_that_does_not_see_the_folder_is_refused(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    with worker(tmp_path, address), crew_at(address) as crew:
+    with worker(tmp_path, address), connect_cluster(address) as pool:
         (tmp_path / "here").mkdir()
         monkeypatch.chdir(tmp_path / "here")
         with pytest.raises(
-            BadCrew, match=r"worker tcp://[\d.:]+ cannot use .* does not see what is written there \(No such file"
+            PoolError, match=r"worker tcp://[\d.:]+ cannot use .* does not see what is written there \(No such file"
         ):
-            crew.check(Path("/proc/self/cwd"))  # another folder in each process
+            pool.check(Path("/proc/self/cwd"))  # another folder in each process
         assert list((tmp_path / "here").iterdir()) == []
 
 
 def test_workers_that_are_killed_are_replaced(address: str, tmp_path: Path):
     runs = tmp_path / "runs"
-    with worker(tmp_path, address) as process, crew_at(address) as crew:
-        told: list[str] = []
-        for answer in crew.carry_out([order(runs, f"run_{i}", seed=i) for i in range(4)]):
-            if not told:
+    with worker(tmp_path, address) as process, connect_cluster(address) as pool:
+        entries: list[str] = []
+        for result in pool.run_jobs([job(runs, f"run_{i}", seed=i) for i in range(4)]):
+            if not entries:
                 (server,) = servers(process)
                 os.kill(parent(server), signal.SIGKILL)
-            assert answer.lost == ""
-            told.append(answer.name)
-    assert sorted(told) == [f"run_{i}" for i in range(4)]
+            assert result.lost == ""
+            entries.append(result.name)
+    assert sorted(entries) == [f"run_{i}" for i in range(4)]

@@ -22,7 +22,7 @@ slow = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    ("bad", "fmi", "told", "kind"),
+    ("bad", "fmi", "text", "kind"),
     [
         ("crashes", 3, CRASH, "crash"),
         pytest.param("hangs", 2, HANG, "hang", marks=slow),
@@ -32,12 +32,12 @@ slow = pytest.mark.slow
     ],
 )
 def test_a_run_whose_unit_does_not_come_back_is_complete_to_the_last_good_step(
-    bad: str, fmi: int, told: str, kind: str, tmp_path: Path
+    bad: str, fmi: int, text: str, kind: str, tmp_path: Path
 ):
     going = start(tmp_path, failing_ssp(tmp_path, bad, fmi), "--out", "r", "--call-limit", "0.5")
     shown, errors = going.communicate(timeout=120)
     assert going.returncode == 3, errors
-    assert errors == told.format(fmi) + "\n"
+    assert errors == text.format(fmi) + "\n"
     assert f"{bad}.ssp failed: a unit failed: " in shown
     assert shown.endswith("report: r/report.html\n")
     out = tmp_path / "r"

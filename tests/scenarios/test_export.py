@@ -51,7 +51,7 @@ def test_an_exported_scenario_gives_the_same_signals_as_the_scenario(name: str, 
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "text"),
     [
         (("ir_gasp", "--ssp", "a.ssp"), "did you mean ir_grasp"),
         (("IrReflex", "--ssp", "a.ssp"), "IrReflex is a unit, not a scenario"),
@@ -65,14 +65,14 @@ def test_an_exported_scenario_gives_the_same_signals_as_the_scenario(name: str, 
     ],
 )
 def test_what_cannot_be_exported_is_told_and_nothing_is_written(
-    arguments: tuple[str, ...], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arguments: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     (tmp_path / "folder.ssp").mkdir()
     result = call("export", *arguments)
     assert result.exit_code == 2, result.output
-    assert told in " ".join(result.output.split())
+    assert text in " ".join(result.output.split())
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.ssp"]
 
 

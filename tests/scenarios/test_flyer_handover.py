@@ -12,7 +12,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.handovers import (
     Collaborative,
     FailedReception,
@@ -107,10 +107,10 @@ def test_a_pull_that_is_too_weak_is_not_felt_and_the_verdict_says_so(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("place", "told"), [("50,-0.07,0", "from -1 to 1 m"), ("0.9,0.9,0.9", "out of the person's reach")]
+    ("place", "text"), [("50,-0.07,0", "from -1 to 1 m"), ("0.9,0.9,0.9", "out of the person's reach")]
 )
-def test_a_place_out_of_reach_is_refused_before_anything_is_written(tmp_path: Path, place: str, told: str):
-    with pytest.raises(BadParameter, match=told):
+def test_a_place_out_of_reach_is_refused_before_anything_is_written(tmp_path: Path, place: str, text: str):
+    with pytest.raises(InvalidParameter, match=text):
         run(RobotToHuman, tmp_path / "r", f"p_WG_handover={place}")
     assert not (tmp_path / "r").exists()
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from flyer_runs import metric, run
 
-from handover.cosim.exceptions import UnitRefused
+from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.parameters import BadParameter
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
 
 
@@ -54,7 +54,7 @@ def test_with_real_limits_a_push_saturates_the_thrusters_and_the_verdict_says_so
 
 
 def test_a_known_delay_that_makes_the_loop_unstable_is_refused_before_anything_is_written(tmp_path: Path):
-    with pytest.raises(UnitRefused, match="unstable"):
+    with pytest.raises(InitializationError, match="unstable"):
         run(FlyerImpedance, tmp_path / "r", "delay=0.032")
     assert not (tmp_path / "r").exists()
 
@@ -67,7 +67,7 @@ def test_an_unknown_delay_makes_the_robot_lose_control_and_the_run_ends_in_time(
 
 
 def test_bad_parameters_are_refused_with_their_ranges(tmp_path: Path):
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         run(FlyerImpedance, tmp_path / "r", "force=1000", "axis=w", "duration=-1")
     assert len(caught.value.faults) == 3
     assert not (tmp_path / "r").exists()

@@ -11,7 +11,7 @@ from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand_and_object import Holder
-from handover.scenarios.free_flyer.handover_evaluation import HandoverWatch
+from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 
 PLACE = np.array([0.0, -0.07, 0.0])
@@ -51,10 +51,10 @@ def signals(
     return Signals(units, ports, None)
 
 
-def follow(watch: HandoverWatch, *moments: tuple[float, Signals]) -> HandoverWatch:
+def follow(evaluator: HandoverEvaluator, *moments: tuple[float, Signals]) -> HandoverEvaluator:
     for t, seen in moments:
-        watch(t, seen)
-    return watch
+        evaluator(t, seen)
+    return evaluator
 
 
 def given() -> list[tuple[float, Signals]]:
@@ -74,23 +74,23 @@ def given() -> list[tuple[float, Signals]]:
     ]
 
 
-def to_person() -> HandoverWatch:
-    return HandoverWatch(HandoverParameters(), ("HAND",))
+def to_person() -> HandoverEvaluator:
+    return HandoverEvaluator(HandoverParameters(), ("HAND",))
 
 
 def test_an_object_that_always_was_in_a_hand_is_handed_over():
-    watch = follow(to_person(), *given())
-    assert watch.over
-    outcome = watch.outcome()
+    evaluator = follow(to_person(), *given())
+    assert evaluator.over
+    outcome = evaluator.outcome()
     assert outcome.success, outcome.reason
-    told = {name: m.value for name, m in outcome.metrics.items()}
-    assert told["transfer_time"] == pytest.approx(3.0)
-    assert told["transfer_speed"] == pytest.approx(0.06)
-    assert told["transfer_displacement_z"] == pytest.approx(0.05)
-    assert told["transfer_displacement_x"] == 0.0
-    assert told["arrival_error"] == pytest.approx(0.02)
-    assert told["saturated_share"] == pytest.approx(1 / 11)
-    assert told["phase_grasp_object"] == 8.0
+    facts = {name: m.value for name, m in outcome.metrics.items()}
+    assert facts["transfer_time"] == pytest.approx(3.0)
+    assert facts["transfer_speed"] == pytest.approx(0.06)
+    assert facts["transfer_displacement_z"] == pytest.approx(0.05)
+    assert facts["transfer_displacement_x"] == 0.0
+    assert facts["arrival_error"] == pytest.approx(0.02)
+    assert facts["saturated_share"] == pytest.approx(1 / 11)
+    assert facts["phase_grasp_object"] == 8.0
 
 
 def test_an_object_that_floated_free_was_not_handed_over_even_if_it_was_caught():
@@ -102,17 +102,17 @@ def test_an_object_that_floated_free_was_not_handed_over_even_if_it_was_caught()
 
 
 def test_a_lost_object_ends_the_run_soon():
-    watch = follow(to_person(), *given()[:4], (20.5, signals(Phase.ACTIVATE_IMPEDANCE, Holder.FREE)))
-    assert not watch.over
-    assert follow(watch, (21.6, signals(Phase.SIGNAL, Holder.FREE))).over
+    evaluator = follow(to_person(), *given()[:4], (20.5, signals(Phase.ACTIVATE_IMPEDANCE, Holder.FREE)))
+    assert not evaluator.over
+    assert follow(evaluator, (21.6, signals(Phase.SIGNAL, Holder.FREE))).over
 
 
 def test_a_pull_that_never_came_is_told_with_the_greatest_speed():
     waiting = [(t, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.0123)) for t in (40.0, 60.0)]
     ends = [(t, signals(Phase.GIVEN_UP, Holder.GRIPPER)) for t in (82.0, 83.0)]
-    watch = follow(to_person(), *given()[:6], *waiting, *ends)
-    assert watch.over
-    outcome = watch.outcome()
+    evaluator = follow(to_person(), *given()[:6], *waiting, *ends)
+    assert evaluator.over
+    outcome = evaluator.outcome()
     assert not outcome.success
     assert "never felt a pull within 61 s" in outcome.reason
     assert "below 0.013 m/s" in outcome.reason
@@ -121,19 +121,19 @@ def test_a_pull_that_never_came_is_told_with_the_greatest_speed():
 
 def test_a_robot_that_did_not_arrive_tells_how_near_it_came():
     far = [(t, signals(Phase.MOVE_TO_HANDOVER, Holder.GRIPPER, away=0.31)) for t in (20.0, 60.0)]
-    watch = follow(to_person(), *given()[:3], *far, (70.0, signals(Phase.GIVEN_UP, Holder.GRIPPER, away=0.31)))
-    assert "came no nearer than 0.31 m" in watch.outcome().reason
+    evaluator = follow(to_person(), *given()[:3], *far, (70.0, signals(Phase.GIVEN_UP, Holder.GRIPPER, away=0.31)))
+    assert "came no nearer than 0.31 m" in evaluator.outcome().reason
 
 
 def test_a_gripper_that_closed_beside_the_object_is_told():
-    watch = follow(to_person(), *given()[:2], (12.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.4)))
-    assert "found nothing" in watch.outcome().reason
+    evaluator = follow(to_person(), *given()[:2], (12.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.4)))
+    assert "found nothing" in evaluator.outcome().reason
 
 
-def received(failed: int) -> HandoverWatch:
-    watch = HandoverWatch(HandoverParameters(), ("GRIPPER",), failures=1)
+def received(failed: int) -> HandoverEvaluator:
+    evaluator = HandoverEvaluator(HandoverParameters(), ("GRIPPER",), failures=1)
     return follow(
-        watch,
+        evaluator,
         (0.0, signals(Phase.MOVE_TO_HANDOVER, Holder.HAND)),
         (10.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.HAND)),
         (11.0, signals(Phase.SIGNAL, Holder.HAND)),
@@ -152,11 +152,11 @@ def test_the_staged_failure_must_have_been_noticed():
     assert "0 failed receptions where 1 was staged" in outcome.reason
 
 
-def asked_again() -> HandoverWatch:
+def asked_again() -> HandoverEvaluator:
     """Return a watch that saw a first push at 20 s, found in vain, and another signal at 30 s."""
-    watch = HandoverWatch(HandoverParameters(), ("GRIPPER",), failures=1)
+    evaluator = HandoverEvaluator(HandoverParameters(), ("GRIPPER",), failures=1)
     return follow(
-        watch,
+        evaluator,
         (10.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.HAND)),
         (11.0, signals(Phase.SIGNAL, Holder.HAND)),
         (12.0, signals(Phase.CHECK_VELOCITY, Holder.HAND, speed=0.09)),
@@ -169,8 +169,8 @@ def asked_again() -> HandoverWatch:
 
 
 def test_a_push_in_vain_is_kept_apart_from_the_one_that_counts():
-    watch = follow(asked_again(), (40.0, signals(Phase.CLOSE_GRIPPER, Holder.BOTH, failed=1, speed=0.03)))
-    (transfer,) = watch.transfers
+    evaluator = follow(asked_again(), (40.0, signals(Phase.CLOSE_GRIPPER, Holder.BOTH, failed=1, speed=0.03)))
+    (transfer,) = evaluator.transfers
     assert (transfer.signalled, transfer.asked) == (11.0, 30.0)
     assert (transfer.in_vain, transfer.felt, transfer.speed) == ([20.0], 40.0, 0.03)
 

@@ -31,8 +31,8 @@ def test_a_full_disk_is_told_and_what_was_recorded_is_kept(full: str, tmp_path: 
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     monkeypatch.setattr(os, "replace", refuse)
     result = CliRunner().invoke(main, ["run", str(file), "--format", "csv", "--out", str(out)])
-    told = out / ("signals.parquet" if full == "signals.csv" else full)
-    assert (result.exit_code, result.output) == (3, f"Error: {told} cannot be written: No space left on device\n")
+    text = out / ("signals.parquet" if full == "signals.csv" else full)
+    assert (result.exit_code, result.output) == (3, f"Error: {text} cannot be written: No space left on device\n")
     there = {p.name for p in out.iterdir()}
     assert full not in there
     assert not any(name.endswith(".part") for name in there)

@@ -7,11 +7,11 @@ from handover.scenarios.cli.run import run
 
 
 def test_help_of_a_run_has_every_option_once_below_its_heading():
-    told = CliRunner().invoke(main, ["run", "--help"], terminal_width=200).output
-    rows = [line.split()[0].rstrip(",") for line in told.splitlines() if line.startswith("  -")]
+    output = CliRunner().invoke(main, ["run", "--help"], terminal_width=200).output
+    rows = [line.split()[0].rstrip(",") for line in output.splitlines() if line.startswith("  -")]
     assert sorted(rows) == sorted(
         ["-h", *(p.opts[0] for p in run.params if p.opts[0].startswith("-") and p.opts != ["-h", "--help"])]
     )
-    headings = [line for line in told.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    headings = [line for line in output.splitlines() if line.endswith(":") and not line.startswith(" ")]
     assert headings == ["Options:", "Of FILE.ssp:", "Record:", "Coupling of units:", "Length of steps:", "Wall time:"]
-    assert told.index("Length of steps:") < told.index("--largest-step") < told.index("Wall time:")
+    assert output.index("Length of steps:") < output.index("--largest-step") < output.index("Wall time:")

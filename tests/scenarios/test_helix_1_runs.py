@@ -7,11 +7,11 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
-from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.local_cluster import embedded_crew
+from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.cli.campaign import CampaignProgress
 from handover.scenarios.published.helix_1 import Helix1
@@ -26,7 +26,7 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     (point,) = [p for p in plan.points if p == FAST]
     ready = prepared(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
     place = CampaignFolder(folder)
-    table = carry_out_campaign(ready, place, OwnCrew(), CampaignProgress(StringIO()))
+    table = run_campaign(ready, place, InProcessPool(), CampaignProgress(StringIO()))
     write_claims(Helix1().claims(table), place)
     draw_figures(Helix1(), table, place.runs, place.figures)
     assert len(Helix1().tables(table)) == 4
@@ -54,8 +54,8 @@ def test_a_run_takes_its_ball_and_is_drawn(tmp_path: Path):
 def test_table_1_at_full_size(tmp_path: Path):
     experiment, folder = Helix1(), CampaignFolder(tmp_path / "campaign")
     ready = prepared(experiment.plan(quick=False))
-    with embedded_crew(None) as crew:
-        table = carry_out_campaign(ready, folder, crew, CampaignProgress(StringIO()))
+    with local_cluster(None) as pool:
+        table = run_campaign(ready, folder, pool, CampaignProgress(StringIO()))
     assert set(table.column("status")) == {"done"}
     verdicts = {claim.claim: claim.verdict for claim in experiment.claims(table)}
     assert verdicts["The arm reaches the ball and the gripper begins to close in every run"] is Verdict.REPRODUCED

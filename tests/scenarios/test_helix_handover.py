@@ -77,9 +77,9 @@ def test_a_run_leaves_its_whole_folder(handover: tuple[Path, int, dict[str, Any]
     figures = {p.name for p in (out / "figures").iterdir()}
     assert figures == {f"{n}.{s}" for n in ("error", "paths", "pictures", "tendons") for s in ("png", "svg")}
     assert (out / "report.html").stat().st_size < 8e6
-    told = json.loads((out / "run.json").read_text())
-    assert set(told["units"]) == {"arm", "hand", "camera", "vision", "servo"}
-    assert all(len(u["sha256"]) == 64 for u in told["units"].values())
+    content = json.loads((out / "run.json").read_text())
+    assert set(content["units"]) == {"arm", "hand", "camera", "vision", "servo"}
+    assert all(len(u["sha256"]) == 64 for u in content["units"].values())
 
 
 def test_the_controller_sees_the_ball_and_the_arm_well(handover: tuple[Path, int, dict[str, Any]]):

@@ -16,7 +16,7 @@ from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation, asked_for
@@ -31,10 +31,10 @@ def fmu(unit: str) -> Path:
 def grasp(seed: int, **parameters: Any) -> Outcome:
     """Run one grasp without leaving a folder."""
     p, experiment = Parameters(**parameters), IrGrasp()
-    watch = experiment.watch(p)
+    evaluator = experiment.evaluator(p)
     with Master(experiment.build(p, seed, fmu)) as master:
-        master.run(experiment.stop_time(p), [watch], until=lambda: watch.over)
-    return watch.outcome()
+        master.run(experiment.stop_time(p), [evaluator], until=lambda: evaluator.over)
+    return evaluator.outcome()
 
 
 def test_a_command_acts_in_the_step_that_follows_its_scan():
@@ -49,7 +49,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
     folder = RunFolder(tmp_path_factory.mktemp("runs") / "r")
     fmus = {unit: fmu(unit) for unit in IrGrasp.units}
     with Interruption() as interruption:
-        carry_out(
+        run_task(
             Task(experiment=IrGrasp(), parameters=Parameters(), seed=0, fmus=fmus, folder=folder),
             lambda _t, _stop: None,
             interruption,

@@ -8,7 +8,7 @@ from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
-from handover.scenarios.ir_grasp.evaluation import GraspWatch
+from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.ir_grasp.parameters import Parameters
 
 HELD = (0.1, 0.0)
@@ -47,38 +47,40 @@ def signals(
     return Signals(units, ports, None)
 
 
-def follow(*moments: tuple[float, Signals]) -> GraspWatch:
-    watch = GraspWatch(Parameters())
+def follow(*moments: tuple[float, Signals]) -> GraspEvaluator:
+    evaluator = GraspEvaluator(Parameters())
     for t, seen in moments:
-        watch(t, seen)
-    watch.finish(moments[-1][1])
-    return watch
+        evaluator(t, seen)
+    evaluator.finish(moments[-1][1])
+    return evaluator
 
 
-def grasp(*after: tuple[float, Signals], at_closing: Signals | None = None) -> GraspWatch:
+def grasp(*after: tuple[float, Signals], at_closing: Signals | None = None) -> GraspEvaluator:
     begin = ((0.0, signals(Phase.REACH)), (0.5, signals(Phase.CHECK)), (1.0, signals(Phase.PROBE)))
     return follow(*begin, (3.0, signals(Phase.CLOSE)), (4.0, at_closing or signals(Phase.PULL)), *after)
 
 
 def test_an_object_that_comes_along_and_stays_is_held():
-    watch = grasp((5.0, signals(Phase.SHAKE, p_WH=-0.25)), (7.0, signals(Phase.DONE)), (7.4, signals(Phase.DONE)))
-    assert watch.over
-    outcome = watch.outcome()
+    evaluator = grasp((5.0, signals(Phase.SHAKE, p_WH=-0.25)), (7.0, signals(Phase.DONE)), (7.4, signals(Phase.DONE)))
+    assert evaluator.over
+    outcome = evaluator.outcome()
     assert outcome.success
     assert "threshold" in outcome.reason
     assert outcome.metrics["refinement_time"].value == pytest.approx(2.5)
     assert outcome.metrics["probing_moves"].value == 1
-    assert watch.moments == {"start": 0.0, "before closing": 3.0, "end": 7.4}
+    assert evaluator.moments == {"start": 0.0, "before closing": 3.0, "end": 7.4}
 
 
-@pytest.mark.parametrize(("phase", "told"), [(Phase.PULL, "during the pull"), (Phase.SHAKE, "during the shake")])
-def test_an_object_that_slipped_out_is_not_held_and_it_is_told_when(phase: Phase, told: str):
+@pytest.mark.parametrize(
+    ("phase", "stop_reasons"), [(Phase.PULL, "during the pull"), (Phase.SHAKE, "during the shake")]
+)
+def test_an_object_that_slipped_out_is_not_held_and_it_is_told_when(phase: Phase, stop_reasons: str):
     lost: dict[str, Any] = {"p_HO": (0.2, 0.0), "touching": 0}
     between = [(5.0, signals(Phase.SHAKE))] if phase is Phase.SHAKE else []
-    watch = grasp(*between, (5.5, signals(phase, **lost)), *((t, signals(Phase.DONE, **lost)) for t in (7.0, 7.4)))
-    assert watch.over
-    assert not watch.outcome().success
-    assert f"slipped out of the closed hand {told}" in watch.outcome().reason
+    evaluator = grasp(*between, (5.5, signals(phase, **lost)), *((t, signals(Phase.DONE, **lost)) for t in (7.0, 7.4)))
+    assert evaluator.over
+    assert not evaluator.outcome().success
+    assert f"slipped out of the closed hand {stop_reasons}" in evaluator.outcome().reason
 
 
 def test_a_hand_that_closed_beside_the_object_says_where_it_is():
@@ -90,15 +92,15 @@ def test_a_hand_that_closed_beside_the_object_says_where_it_is():
 
 
 def test_a_finger_that_sees_nothing_is_told_from_one_at_the_end_of_its_range():
-    def told(seen: float, true: float) -> list[str]:
+    def stop_reasons(seen: float, true: float) -> list[str]:
         closing = signals(Phase.CLOSE, index=(seen, true))
         metrics = follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics
         return [metrics[f"{kind}_distance_index"].description for kind in ("final", "true")]
 
-    assert told(0.065, 0.2)[0].endswith("by [Luberto] eq. (11) (sees nothing)")
-    assert told(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
-    assert told(0.06, 0.07)[0].endswith("by [Luberto] eq. (11)")
-    assert told(0.06, 0.07)[1].endswith("along the beam")
+    assert stop_reasons(0.065, 0.2)[0].endswith("by [Luberto] eq. (11) (sees nothing)")
+    assert stop_reasons(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
+    assert stop_reasons(0.06, 0.07)[0].endswith("by [Luberto] eq. (11)")
+    assert stop_reasons(0.06, 0.07)[1].endswith("along the beam")
 
 
 def test_an_object_that_one_finger_pushes_along_is_not_held():
@@ -107,6 +109,6 @@ def test_an_object_that_one_finger_pushes_along_is_not_held():
 
 
 def test_a_run_that_ends_early_says_in_which_phase():
-    watch = follow((0.0, signals(Phase.REACH)), (0.5, signals(Phase.PROBE)))
-    assert not watch.over
-    assert "stopped at 0.5 s in phase PROBE" in watch.outcome().reason
+    evaluator = follow((0.0, signals(Phase.REACH)), (0.5, signals(Phase.PROBE)))
+    assert not evaluator.over
+    assert "stopped at 0.5 s in phase PROBE" in evaluator.outcome().reason

@@ -4,10 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
 from handover.plants.ir_grasp.objects import Thing
-from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
@@ -23,7 +23,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> tuple[CampaignFolder, 
     points = [p for p in plan.points if p["thing"] == "cylinder" and p["perturbed"] == "true"]
     folder = CampaignFolder(tmp_path_factory.mktemp("campaigns") / "c")
     few = prepared(replace(plan, points=points, repetitions=1))
-    return folder, carry_out_campaign(few, folder, OwnCrew(), lambda _tally: None)
+    return folder, run_campaign(few, folder, InProcessPool(), lambda _tally: None)
 
 
 def test_cells_are_the_runs_of_their_arm(campaign: tuple[CampaignFolder, CampaignTable]):

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.results.pictures import read_pictures, write_pictures
-from handover.scenarios.results.run_folder import BadRunFolder
+from handover.scenarios.results.pictures import read_picture_files, write_picture_files
+from handover.scenarios.results.run_folder import InvalidRunFolder
 
 MARK = Mark(label="ball, as measured", shape="circle", u=30.5, v=20.0, radius=6.0, colour="#ffd23f")
 
@@ -27,14 +27,14 @@ def taken(role: str, t: float = 0.0, *marks: Mark) -> CameraPicture:
 
 def test_pictures_are_read_back_as_they_were(tmp_path: Path):
     pictures = [taken("start"), taken("at the ball", 8.0, MARK)]
-    write_pictures(tmp_path / "pictures", pictures)
-    assert read_pictures(tmp_path / "pictures") == pictures
-    told = json.loads((tmp_path / "pictures" / "pictures.json").read_text())
-    assert {name: told[1][name] for name in ("t", "camera", "role", "file", "width", "height")} == {
+    write_picture_files(tmp_path / "pictures", pictures)
+    assert read_picture_files(tmp_path / "pictures") == pictures
+    data = json.loads((tmp_path / "pictures" / "pictures.json").read_text())
+    assert {name: data[1][name] for name in ("t", "camera", "role", "file", "width", "height")} == {
         "t": 8.0, "camera": "left", "role": "at the ball", "file": "02_at_the_ball_left.jpg", "width": 60, "height": 40,
     }  # fmt: skip
     mark = {"label": "ball, as measured", "shape": "circle", "u": 30.5, "v": 20.0, "radius": 6.0, "colour": "#ffd23f"}
-    assert told[1]["marks"] == [mark]
+    assert data[1]["marks"] == [mark]
 
 
 def test_the_pixels_are_those_that_were_taken_but_for_jpegs_loss():
@@ -42,24 +42,24 @@ def test_the_pixels_are_those_that_were_taken_but_for_jpegs_loss():
 
 
 def test_pictures_of_an_earlier_end_do_not_stay(tmp_path: Path):
-    write_pictures(tmp_path / "pictures", [taken("start"), taken("end", 3.0)])
-    write_pictures(tmp_path / "pictures", [taken("start")])
+    write_picture_files(tmp_path / "pictures", [taken("start"), taken("end", 3.0)])
+    write_picture_files(tmp_path / "pictures", [taken("start")])
     assert sorted(p.name for p in (tmp_path / "pictures").iterdir()) == ["01_start_left.jpg", "pictures.json"]
-    write_pictures(tmp_path / "pictures", [])
+    write_picture_files(tmp_path / "pictures", [])
     assert not (tmp_path / "pictures").exists()
-    assert read_pictures(tmp_path / "pictures") == []
+    assert read_picture_files(tmp_path / "pictures") == []
 
 
 @pytest.mark.parametrize("content", ["[{]", '[{"t": 0.0}]', "[1]", '{"a": 1}'])
 def test_a_damaged_list_is_told_as_such(content: str, tmp_path: Path):
     (tmp_path / "pictures").mkdir()
     (tmp_path / "pictures" / "pictures.json").write_text(content)
-    with pytest.raises(BadRunFolder, match=r"its pictures\.json is damaged"):
-        read_pictures(tmp_path / "pictures")
+    with pytest.raises(InvalidRunFolder, match=r"its pictures\.json is damaged"):
+        read_picture_files(tmp_path / "pictures")
 
 
 def test_a_picture_that_is_gone_is_named(tmp_path: Path):
-    write_pictures(tmp_path / "pictures", [taken("start")])
+    write_picture_files(tmp_path / "pictures", [taken("start")])
     (tmp_path / "pictures" / "01_start_left.jpg").unlink()
-    with pytest.raises(BadRunFolder, match=r"01_start_left\.jpg cannot be read: No such file"):
-        read_pictures(tmp_path / "pictures")
+    with pytest.raises(InvalidRunFolder, match=r"01_start_left\.jpg cannot be read: No such file"):
+        read_picture_files(tmp_path / "pictures")

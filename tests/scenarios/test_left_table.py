@@ -7,14 +7,14 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
-from handover.scenarios.campaign.campaign import carry_out_campaign
+from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.table_writer import complete_table
+from handover.scenarios.campaign.table_writer import rebuild_table
 from handover.scenarios.cli.command import main
 
 PLAN = CampaignPlan(
@@ -26,7 +26,7 @@ FIRST, SECOND = (run.name for run in PLAN.runs())
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "done"
-    carry_out_campaign(prepared(PLAN), CampaignFolder(path), OwnCrew(), lambda _tally: None)
+    run_campaign(prepared(PLAN), CampaignFolder(path), InProcessPool(), lambda _tally: None)
     return path
 
 
@@ -50,24 +50,24 @@ def test_it_is_as_the_campaign_itself_writes_it(left: str, finished: Path, folde
         folder.table.write_bytes(b"PAR1")
     else:
         cut(folder, rows=int(left == "a row"))
-    complete_table(folder)
+    rebuild_table(folder)
     expected = CampaignTable.read(finished).table
     assert CampaignTable.read(folder.table).table.equals(expected, check_metadata=True)
 
 
 def test_a_whole_one_is_not_written_again(folder: CampaignFolder):
     before = folder.table.stat()
-    complete_table(folder)
+    rebuild_table(folder)
     assert folder.table.stat().st_mtime_ns == before.st_mtime_ns
     assert folder.table.stat().st_ino == before.st_ino
 
 
 def test_a_lost_run_stays_lost(tmp_path: Path):
     lost = CampaignFolder(tmp_path / "lost")
-    crew = OwnCrew(lambda order: "its worker went away" if order.name == FIRST else "")
-    carry_out_campaign(prepared(PLAN), lost, crew, lambda _tally: None)
+    pool = InProcessPool(lambda job: "its worker went away" if job.name == FIRST else "")
+    run_campaign(prepared(PLAN), lost, pool, lambda _tally: None)
     cut(lost, rows=1)
-    complete_table(lost)
+    rebuild_table(lost)
     table = CampaignTable.read(lost.table)
     assert table.column("run").tolist() == [FIRST, SECOND]
     assert table.column("status").tolist() == ["lost", "done"]
@@ -77,7 +77,7 @@ def test_a_lost_run_stays_lost(tmp_path: Path):
 def test_it_is_left_to_the_command_that_is_at_work(folder: CampaignFolder):
     before = cut(folder, rows=1)
     with folder.held():
-        complete_table(folder)
+        rebuild_table(folder)
     assert folder.table.read_bytes() == before
 
 
@@ -88,7 +88,7 @@ def test_what_another_version_has_left_or_is_damaged_is_left(change: dict[str, o
     before = cut(folder, rows=1)
     file = folder.path / "campaign.json"
     file.write_text(json.dumps({**json.loads(file.read_text(encoding="utf-8")), **change}), encoding="utf-8")
-    complete_table(folder)
+    rebuild_table(folder)
     assert folder.table.read_bytes() == before
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Cover, Place
 
@@ -15,7 +15,7 @@ def test_what_is_not_given_has_its_default():
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "text"),
     [
         ("alfa=0.1", "did you mean alpha"),
         ("alpha=1.5", "from 0.01 to 1"),
@@ -28,13 +28,13 @@ def test_what_is_not_given_has_its_default():
         ("alpha", "not of the form name=value"),
     ],
 )
-def test_a_bad_parameter_is_refused_with_what_would_be_right(given: str, told: str):
-    with pytest.raises(BadParameter) as caught:
+def test_a_bad_parameter_is_refused_with_what_would_be_right(given: str, text: str):
+    with pytest.raises(InvalidParameter) as caught:
         parse_parameters(HelixHandover, [given])
-    assert told in str(caught.value)
+    assert text in str(caught.value)
 
 
 def test_all_faults_are_told_at_once():
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         parse_parameters(HelixHandover, ["alpha=2", "radius=-1", "nothing=3", "alpha=0.1"])
     assert len(caught.value.faults) == 4

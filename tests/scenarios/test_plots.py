@@ -18,7 +18,7 @@ from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.plotting import draw_time_figures, draw_time_plot
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
 from handover.scenarios.reporting.time_plots import time_figure
-from handover.scenarios.results.task import Ended
+from handover.scenarios.results.summary import RunResult
 
 FAST = {
     "ir_grasp": (),
@@ -34,7 +34,7 @@ class Run:
 
     def __init__(self, name: str, given: tuple[str, ...], out: Path) -> None:
         scenario: type[Experiment[Any]] = SCENARIOS[name]
-        self.ended: Ended = run(scenario, out, *given)
+        self.ended: RunResult = run(scenario, out, *given)
         self.experiment, self.parameters = scenario(), parse_parameters(scenario, given)
         self.file = out / "signals.parquet"
         self.record = Record(self.file)

@@ -33,7 +33,7 @@ def values_of(scenario: str, given: tuple[str, ...]) -> list[PublishedValue]:
 def check(scenario: str, given: tuple[str, ...], number: int, folder: Path) -> None:
     """Run it, and compare the section's rows with the paper file."""
     run(SCENARIOS[scenario], folder, *given)
-    facts = RunFacts.read(RunFolder.left_at(folder))
+    facts = RunFacts.read(RunFolder.of_run(folder))
     values = values_of(scenario, given)
     assert [v.metric for v in values if v.metric not in facts.summary["metrics"]] == []
     assert len(values) == number

@@ -67,9 +67,9 @@ def test_conversions_are_told_in_run_json_terminal_and_report(pairs: int, tmp_pa
             s.connect(getattr(a.y, name), getattr(b.u, f"{name}_in"))
     file = write_ssp(s, tmp_path / "x.ssp", "x", Fraction(1))
     shown = run(file, tmp_path / "out")
-    told = json.loads((tmp_path / "out" / "run.json").read_text())["conversions"]
-    assert len(told) == 3 * pairs
-    assert told[0] == {
+    content = json.loads((tmp_path / "out" / "run.json").read_text())["conversions"]
+    assert len(content) == 3 * pairs
+    assert content[0] == {
         "source": "a0.angle",
         "unit": "deg",
         "target": "b0.angle_in",

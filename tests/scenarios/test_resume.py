@@ -18,8 +18,7 @@ from handover.scenarios.cli.listing import print_summary
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.summary import Summary
-from handover.scenarios.results.task import Ended
+from handover.scenarios.results.summary import RunResult, Summary
 
 fcntl = pytest.importorskip("fcntl")
 
@@ -32,10 +31,10 @@ def call(*arguments: str | Path) -> Result:
 
 def summary_of(folder: Path) -> dict[str, Any]:
     """Return all of a summary that measures no time."""
-    told = json.loads((folder / "summary.json").read_text())
-    metrics = {k: v for k, v in told["metrics"].items() if not k.startswith(OF_TIME)}
-    units = [{k: v for k, v in unit.items() if k != "cpu_seconds"} for unit in told["units"]]
-    others = {k: v for k, v in told.items() if k not in ("wall_seconds", "cpu_seconds")}
+    data = json.loads((folder / "summary.json").read_text())
+    metrics = {k: v for k, v in data["metrics"].items() if not k.startswith(OF_TIME)}
+    units = [{k: v for k, v in unit.items() if k != "cpu_seconds"} for unit in data["units"]]
+    others = {k: v for k, v in data.items() if k not in ("wall_seconds", "cpu_seconds")}
     return others | {"metrics": metrics, "units": units}
 
 
@@ -47,8 +46,8 @@ def assert_same(joined: Path, whole: Path) -> None:
     assert {str(p.relative_to(joined)) for p in joined.rglob("*")} == names
     for picture in whole.glob("pictures/*"):
         assert (joined / "pictures" / picture.name).read_bytes() == picture.read_bytes(), picture.name
-    told, wanted = (json.loads((folder / "run.json").read_text()) for folder in (joined, whole))
-    assert told | {"checkpoint": None} == wanted
+    data, wanted = (json.loads((folder / "run.json").read_text()) for folder in (joined, whole))
+    assert data | {"checkpoint": None} == wanted
 
 
 def slow(*values: Any) -> Any:
@@ -76,7 +75,7 @@ def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
     assert ended in (-signal.SIGKILL, 1)
     assert call(*arguments, whole).exit_code == 0
     (killed / "checkpoint.zip.part").write_text("of a process that died as it wrote one")
-    RunFolder.left_at(killed).add_to_run(failure={"kind": "killed"})  # as whoever completes the folder of a dead run
+    RunFolder.of_run(killed).add_to_run(failure={"kind": "killed"})  # as whoever completes the folder of a dead run
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
@@ -104,9 +103,9 @@ def test_a_run_of_an_ssp_goes_on(tmp_path: Path):
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_what_judges_a_run_can_be_kept(name: str):
     experiment = SCENARIOS[name]()
-    watch = experiment.watch(parse_parameters(SCENARIOS[name], []))
-    kept = pickle.loads(pickle.dumps(watch))
-    assert vars(kept).keys() == vars(watch).keys()
+    evaluator = experiment.evaluator(parse_parameters(SCENARIOS[name], []))
+    kept = pickle.loads(pickle.dumps(evaluator))
+    assert vars(kept).keys() == vars(evaluator).keys()
 
 
 @pytest.fixture(scope="module")
@@ -145,19 +144,19 @@ def test_a_run_that_can_go_on_is_told_how(copy: Path, capsys: pytest.CaptureFixt
         "simulated_seconds": 0.3,
         "wall_seconds": 1.0,
     }
-    ended = Ended(outcome=Outcome(success=False, reason="interrupted"), summary=cast(Summary, summary))
-    print_summary(ended, (), RunFolder.left_at(copy))
+    ended = RunResult(outcome=Outcome(success=False, reason="interrupted"), summary=cast(Summary, summary))
+    print_summary(ended, (), RunFolder.of_run(copy))
     assert f"to go on: handover resume {copy}\n" in capsys.readouterr().out
     (copy / "checkpoint.zip").unlink()
-    print_summary(ended, (), RunFolder.left_at(copy))
+    print_summary(ended, (), RunFolder.of_run(copy))
     assert "to go on" not in capsys.readouterr().out
 
 
-def assert_refused(folder: Path, told: str) -> None:
+def assert_refused(folder: Path, data: str) -> None:
     before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file() and "signals" not in p.name}
     result = call("resume", folder)
     assert result.exit_code == 2, result.output
-    assert told in result.output
+    assert data in result.output
     assert len(result.output.splitlines()) == 1
     assert {p: p.read_bytes() for p in before} == before
 
@@ -196,7 +195,7 @@ def test_a_run_that_goes_on_is_refused(copy: Path):
 
 
 def test_a_run_that_another_process_is_about_to_go_on_with_is_refused(copy: Path):
-    with RunFolder.left_at(copy).held():
+    with RunFolder.of_run(copy).held():
         assert_refused(copy, "the run still goes on")
     assert not (copy / "signals.parquet").exists()
     (copy / "checkpoint.zip").unlink()
@@ -234,9 +233,9 @@ def test_fmus_that_changed_are_refused_by_name(copy: Path, left: Path):
 
 
 def test_other_versions_are_refused_by_name(copy: Path):
-    told = json.loads((copy / "run.json").read_text())
-    told["versions"]["numpy"] = "1.0"
-    (copy / "run.json").write_text(json.dumps(told))
+    data = json.loads((copy / "run.json").read_text())
+    data["versions"]["numpy"] = "1.0"
+    (copy / "run.json").write_text(json.dumps(data))
     assert_refused(copy, "the run began with other versions: numpy 1.0 (here 2.")
 
 

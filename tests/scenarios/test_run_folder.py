@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from handover.scenarios.results.run_folder import BadRunFolder, RunFolder, versions
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, versions
 
 
 def test_nothing_is_made_before_it_is_asked_for(tmp_path: Path):
@@ -21,16 +21,16 @@ def test_an_empty_folder_can_be_used(tmp_path: Path):
 
 def test_a_folder_with_something_in_it_is_refused(tmp_path: Path):
     (tmp_path / "mine").write_text("precious")
-    with pytest.raises(BadRunFolder, match="not empty"):
+    with pytest.raises(InvalidRunFolder, match="not empty"):
         RunFolder(tmp_path)
     assert (tmp_path / "mine").read_text() == "precious"
 
 
 def test_a_file_in_the_way_is_told(tmp_path: Path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(BadRunFolder, match="file of that name"):
+    with pytest.raises(InvalidRunFolder, match="file of that name"):
         RunFolder(tmp_path / "file")
-    with pytest.raises(BadRunFolder, match="is a file"):
+    with pytest.raises(InvalidRunFolder, match="is a file"):
         RunFolder(tmp_path / "file" / "below")
 
 
@@ -39,7 +39,7 @@ def test_a_place_without_permission_is_refused(tmp_path: Path, monkeypatch: pyte
         return False
 
     monkeypatch.setattr(os, "access", denied)
-    with pytest.raises(BadRunFolder, match="no permission"):
+    with pytest.raises(InvalidRunFolder, match="no permission"):
         RunFolder(tmp_path / "new")
 
 

@@ -16,7 +16,7 @@ from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.results.summary import parameter_rows, told_system
+from handover.scenarios.results.summary import describe_system, parameter_rows
 from handover.scenarios.results.task import Task
 
 
@@ -26,25 +26,25 @@ def read(out: Path, name: str) -> dict[str, Any]:
 
 def test_units_of_parameters_are_written_as_one_reads_them():
     task = SimpleNamespace(experiment=FlyerImpedance(), parameters=FlyerImpedance.parameters_type())
-    told = {name: value for name, value, _ in parameter_rows(cast(Task, task))}
-    assert told["torque"].endswith(" N·m")
+    found = {name: value for name, value, _ in parameter_rows(cast(Task, task))}
+    assert found["torque"].endswith(" N·m")
 
 
 def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):
     ended = run(IrGrasp, tmp_path / "out", "thing=paper_box_a")
-    told = read(tmp_path / "out", "run.json")
-    assert told["title"] == IrGrasp.title
-    assert told["headline"] == list(IrGrasp.headline)
-    names = [name for name, _, _ in told["told_parameters"]]
+    found = read(tmp_path / "out", "run.json")
+    assert found["title"] == IrGrasp.title
+    assert found["headline"] == list(IrGrasp.headline)
+    names = [name for name, _, _ in found["told_parameters"]]
     assert names == [v.name for v in IrGrasp.parameters()]
-    assert ["forward", "0.035 m", "how far forward, for that strategy"] in told["told_parameters"]
-    assert told["told_parameters"][0][1] == "paper_box_a"
-    assert told["system"]["units"] == [
+    assert ["forward", "0.035 m", "how far forward, for that strategy"] in found["told_parameters"]
+    assert found["told_parameters"][0][1] == "paper_box_a"
+    assert found["system"]["units"] == [
         {"name": "scene", "model": "GraspScene", "fmi": "3", "period": 0.015, "sampled": False},
         {"name": "reflex", "model": "IrReflex", "fmi": "3", "period": 0.015, "sampled": True},
     ]
     assert {"source": "scene.ticks", "target": "reflex.ticks", "unit": "tick", "size": 3, "kind": "real"} in (
-        told["system"]["connections"]
+        found["system"]["connections"]
     )
     scene, reflex = ended.summary["units"]
     assert (scene["name"], scene["model"], scene["step"]) == ("scene", "GraspScene (FMI 3)", "15 ms")
@@ -57,11 +57,11 @@ def test_an_ssp_tells_the_same_and_a_unit_without_period_has_none(tmp_path: Path
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), "--adaptive", "1e-3"])
     assert done.exit_code == 0, done.output
-    told = read(out, "run.json")
-    assert told["told_parameters"] == told["headline"] == []
-    assert file.name in told["title"]
-    assert {unit["period"] for unit in told["system"]["units"]} == {None}
-    assert [u["name"] for u in read(out, "summary.json")["units"]] == [u["name"] for u in told["system"]["units"]]
+    found = read(out, "run.json")
+    assert found["told_parameters"] == found["headline"] == []
+    assert file.name in found["title"]
+    assert {unit["period"] for unit in found["system"]["units"]} == {None}
+    assert [u["name"] for u in read(out, "summary.json")["units"]] == [u["name"] for u in found["system"]["units"]]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no process can be forked that tells")
@@ -81,6 +81,6 @@ def test_units_are_told_as_their_sources_have_them_and_pictures_as_binary():
     camera, vision = s.add("camera", cached("StereoCamera", 3)), s.add("vision", cached("HandoverVision", 3))
     s.connect(camera.y.left, vision.u.left)
     s.check()
-    length, picture = told_system(s, adaptive=False)["connections"]
+    length, picture = describe_system(s, adaptive=False)["connections"]
     assert (length["unit"], length["kind"], length["size"]) == ("mm", "real", 1)
     assert picture == {"source": "camera.left", "target": "vision.left", "unit": "", "size": 1, "kind": "binary"}

@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from click.testing import CliRunner
-from crew_orders import bad_order, order
+from crew_orders import bad_job, job
 from living import children, lives, until
 
 from handover.cosim.record.reader import Record
@@ -61,7 +61,7 @@ def test_the_signals_are_those_of_the_same_run_by_itself(
     alone, runs = tmp_path / "alone", tmp_path / "runs"
     chosen = [text for parameter in parameters for text in ("-p", parameter)]
     CliRunner().invoke(main, ["run", scenario, *chosen, "--seed", "3", "--no-report", "--out", str(alone)])
-    assert server.carry_out(order(runs, "run", *parameters, scenario=scenario), yes).lost == ""
+    assert server.run_job(job(runs, "run", *parameters, scenario=scenario), yes).lost == ""
     assert (runs / "run" / "signals.parquet").read_bytes() == (alone / "signals.parquet").read_bytes()
     assert {p.name for p in (runs / "run").iterdir()} == {p.name for p in alone.iterdir()}
     assert {"run.json", "signals.parquet", "summary.json"} <= {p.name for p in (runs / "run").iterdir()}
@@ -69,32 +69,32 @@ def test_the_signals_are_those_of_the_same_run_by_itself(
 
 
 def test_a_unit_that_fails_is_in_the_summary(server: ServerProcess, built: Path, tmp_path: Path):
-    assert server.carry_out(bad_order(tmp_path / "runs", "Raises", built), yes).lost == ""
+    assert server.run_job(bad_job(tmp_path / "runs", "Raises", built), yes).lost == ""
     summary = summary_in(tmp_path / "runs")
     assert (summary["success"], summary["failure"]["kind"]) == (False, "error")
     assert "a sensor broke" in summary["reason"]
 
 
 @pytest.mark.parametrize(
-    ("reflex", "kind", "told"),
+    ("reflex", "kind", "line"),
     [("RefusesToStart", "error", "reflex does not start: "), ("CrashesAtStart", "crash", "a unit failed: ")],
 )
 def test_a_unit_that_does_not_start_is_in_the_summary(
-    reflex: str, kind: str, told: str, server: ServerProcess, built: Path, tmp_path: Path
+    reflex: str, kind: str, line: str, server: ServerProcess, built: Path, tmp_path: Path
 ):
     """It would not start another time either: there is nothing to try again."""
-    order = bad_order(tmp_path / "runs", reflex, built)
-    assert server.carry_out(order, yes).lost == ""
+    job = bad_job(tmp_path / "runs", reflex, built)
+    assert server.run_job(job, yes).lost == ""
     summary = summary_in(tmp_path / "runs")
     assert (summary["success"], summary["complete"], summary["simulated_seconds"]) == (False, False, 0.0)
     assert (summary["failure"]["kind"], summary["failure"]["instance"]) == (kind, "reflex")
-    assert summary["reason"].startswith(told)
+    assert summary["reason"].startswith(line)
     assert "\n" not in summary["reason"]
-    run = PlannedRun(name="bad", point=0, repetition=0, parameters={}, seed=order.seed)
+    run = PlannedRun(name="bad", point=0, repetition=0, parameters={}, seed=job.seed)
     row = row_of(run, tmp_path / "runs" / "bad")
     assert row is not None
     assert (row.status, row.success) == ("failed", None)
-    write_run_page(RunFolder.left_at(tmp_path / "runs" / "bad"))
+    write_run_page(RunFolder.of_run(tmp_path / "runs" / "bad"))
     page = (tmp_path / "runs" / "bad" / "report.html").read_text(encoding="utf-8")
     assert summary["reason"] in page.replace("\u00a0", " ")  # numbers are tied to their units
 
@@ -103,7 +103,7 @@ def test_a_unit_that_does_not_start_is_in_the_summary(
 def test_a_unit_that_does_not_come_back_ends_its_run_only(
     reflex: str, kind: str, server: ServerProcess, built: Path, tmp_path: Path
 ):
-    assert server.carry_out(bad_order(tmp_path / "runs", reflex, built, call_limit=0.5), yes).lost == ""
+    assert server.run_job(bad_job(tmp_path / "runs", reflex, built, call_limit=0.5), yes).lost == ""
     summary = summary_in(tmp_path / "runs")
     assert (summary["failure"]["kind"], summary["failure"]["instance"]) == (kind, "reflex")
     assert 0.0 < summary["cpu_seconds"] < 60.0
@@ -112,32 +112,32 @@ def test_a_unit_that_does_not_come_back_ends_its_run_only(
 
 
 @pytest.mark.parametrize(
-    ("reflex", "told", "no_room"),
+    ("reflex", "line", "no_room"),
     [
         ("IsKilled", "the run was killed at t = 0.105 s, in ", ""),
         pytest.param("FillsTheDisk", "cannot be written: File too large", "File too large", marks=slow),
     ],
 )
 def test_a_run_without_a_summary_leaves_nothing(
-    reflex: str, told: str, no_room: str, server: ServerProcess, built: Path, tmp_path: Path
+    reflex: str, line: str, no_room: str, server: ServerProcess, built: Path, tmp_path: Path
 ):
-    answer = server.carry_out(bad_order(tmp_path / "runs", reflex, built), yes)
-    assert told in answer.lost
-    assert "\n" not in answer.lost
-    assert answer.no_room == no_room
+    result = server.run_job(bad_job(tmp_path / "runs", reflex, built), yes)
+    assert line in result.lost
+    assert "\n" not in result.lost
+    assert result.no_room == no_room
     assert list((tmp_path / "runs").iterdir()) == []
 
 
 def test_what_is_refused_is_told(server: ServerProcess, tmp_path: Path):
-    assert "has no parameter 'gloss'" in server.carry_out(order(tmp_path / "runs", "run", "gloss=1"), yes).lost
-    unknown = replace(order(tmp_path / "runs"), scenario="juggle")
-    assert "no scenario 'juggle'" in server.carry_out(unknown, yes).lost
+    assert "has no parameter 'gloss'" in server.run_job(job(tmp_path / "runs", "run", "gloss=1"), yes).lost
+    unknown = replace(job(tmp_path / "runs"), scenario="juggle")
+    assert "no scenario 'juggle'" in server.run_job(unknown, yes).lost
     assert list((tmp_path / "runs").iterdir()) == []
 
 
 @slow
 def test_what_a_run_prints_is_kept_beside_its_record(server: ServerProcess, built: Path, tmp_path: Path):
-    assert server.carry_out(bad_order(tmp_path / "runs", "Prints", built), yes).lost == ""
+    assert server.run_job(bad_job(tmp_path / "runs", "Prints", built), yes).lost == ""
     log = tmp_path / "runs" / "bad" / "log.txt"
     assert log.read_text() == "from Python\nfrom native code\ninput: ''\n"
 
@@ -145,7 +145,7 @@ def test_what_a_run_prints_is_kept_beside_its_record(server: ServerProcess, buil
 @slow
 def test_a_run_that_was_carried_out_twice_is_there_once(server: ServerProcess, tmp_path: Path):
     for _ in range(2):
-        assert server.carry_out(order(tmp_path / "runs"), yes).lost == ""
+        assert server.run_job(job(tmp_path / "runs"), yes).lost == ""
     assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
 
 
@@ -160,7 +160,7 @@ def test_a_server_that_is_killed_takes_its_run_with_it(built: Path, tmp_path: Pa
         return True
 
     with pytest.raises(ServerLost, match="ended with status -9"):
-        server.carry_out(bad_order(tmp_path / "runs", "Hangs", built), kill)
+        server.run_job(bad_job(tmp_path / "runs", "Hangs", built), kill)
     assert len(seen) == 1
     until(lambda: not lives(seen[0]))
     assert list((tmp_path / "runs").iterdir()) == []
@@ -177,7 +177,7 @@ def test_a_run_that_is_not_wanted_any_more_is_ended(built: Path, tmp_path: Path)
         return not seen
 
     with pytest.raises(NotWanted):
-        server.carry_out(bad_order(tmp_path / "runs", "Hangs", built), wanted)
+        server.run_job(bad_job(tmp_path / "runs", "Hangs", built), wanted)
     assert len(seen) == 1
     until(lambda: not any(map(lives, (server.pid, *seen))))
     assert list((tmp_path / "runs").iterdir()) == []

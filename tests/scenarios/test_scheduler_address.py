@@ -14,11 +14,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 from clusters import closed_port, scheduler
 
 from handover.scenarios.campaign.scheduler import scheduler_address
-from handover.scenarios.execution.errors import BadCrew
+from handover.scenarios.execution.errors import PoolError
 
 
 def refused(address: str) -> str:
-    with pytest.raises(BadCrew) as caught:
+    with pytest.raises(PoolError) as caught:
         scheduler_address(address)
     assert "\n" not in str(caught.value)
     return str(caught.value)
@@ -49,7 +49,7 @@ def other_server(request: pytest.FixtureRequest) -> Generator[str, None, None]:
 
 
 @pytest.mark.parametrize(
-    ("address", "told"),
+    ("address", "text"),
     [
         ("nonsense", "scheduler 'nonsense' has no port"),
         ("", "scheduler '' has no host"),
@@ -61,8 +61,8 @@ def other_server(request: pytest.FixtureRequest) -> Generator[str, None, None]:
         ("[::1", "scheduler '[::1': Invalid IPv6 URL"),
     ],
 )
-def test_a_malformed_address_is_refused(address: str, told: str):
-    assert refused(address).startswith(told)
+def test_a_malformed_address_is_refused(address: str, text: str):
+    assert refused(address).startswith(text)
 
 
 @pytest.mark.slow
@@ -80,8 +80,8 @@ def test_a_server_that_is_no_scheduler_is_refused(other_server: str):
 def test_a_scheduler_is_found_from_where_an_event_loop_runs(tmp_path: Path):
     """As it does in a notebook."""
 
-    async def ask(told: str) -> str:
-        return scheduler_address(told)
+    async def ask(text: str) -> str:
+        return scheduler_address(text)
 
     with scheduler(tmp_path) as address:
         assert asyncio.run(ask(address.removeprefix("tcp://"))) == address

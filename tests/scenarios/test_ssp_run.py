@@ -44,12 +44,12 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
     assert record["left.x"][-1] == 4.0
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["success"], summary["simulated_seconds"]) == (True, 2.0)
-    told = json.loads((out / "run.json").read_text())
-    assert told["seed"] is None
+    data = json.loads((out / "run.json").read_text())
+    assert data["seed"] is None
     sha256 = hashlib.sha256((tmp_path / "springs.ssp").read_bytes()).hexdigest()
-    assert (told["source"]["sha256"], told["source"]["stop"]) == (sha256, "2")
-    units = told["units"]
-    assert {u: told["fmu"] for u, told in units.items()} == dict.fromkeys(("left", "right"), "TearingSpring.fmi2.fmu")
+    assert (data["source"]["sha256"], data["source"]["stop"]) == (sha256, "2")
+    units = data["units"]
+    assert {u: data["fmu"] for u, data in units.items()} == dict.fromkeys(("left", "right"), "TearingSpring.fmi2.fmu")
     figures = {p.name for p in (out / "figures").iterdir()}
     assert figures == {f"{n}.{s}" for n in ("1_left", "2_right") for s in ("png", "svg")}
     lead = (out / "report.html").read_text().partition("<main>")[0]
@@ -111,7 +111,7 @@ def test_a_time_is_a_positive_number(spring: Path, tmp_path: Path, option: str, 
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "data"),
     [
         (b'name="left"', b'name="right"', "two elements are called 'right'"),
         (b"TearingSpring", b"Spring", "there is no 'resources/Spring.fmi2.fmu' in the SSP; did you mean "),
@@ -120,7 +120,7 @@ def test_a_time_is_a_positive_number(spring: Path, tmp_path: Path, option: str, 
     ],
 )
 def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
-    spring: Path, tmp_path: Path, old: bytes, new: bytes, told: str
+    spring: Path, tmp_path: Path, old: bytes, new: bytes, data: str
 ):
     file, out = tmp_path / "bad.ssp", tmp_path / "out"
     with zipfile.ZipFile(packed(spring, tmp_path, Fraction(2))) as good, zipfile.ZipFile(file, "w") as bad:
@@ -131,7 +131,7 @@ def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
     assert result.exit_code == 2, result.output
     (line,) = result.output.splitlines()
     assert line.startswith(f"Error: {file}: ")
-    assert told in line
+    assert data in line
     assert not out.exists()
 
 

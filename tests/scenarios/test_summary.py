@@ -12,8 +12,8 @@ from handover.cosim.exceptions import WiringError
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.results.summary import (
+    ElapsedTime,
     RunData,
-    Spent,
     Summary,
     configuration,
     crashed_summary,
@@ -23,7 +23,7 @@ from handover.scenarios.results.summary import (
     refused_run,
     refused_summary,
 )
-from handover.scenarios.results.tables import told
+from handover.scenarios.results.tables import format_metric
 
 
 def assert_of(declared: type[Any], content: Any) -> None:
@@ -33,7 +33,7 @@ def assert_of(declared: type[Any], content: Any) -> None:
 
 
 def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
-    task, spent = task_of(IrGrasp, tmp_path / "refused"), Spent(wall=2.0, cpu=1.0)
+    task, spent = task_of(IrGrasp, tmp_path / "refused"), ElapsedTime(wall=2.0, cpu=1.0)
     finished = run(IrGrasp, tmp_path / "run").summary
     refusal = WiringError(["nothing feeds scene.goal"])
     refused = refused_summary(task, refusal, spent)
@@ -50,7 +50,7 @@ def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
 def test_a_metric_that_is_not_finite_is_null_and_told_as_undefined(value: float):
     made = metric_data(Metric(value, "m", "a length"))
     assert made == {"value": None, "unit": "m", "description": "a length"}
-    assert told(made) == "undefined"
+    assert format_metric(made) == "undefined"
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_metric_that_is_not_finite_is_null_and_told_as_undefined(value: float)
     [(0.1, "kg", "100 g"), (2e3, "Pa", "2 kPa"), (7.2e4, "s", "20 h"), (0.0123, "m", "12.3 mm"), (1.0, "rad", "57.3°")],
 )
 def test_a_metric_is_told_in_the_unit_in_which_pages_show_it(value: float, unit: str, text: str):
-    assert told(metric_data(Metric(value, unit, ""))) == text
+    assert format_metric(metric_data(Metric(value, unit, ""))) == text
 
 
 def test_without_the_system_telling_memory_there_is_no_figure_of_it(monkeypatch: pytest.MonkeyPatch):

@@ -7,16 +7,17 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from clusters import closed_port
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
 from handover.cosim.record.file_lock import folder_locked
 from handover.fmus.build import cached
-from handover.scenarios.campaign import local_cluster, plan_check
+from handover.scenarios.campaign import local_cluster as dask_crew
+from handover.scenarios.campaign import plan_check
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import RunOrder
+from handover.scenarios.campaign.worker_pool import RunJob
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution.errors import BadCrew, CrewLost
+from handover.scenarios.execution.errors import ClusterLost, PoolError
 
 CALL = [
     "sweep",
@@ -43,36 +44,36 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def sweep(
-    monkeypatch: pytest.MonkeyPatch, *call: str, before: Callable[[RunOrder], str] = lambda _order: ""
+    monkeypatch: pytest.MonkeyPatch, *call: str, before: Callable[[RunJob], str] = lambda _order: ""
 ) -> tuple[Result, list[str]]:
     """Return how a command ended, and which runs it began."""
-    crew = OwnCrew(before)
+    pool = InProcessPool(before)
 
     @contextlib.contextmanager
-    def own_crew(_workers: int | None) -> Generator[OwnCrew, None, None]:
-        yield crew
+    def in_process_pool(_workers: int | None) -> Generator[InProcessPool, None, None]:
+        yield pool
 
-    monkeypatch.setattr(local_cluster, "embedded_crew", own_crew)
-    return CliRunner().invoke(main, call), crew.begun
+    monkeypatch.setattr(dask_crew, "local_cluster", in_process_pool)
+    return CliRunner().invoke(main, call), pool.begun
 
 
 def refuse_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let no workers be had."""
 
     @contextlib.contextmanager
-    def refuse(_workers: int | None) -> Generator[OwnCrew, None, None]:
-        raise BadCrew("there are none")
-        yield OwnCrew()
+    def refuse(_workers: int | None) -> Generator[InProcessPool, None, None]:
+        raise PoolError("there are none")
+        yield InProcessPool()
 
-    monkeypatch.setattr(local_cluster, "embedded_crew", refuse)
+    monkeypatch.setattr(dask_crew, "local_cluster", refuse)
 
 
-def raising(error: BaseException, at: int) -> Callable[[RunOrder], str]:
+def raising(error: BaseException, at: int) -> Callable[[RunJob], str]:
     """Return what raises an error before the run of a number, from 0."""
     counted: list[str] = []
 
-    def count(order: RunOrder) -> str:
-        counted.append(order.name)
+    def count(job: RunJob) -> str:
+        counted.append(job.name)
         if len(counted) > at:
             raise error
         return ""
@@ -141,7 +142,7 @@ def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.slow
 def test_a_lost_run_is_told_by_the_status(monkeypatch: pytest.MonkeyPatch):
-    result, _ = sweep(monkeypatch, *CALL, before=lambda order: "its machine burnt" if order.name == ALL[0] else "")
+    result, _ = sweep(monkeypatch, *CALL, before=lambda job: "its machine burnt" if job.name == ALL[0] else "")
     assert result.exit_code == 3
     assert "1 of 2 runs done, 1 lost" in result.output
     assert "1 lost: its machine burnt" in result.output
@@ -149,7 +150,7 @@ def test_a_lost_run_is_told_by_the_status(monkeypatch: pytest.MonkeyPatch):
 
 @pytest.mark.slow
 def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
-    result, _ = sweep(monkeypatch, *CALL, before=raising(CrewLost("the scheduler is gone"), at=1))
+    result, _ = sweep(monkeypatch, *CALL, before=raising(ClusterLost("the scheduler is gone"), at=1))
     assert (result.exit_code, result.output) == (
         3,
         f"{BEGINNING}Error: the scheduler is gone; 1 of 2 runs done; the same call goes on\n",
@@ -164,7 +165,7 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize(
-    ("call", "told"),
+    ("call", "sentence"),
     [
         (["ir_gasp"], "no scenario 'ir_gasp': did you mean ir_grasp?"),
         (["x.ssp"], "x.ssp: a scenario can be swept, an SSP has no parameters of its own"),
@@ -180,11 +181,11 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
     ],
 )
 def test_bad_calls_are_told_in_a_line_and_leave_nothing(
-    here: Path, call: list[str], told: str, monkeypatch: pytest.MonkeyPatch
+    here: Path, call: list[str], sentence: str, monkeypatch: pytest.MonkeyPatch
 ):
     result, begun = sweep(monkeypatch, "sweep", *call)
     assert result.exit_code == 2
-    assert told in result.output
+    assert sentence in result.output
     assert len(result.output.splitlines()) == 1
     assert begun == []
     assert list(here.iterdir()) == []

@@ -33,10 +33,10 @@ def test_the_first_signal_ends_it_in_order(number: signal.Signals, tmp_path: Pat
         wait_for(lambda: len(runs_in(out)) >= 3, going)
         family = family_of(going)
         going.send_signal(number)
-        status, told, errors = ended(going)
+        status, value, errors = ended(going)
         wait_for_end_of(family)
     done = len(runs_in(out))
-    assert (status, told) == (1, "")
+    assert (status, value) == (1, "")
     assert errors.splitlines()[-1] == f"{done} of 200 runs done in {out}; the same call goes on"
     assert 3 <= len(CampaignTable.read(out)) == done < 200
     assert list((out / "runs").glob(".*")) == []
@@ -50,8 +50,8 @@ def test_ctrl_c_before_the_first_run_leaves_nothing(tmp_path: Path, monkeypatch:
     with sweeping(*CALL, "--out", out) as going:
         wait_for(cache.exists, going)
         going.send_signal(signal.SIGINT)
-        status, told, errors = ended(going)
-    assert (status, told, errors) == (130, "", "Aborted!\n")
+        status, value, errors = ended(going)
+    assert (status, value, errors) == (130, "", "Aborted!\n")
     assert not out.exists()
 
 
@@ -61,8 +61,8 @@ def test_a_signal_as_workers_start_leaves_nothing_of_a_campaign_that_begins(numb
     with sweeping(*CALL, "--out", out) as going:
         wait_for(lambda: (out / "campaign.json").exists(), going)
         going.send_signal(number)
-        status, told, errors = ended(going)
-    assert (status, told) == (130, "")
+        status, value, errors = ended(going)
+    assert (status, value) == (130, "")
     assert errors == f"200 runs of ir_grasp on 2 workers into {out}\nAborted!\n"
     assert not out.exists()
 

@@ -35,7 +35,7 @@ def paper() -> Paper:
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
-def told(value: Any) -> Any:
+def as_paper(value: Any) -> Any:
     return getattr(value, "name", value).lower() if hasattr(value, "name") else value
 
 
@@ -51,7 +51,7 @@ def told(value: Any) -> Any:
 )
 def test_defaults_are_those_of_the_paper_file(paper: Paper, group: str, params: Any):
     for name, entry in paper[group].items():
-        assert np.array_equal(told(getattr(params, name)), entry["value"]), name
+        assert np.array_equal(as_paper(getattr(params, name)), entry["value"]), name
 
 
 @pytest.mark.parametrize(
@@ -101,12 +101,12 @@ def test_the_arm_starts_where_the_scenario_has_it_start(paper: Paper):
 
 
 def test_the_training_is_as_told(paper: Paper):
-    told = {name: entry["value"] for name, entry in paper["training"].items()}
+    as_paper = {name: entry["value"] for name, entry in paper["training"].items()}
     points = next(p.default for p in vsl_train.params if p.name == "points")
-    assert told.pop("points") == points
-    assert told.pop("split") == list(SPLIT) == paper["published"]["split"]["value"]
-    assert {n: np.ravel(v).tolist() for n, v in told.items()} == {
-        n: np.ravel(getattr(training_data, n.upper())).tolist() for n in told
+    assert as_paper.pop("points") == points
+    assert as_paper.pop("split") == list(SPLIT) == paper["published"]["split"]["value"]
+    assert {n: np.ravel(v).tolist() for n, v in as_paper.items()} == {
+        n: np.ravel(getattr(training_data, n.upper())).tolist() for n in as_paper
     }
 
 

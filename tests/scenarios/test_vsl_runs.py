@@ -9,24 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.cosim.exceptions import UnitRefused
+from handover.cosim.exceptions import InitializationError
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Observer
 from handover.fmus.build import cached
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.runner import carry_out
+from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Outcome
-from handover.scenarios.experiment.parameters import BadParameter, parse_parameters
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.task import Ended, Task
+from handover.scenarios.results.summary import RunResult
+from handover.scenarios.results.task import Task
 from handover.scenarios.vsl.path_experiments import PathExperiment, VslHybrid, VslModelBased
 
 BOTH = [VslModelBased, VslHybrid]
 
 
-def run(experiment: type[PathExperiment], out: Path, *parameters: str, seed: int = 0) -> Ended:
+def run(experiment: type[PathExperiment], out: Path, *parameters: str, seed: int = 0) -> RunResult:
     """Run as the command does, with record, figures and report."""
     task = Task(
         experiment=experiment(),
@@ -36,7 +37,7 @@ def run(experiment: type[PathExperiment], out: Path, *parameters: str, seed: int
         folder=RunFolder(out),
     )
     with Interruption() as interruption:
-        return carry_out(task, lambda _t, _stop: None, interruption)
+        return run_task(task, lambda _t, _stop: None, interruption)
 
 
 def judge(
@@ -44,10 +45,10 @@ def judge(
 ) -> Outcome:
     """Run without leaving anything."""
     p, e = parse_parameters(experiment, parameters), experiment()
-    watch = e.watch(p)
+    evaluator = e.evaluator(p)
     with Master(e.build(p, seed, lambda name: cached(experiment.units[name], 3))) as master:
-        master.run(e.stop_time(p), [*observers, watch], until=lambda: watch.over)
-    return watch.outcome()
+        master.run(e.stop_time(p), [*observers, evaluator], until=lambda: evaluator.over)
+    return evaluator.outcome()
 
 
 def error_of(*parameters: str) -> float:
@@ -61,14 +62,14 @@ def digest(out: Path) -> str:
     return hashlib.sha256((out / "signals.parquet").read_bytes()).hexdigest()
 
 
-Finished = Callable[[type[PathExperiment]], tuple[Path, Ended]]
+Finished = Callable[[type[PathExperiment]], tuple[Path, RunResult]]
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    runs: dict[str, tuple[Path, Ended]] = {}
+    runs: dict[str, tuple[Path, RunResult]] = {}
 
-    def of(experiment: type[PathExperiment]) -> tuple[Path, Ended]:
+    def of(experiment: type[PathExperiment]) -> tuple[Path, RunResult]:
         if experiment.name not in runs:
             out = tmp_path_factory.mktemp("runs") / experiment.name
             runs[experiment.name] = out, run(experiment, out)
@@ -157,13 +158,13 @@ def test_other_paths_loads_and_pressures_succeed(experiment: type[PathExperiment
 def test_a_point_out_of_reach_is_refused_and_named_before_anything_is_written(
     experiment: type[PathExperiment], tmp_path: Path
 ):
-    with pytest.raises(UnitRefused, match=r"segment 1 of 1, point \d+ of 100, \(0\.4\d+, 0, 0\.05\) m"):
+    with pytest.raises(InitializationError, match=r"segment 1 of 1, point \d+ of 100, \(0\.4\d+, 0, 0\.05\) m"):
         run(experiment, tmp_path / "r", "path=custom", "x_g=0.6,0,0.05")
     assert not (tmp_path / "r").exists()
 
 
 @pytest.mark.parametrize(
-    ("parameters", "told"),
+    ("parameters", "entries"),
     [
         (("path=custom", "x_0=0.3,0,-0.1", "x_g=0.35,0,0"), [r"x_0: (0.3, 0, -0.1) m is below the ground"]),
         (("path=custom", "x_0=0.3,0,-0.1", "x_g=0.3,0,-0.05"), ["x_0: (0.3, 0, -0.1) m", "x_g: (0.3, 0, -0.05) m"]),
@@ -173,17 +174,17 @@ def test_a_point_out_of_reach_is_refused_and_named_before_anything_is_written(
 )
 @pytest.mark.parametrize("experiment", BOTH)
 def test_ends_below_the_ground_or_of_another_path_are_refused_and_named(
-    experiment: type[PathExperiment], parameters: tuple[str, ...], told: list[str], tmp_path: Path
+    experiment: type[PathExperiment], parameters: tuple[str, ...], entries: list[str], tmp_path: Path
 ):
-    with pytest.raises(BadParameter) as caught:
+    with pytest.raises(InvalidParameter) as caught:
         run(experiment, tmp_path / "r", *parameters)
-    assert len(caught.value.faults) == sum(part.startswith("x_") for part in told)
-    assert all(part in str(caught.value) for part in told)
+    assert len(caught.value.faults) == sum(part.startswith("x_") for part in entries)
+    assert all(part in str(caught.value) for part in entries)
     assert not (tmp_path / "r").exists()
 
 
 def test_a_model_that_is_not_there_is_refused_and_named(tmp_path: Path):
-    with pytest.raises(UnitRefused, match=r"nowhere\.json"):
+    with pytest.raises(InitializationError, match=r"nowhere\.json"):
         run(VslHybrid, tmp_path / "r", "model=nowhere.json")
     assert not (tmp_path / "r").exists()
 

@@ -99,17 +99,17 @@ def test_the_same_seed_gives_the_same_model_in_both_forms(tmp_path: Path):
     exec((tmp_path / "m.py").read_text(), vars(module))
     assert vars(module)["DEFAULT_MODEL"] == (tmp_path / "m.json").read_text()
     assert "--points 400 --seed 1" in (module.__doc__ or "")
-    told = read_model(tmp_path / "m.json").provenance
-    assert told["arm"]["fmu"] == "VslArm"
-    assert told["arm"]["parameters"]["motion"] == "QUASI_STATIC"
-    assert told["seed"] == 1
-    assert 300 < sum(told["points"][k] for k in ("training", "validation", "test")) <= 400
-    assert told["mean_test_errors_m"]["forward_hybrid"] < 0.1 * told["mean_test_errors_m"]["forward_model_based"]
+    text = read_model(tmp_path / "m.json").provenance
+    assert text["arm"]["fmu"] == "VslArm"
+    assert text["arm"]["parameters"]["motion"] == "QUASI_STATIC"
+    assert text["seed"] == 1
+    assert 300 < sum(text["points"][k] for k in ("training", "validation", "test")) <= 400
+    assert text["mean_test_errors_m"]["forward_hybrid"] < 0.1 * text["mean_test_errors_m"]["forward_model_based"]
 
 
 def test_another_seed_gives_another_model():
     a, b = (
-        VslTraining(fmu=cached("VslArm", 3), kinematics=ARM, points=40, seed=seed).carry_out(lambda _t, _end: None)[0]
+        VslTraining(fmu=cached("VslArm", 3), kinematics=ARM, points=40, seed=seed).train(lambda _t, _end: None)[0]
         for seed in (1, 2)
     )
     assert np.all(a.inverse.mean != b.inverse.mean)
@@ -117,7 +117,7 @@ def test_another_seed_gives_another_model():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "text"),
     [
         (["--points", "10"], "10 is not in the range"),
         (["--seed", "-1"], "-1 is not in the range"),
@@ -130,14 +130,14 @@ def test_another_seed_gives_another_model():
         (["--plant", "text.fmu"], "not an FMU"),
     ],
 )
-def test_a_bad_call_is_told_in_a_line(arguments: list[str], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_bad_call_is_told_in_a_line(arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.json").mkdir()
     (tmp_path / "text.fmu").write_text("text")
     before = sorted(tmp_path.iterdir())
     result = call(*arguments)
     assert result.exit_code == 2
-    assert told in result.output
+    assert text in result.output
     assert "Traceback" not in result.output
     assert sorted(tmp_path.iterdir()) == before
 
@@ -151,17 +151,17 @@ def test_an_arm_that_fails_leaves_no_file(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("arm", "told"),
+    ("arm", "text"),
     [
         ("DistantArm", "0 of 400 measured tips are where links of 0.225 and 0.225 m"),
         ("ArmWithoutGauges", r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
     ],
 )
-def test_an_arm_that_teaches_nothing_is_refused(arm: str, told: str, tmp_path: Path):
+def test_an_arm_that_teaches_nothing_is_refused(arm: str, text: str, tmp_path: Path):
     fmu = build_block(f"vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
     result = call("--points", "400", "--plant", fmu, "--out", tmp_path / "m.json")
     assert result.exit_code == 2
-    assert re.search(told, result.output)
+    assert re.search(text, result.output)
     assert "Traceback" not in result.output
     assert not (tmp_path / "m.json").exists()
 
@@ -210,12 +210,12 @@ def test_the_model_that_ships_was_trained_on_the_present_arm():
 
 @pytest.mark.slow
 def test_the_model_that_ships_can_be_made_again():
-    told = shipped().provenance
+    text = shipped().provenance
     training = VslTraining(
-        fmu=cached("VslArm", 3), kinematics=ARM, points=told["points"]["measured"], seed=told["seed"]
+        fmu=cached("VslArm", 3), kinematics=ARM, points=text["points"]["measured"], seed=text["seed"]
     )
-    again, _ = training.carry_out(lambda _t, _end: None)
-    assert again.provenance["arm"] == told["arm"]
+    again, _ = training.train(lambda _t, _end: None)
+    assert again.provenance["arm"] == text["arm"]
     x = shipped().inverse.mean + np.random.default_rng(0).uniform(-1.5, 1.5, (100, 7)) * shipped().inverse.scale
     np.testing.assert_allclose(again.inverse.predict(x), shipped().inverse.predict(x), atol=2e-6)  # 1 um at the tip
     np.testing.assert_allclose(again.forward.predict(x), shipped().forward.predict(x), atol=1e-6)

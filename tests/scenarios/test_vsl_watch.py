@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
-from handover.scenarios.vsl.evaluation import PathWatch, distance_to_path
+from handover.scenarios.vsl.evaluation import PathEvaluator, distance_to_path
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -24,10 +24,10 @@ def signals(
     lowest: float = 0.04,
 ) -> Signals:
     """Return a goal at x = goal and a tip `below` the point at x = at; servos are 1 mm off, the tracker 0.5 mm."""
-    told, reached = (np.array([x, 0.0, 0.1]) for x in (goal, goal if at is None else at))
+    entries, reached = (np.array([x, 0.0, 0.1]) for x in (goal, goal if at is None else at))
     tip = reached - below * UP
     values: dict[str, dict[str, Any]] = {
-        "planner": {"p_WG_goal": told, "moving": segment > 0 and not done, "done": done, "segment": segment},
+        "planner": {"p_WG_goal": entries, "moving": segment > 0 and not done, "done": done, "segment": segment},
         "arm": {"p_WG": tip + 0.0005 * UP, "p_WG_meas": tip, "shape": np.array([0.0 * UP, 0.15 * UP, lowest * UP])},
         "kinematics": {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.003 * UP, "outside": outside},
     }
@@ -42,10 +42,10 @@ def port(name: str, shape: tuple[int, ...]) -> FmuPort:
     return FmuPort(name=name, kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="", references=(), shape=shape)
 
 
-def follow(watch: PathWatch, *moments: Signals) -> PathWatch:
+def follow(evaluator: PathEvaluator, *moments: Signals) -> PathEvaluator:
     for k, seen in enumerate(moments):
-        watch(0.02 * k, seen)
-    return watch
+        evaluator(0.02 * k, seen)
+    return evaluator
 
 
 def path(*below: float, outside: bool = False) -> list[Signals]:
@@ -57,13 +57,13 @@ def path(*below: float, outside: bool = False) -> list[Signals]:
 
 
 def test_a_point_counts_when_it_is_left_not_while_the_arm_is_on_its_way():
-    watch = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.02, 0.06))
-    assert [p.error for p in watch.points] == pytest.approx([0.01, 0.02, 0.06])
-    assert [p.desired[0] for p in watch.points] == pytest.approx([0.31, 0.32, 0.33])
+    evaluator = follow(PathEvaluator(Parameters(), hybrid=False), *path(0.01, 0.02, 0.06))
+    assert [p.error for p in evaluator.points] == pytest.approx([0.01, 0.02, 0.06])
+    assert [p.desired[0] for p in evaluator.points] == pytest.approx([0.31, 0.32, 0.33])
 
 
 def test_errors_are_those_of_the_points():
-    metrics = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.02, 0.06, 0.03, 0.05)).outcome().metrics
+    metrics = follow(PathEvaluator(Parameters(), hybrid=False), *path(0.01, 0.02, 0.06, 0.03, 0.05)).outcome().metrics
     values = {name: m.value for name, m in metrics.items()}
     assert values["mean_error"] == pytest.approx(0.034)
     assert values["median_error"] == pytest.approx(0.03)
@@ -81,55 +81,57 @@ def test_errors_are_those_of_the_points():
 
 
 def test_a_completed_path_within_the_tolerance_succeeds():
-    watch = follow(PathWatch(Parameters(tolerance=0.04), hybrid=False), *path(0.03, 0.04))
-    assert watch.over
-    outcome = watch.outcome()
+    evaluator = follow(PathEvaluator(Parameters(tolerance=0.04), hybrid=False), *path(0.03, 0.04))
+    assert evaluator.over
+    outcome = evaluator.outcome()
     assert outcome.success
     assert "mean error of the tip 35.0 mm, within the tolerance of 40.0 mm" in outcome.reason
 
 
 def test_a_completed_path_with_a_mean_error_above_the_tolerance_fails():
-    outcome = follow(PathWatch(HybridParameters(), hybrid=True), *path(0.004, 0.008)).outcome()
+    outcome = follow(PathEvaluator(HybridParameters(), hybrid=True), *path(0.004, 0.008)).outcome()
     assert not outcome.success
     assert "mean error of the tip 6.0 mm, above the tolerance of 5.0 mm" in outcome.reason
 
 
 def test_a_path_that_was_cut_short_fails_and_says_how_far_it_came():
-    watch = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.01, 0.01)[:-1])
-    assert not watch.over
-    outcome = watch.outcome()
+    evaluator = follow(PathEvaluator(Parameters(), hybrid=False), *path(0.01, 0.01, 0.01)[:-1])
+    assert not evaluator.over
+    outcome = evaluator.outcome()
     assert not outcome.success
     assert "stopped at 0.1 s in segment 1 of the path, 2 of the path's 200 points visited" in outcome.reason
     assert "path_time" not in outcome.metrics
 
 
 def test_a_path_that_never_began_fails_without_errors():
-    outcome = follow(PathWatch(Parameters(), hybrid=False), signals(0.3, segment=0)).outcome()
+    outcome = follow(PathEvaluator(Parameters(), hybrid=False), signals(0.3, segment=0)).outcome()
     assert not outcome.success
     assert outcome.reason == "stopped at 0.0 s, before the path began"
     assert not outcome.metrics
 
 
 def test_points_that_fell_between_two_periods_are_told():
-    metrics = follow(PathWatch(Parameters(points=2), hybrid=False), *path(0.01, 0.02, 0.03)).outcome().metrics
+    metrics = follow(PathEvaluator(Parameters(points=2), hybrid=False), *path(0.01, 0.02, 0.03)).outcome().metrics
     assert metrics["points_visited"].value == 3
     assert metrics["points_visited"].description.startswith("points visited of the path's 4; the others fell between")
-    metrics = follow(PathWatch(Parameters(points=1), hybrid=False), *path(0.01, 0.02)).outcome().metrics
+    metrics = follow(PathEvaluator(Parameters(points=1), hybrid=False), *path(0.01, 0.02)).outcome().metrics
     assert metrics["points_visited"].description == "points visited of the path's 2"
 
 
 def test_links_below_the_ground_are_told():
-    above = follow(PathWatch(Parameters(), hybrid=False), *path(0.01, 0.02)).outcome()
+    above = follow(PathEvaluator(Parameters(), hybrid=False), *path(0.01, 0.02)).outcome()
     assert above.metrics["lowest"].value == pytest.approx(0.04)
     assert "ground" not in above.reason
-    below = follow(PathWatch(Parameters(), hybrid=False), signals(0.3, segment=0, lowest=-0.0421), *path(0.01, 0.02))
+    below = follow(
+        PathEvaluator(Parameters(), hybrid=False), signals(0.3, segment=0, lowest=-0.0421), *path(0.01, 0.02)
+    )
     assert below.outcome().metrics["lowest"].value == pytest.approx(-0.0421)
     assert below.outcome().reason.endswith("the links dipped 42.1 mm below it")
 
 
 def test_the_hybrid_tells_of_its_forward_model_and_of_extrapolation():
-    watch = follow(PathWatch(HybridParameters(), hybrid=True), *path(0.003, 0.003, outside=True))
-    metrics = watch.outcome().metrics
+    evaluator = follow(PathEvaluator(HybridParameters(), hybrid=True), *path(0.003, 0.003, outside=True))
+    metrics = evaluator.outcome().metrics
     assert metrics["estimate_error"].value == pytest.approx(0.0025)
     assert metrics["model_error"].value == pytest.approx(0.0015)  # 2.5 mm below the point, taken to be 1 mm below it
     assert metrics["servo_error"].value == pytest.approx(0.001)

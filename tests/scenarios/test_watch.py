@@ -10,7 +10,7 @@ from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.helix.handover_partner import Holder
 from handover.scenarios.helix.cameras import camera_of
-from handover.scenarios.helix.evaluation import HandoverWatch
+from handover.scenarios.helix.evaluation import HandoverEvaluator
 from handover.scenarios.helix.parameters import Cover, Parameters
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
@@ -52,19 +52,19 @@ def port(name: str, kind: Kind, **more: Any) -> FmuPort:
     return FmuPort(name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), **more)
 
 
-def follow(*seen: tuple[float, Signals], parameters: Parameters | None = None) -> HandoverWatch:
-    watch = HandoverWatch(parameters or Parameters())
+def follow(*seen: tuple[float, Signals], parameters: Parameters | None = None) -> HandoverEvaluator:
+    evaluator = HandoverEvaluator(parameters or Parameters())
     for t, at_t in seen:
-        watch(t, at_t)
-    watch.finish(seen[-1][1])
-    return watch
+        evaluator(t, at_t)
+    evaluator.finish(seen[-1][1])
+    return evaluator
 
 
 def test_a_gripper_that_closed_beside_the_ball_fails_and_says_how_far():
     beside = [signals(phase, beside=0.04, along=-0.01) for phase in (Phase.GRASP, Phase.HOLD, Phase.HOLD)]
-    watch = follow((8.0, beside[0]), (18.0, beside[1]), (19.1, beside[2]))
-    assert watch.over
-    outcome = watch.outcome()
+    evaluator = follow((8.0, beside[0]), (18.0, beside[1]), (19.1, beside[2]))
+    assert evaluator.over
+    outcome = evaluator.outcome()
     assert not outcome.success
     assert "0.040 m beside its axis and -0.010 m along it" in outcome.reason
     assert "grasp_offset_lateral" not in outcome.metrics
@@ -86,22 +86,22 @@ def test_a_ball_that_fell_from_the_gripper_fails():
     assert "did not keep the ball" in outcome.reason
 
 
-def moments(watch: HandoverWatch) -> dict[str, float]:
+def moments(evaluator: HandoverEvaluator) -> dict[str, float]:
     """Return the times of the pictures by role; each moment has a left and a right one."""
-    pictures = watch.pictures()
+    pictures = evaluator.pictures()
     assert [p.camera for p in pictures] == ["left", "right"] * (len(pictures) // 2)
     return {p.role: p.t for p in pictures}
 
 
 def test_pictures_are_of_the_start_the_first_entries_into_phases_and_the_end():
     course = (Phase.WAIT, Phase.APPROACH, Phase.DESCEND, Phase.APPROACH, Phase.DESCEND, Phase.GRASP, Phase.DESCEND)
-    watch = follow(*((float(t), signals(phase)) for t, phase in enumerate((*course, Phase.GRASP, Phase.HOLD))))
-    assert moments(watch) == {"start": 0.0, "approach": 1.0, "descent": 2.0, "at the ball": 5.0, "end": 8.0}
+    evaluator = follow(*((float(t), signals(phase)) for t, phase in enumerate((*course, Phase.GRASP, Phase.HOLD))))
+    assert moments(evaluator) == {"start": 0.0, "approach": 1.0, "descent": 2.0, "at the ball": 5.0, "end": 8.0}
 
 
 def test_a_run_that_timed_out_has_a_start_and_an_end():
-    watch = follow((0.0, signals(Phase.APPROACH)), (60.0, signals(Phase.APPROACH)))
-    assert moments(watch) == {"start": 0.0, "end": 60.0}
+    evaluator = follow((0.0, signals(Phase.APPROACH)), (60.0, signals(Phase.APPROACH)))
+    assert moments(evaluator) == {"start": 0.0, "end": 60.0}
 
 
 def test_a_moment_is_shown_once():
@@ -118,9 +118,9 @@ def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to
 def test_a_covered_lens_is_shown_when_the_first_picture_was_taken_through_it():
     covered = Parameters(cover=Cover.LEFT, cover_from=0.99, cover_for=2.0)
     seen = signals(Phase.WAIT)
-    watch = follow(*((t, seen) for t in (0.0, 0.98, 0.99, 1.0, 1.02, 4.0)), parameters=covered)
-    assert moments(watch) == {"start": 0.0, "lens covered": 1.0, "end": 4.0}
-    labels = {(p.role, p.camera): [m.label for m in p.marks if "measured" in m.label] for p in watch.pictures()}
+    evaluator = follow(*((t, seen) for t in (0.0, 0.98, 0.99, 1.0, 1.02, 4.0)), parameters=covered)
+    assert moments(evaluator) == {"start": 0.0, "lens covered": 1.0, "end": 4.0}
+    labels = {(p.role, p.camera): [m.label for m in p.marks if "measured" in m.label] for p in evaluator.pictures()}
     assert labels["lens covered", "left"] == []
     assert len(labels["lens covered", "right"]) == len(labels["end", "left"]) == 3
 

@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from crew_orders import order
+from crew_orders import job
 from distributed import Client
 
 from handover.scenarios.campaign import worker
@@ -25,8 +25,8 @@ def test_an_order_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path
         return started[-1]
 
     def lost(client: Client, batch: str) -> str:
-        arguments: list[Any] = [order(tmp_path / "runs"), batch, versions()]
-        return client.submit(worker.carry_out_run, *arguments, pure=False).result(timeout=60).lost
+        arguments: list[Any] = [job(tmp_path / "runs"), batch, versions()]
+        return client.submit(worker.run_job_on_worker, *arguments, pure=False).result(timeout=60).lost
 
     monkeypatch.setattr(worker, "ServerProcess", started_server)
     with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as client:

@@ -4,29 +4,29 @@ import contextlib
 from collections.abc import Generator
 
 import pytest
-from own_crew import OwnCrew
+from own_crew import InProcessPool
 
 from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign import scheduler as scheduler_address
-from handover.scenarios.campaign.pool_config import Workforce
+from handover.scenarios.campaign.pool_config import PoolConfig
 
 
 @pytest.mark.parametrize("checked", [True, False], ids=["checked", "unchecked"])
 def test_workers_are_those_of_the_scheduler_that_has_answered(checked: bool, monkeypatch: pytest.MonkeyPatch):
     asked: list[str] = []
 
-    def answer(told: str) -> str:
-        asked.append(told)
-        return f"tcp://{told}"
+    def result(text: str) -> str:
+        asked.append(text)
+        return f"tcp://{text}"
 
     @contextlib.contextmanager
-    def crew_at(address: str) -> Generator[OwnCrew, None, None]:
+    def connect_cluster(address: str) -> Generator[InProcessPool, None, None]:
         asked.append(address)
-        yield OwnCrew()
+        yield InProcessPool()
 
-    monkeypatch.setattr(scheduler_address, "scheduler_address", answer)
-    monkeypatch.setattr(local_cluster, "crew_at", crew_at)
-    workforce = Workforce(scheduler="h:1")
+    monkeypatch.setattr(scheduler_address, "scheduler_address", result)
+    monkeypatch.setattr(local_cluster, "connect_cluster", connect_cluster)
+    workforce = PoolConfig(scheduler="h:1")
     if checked:
         workforce.check()
     with workforce.start():
