@@ -52,8 +52,8 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> N
 
 
 def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
-    from handover.scenarios.cli.run_figures import draw_run
     from handover.scenarios.execution.resume import complete_signals
+    from handover.scenarios.reporting.run_figures import draw_run
     from handover.scenarios.reporting.run_page import write_run_page
     from handover.scenarios.results.run_facts import RunFacts
 

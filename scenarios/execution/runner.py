@@ -153,7 +153,7 @@ def _outcome(evaluator: Evaluator, failure: UnitFailure | None, interrupted: boo
 
 
 def _present(task: Task, evaluator: Evaluator) -> None:
-    from handover.scenarios.cli.run_figures import draw_figures  # plots take long to load
+    from handover.scenarios.reporting.run_figures import draw_figures  # plots take long to load
     from handover.scenarios.reporting.run_page import write_run_page
 
     record = record_of(task.folder)

@@ -1,8 +1,7 @@
 """An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
 
 import contextlib
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -14,13 +13,9 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
-from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, TimePlot
+from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.results.run_folder import sha256_of
-
-_MAX_SIGNALS = 6
-"""Signals in one figure."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,21 +75,11 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
             return ()
 
         def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
+            from handover.scenarios.reporting.run_figures import figures_of_outputs  # what draws takes long to load
+
             return figures_of_outputs(ssp.system.units, record)
 
     return SspExperiment()
-
-
-def figures_of_outputs(units: Iterable[str], record: Record) -> list[TimeFigure]:
-    """Return the first real outputs of each unit over time, an axis for each."""
-    figures: list[TimeFigure] = []
-    for name in units:
-        ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MAX_SIGNALS]
-        if ports:
-            file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
-            plots = [_output(port, port.removeprefix(f"{name}."), record) for port in ports]
-            figures.append(TimeFigure(name=file, caption=f"Outputs of {name} over time.", plots=plots))
-    return figures
 
 
 def open_experiment(
@@ -117,10 +102,3 @@ def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, An
     """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
     facts = {"stop": str(stop), "step": None if step is None else str(step)}
     return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **facts}
-
-
-def _output(port: str, quantity: str, record: Record) -> TimePlot:
-    values = record[port].reshape(len(record.time), -1)[:, : len(COLOURS)]
-    labels = [quantity] if values.shape[1] == 1 else [f"element {k + 1}" for k in range(values.shape[1])]
-    curves = [Curve(label=label, values=values[:, k]) for k, label in enumerate(labels)]
-    return TimePlot(title=port, quantity=quantity, unit=unit_symbol(record.unit(port)), curves=curves)

@@ -186,8 +186,8 @@ def _within_runs(runs: IrTableRuns) -> Claim:
             medians.append(float(np.median(values)))
     reason = (
         "The paper tells neither of how many runs its figures are nor how they spread. Reproduced if each of the six "
-        f"lies between the {_SPAN_OF_MOST_RUNS[0]:g}th and {_SPAN_OF_MOST_RUNS[1]:g}th percentile of our runs, so that it could "
-        f"be a run's: {sum(inside)} of {len(inside)} do."
+        f"lies between the {_SPAN_OF_MOST_RUNS[0]:g}th and {_SPAN_OF_MOST_RUNS[1]:g}th percentile of our runs, so that "
+        f"it could be a run's: {sum(inside)} of {len(inside)} do."
     )
     return Claim(
         claim=sentence,

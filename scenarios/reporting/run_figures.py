@@ -1,19 +1,24 @@
 """Draws the figures of a run that has ended, of what its folder keeps."""
 
 import os
+import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from handover.cosim.record.reader import Record, RecordedSignals
-from handover.scenarios.execution.ssp_run import figures_of_outputs
+from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Figure
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.experiment.plotting import draw_time_figures
+from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, TimePlot
 from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported
+
+_MAX_SIGNALS = 6
+"""Signals in one figure."""
 
 
 def draw_figures(
@@ -69,3 +74,22 @@ def _show(record: Record, evaluator: Evaluator) -> None:
         signals.row = row
         evaluator(t, signals)
     evaluator.finish(signals)
+
+
+def figures_of_outputs(units: Iterable[str], record: Record) -> list[TimeFigure]:
+    """Return the first real outputs of each unit over time, an axis for each."""
+    figures: list[TimeFigure] = []
+    for name in units:
+        ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MAX_SIGNALS]
+        if ports:
+            file = f"{len(figures) + 1}_{re.sub(r'[^A-Za-z0-9_-]', '_', name)}"
+            plots = [_output(port, port.removeprefix(f"{name}."), record) for port in ports]
+            figures.append(TimeFigure(name=file, caption=f"Outputs of {name} over time.", plots=plots))
+    return figures
+
+
+def _output(port: str, quantity: str, record: Record) -> TimePlot:
+    values = record[port].reshape(len(record.time), -1)[:, : len(COLOURS)]
+    labels = [quantity] if values.shape[1] == 1 else [f"element {k + 1}" for k in range(values.shape[1])]
+    curves = [Curve(label=label, values=values[:, k]) for k, label in enumerate(labels)]
+    return TimePlot(title=port, quantity=quantity, unit=unit_symbol(record.unit(port)), curves=curves)
