@@ -14,7 +14,7 @@ from handover.scenarios.experiment.paper import paper_values
 
 def calibration() -> dict[str, Any]:
     """Return both cameras' calibration under the names of the units' parameters."""
-    facts = {name: np.array(value) for name, value in paper_values("helix_handover", "camera").items()}
+    facts = {name: np.array(value) for name, value in paper_values("helix", "camera").items()}
     found: dict[str, Any] = {}
     for i, side in enumerate(("left", "right")):
         p_WC = facts["p_WC"][i]

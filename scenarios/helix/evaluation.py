@@ -41,7 +41,7 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
         q_sys: commanded state, shape (9,), rad and m.
         p_WG_est: filtered measured position of the gripper in W, shape (3,), m.
     """
-    stated = paper_values("helix_handover", "servo")
+    stated = paper_values("helix", "servo")
     d_gripper = float(stated["d_gripper"])
     p_WG_sys = _W_FROM_B * forward_kinematics(q_sys, d_gripper)[3:]
     p_WG_calib = np.array([0.0, 0.0, -sum(stated["l_calib"]) - d_gripper])

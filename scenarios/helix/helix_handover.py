@@ -21,7 +21,7 @@ from handover.scenarios.helix.cameras import calibration
 from handover.scenarios.helix.evaluation import HandoverEvaluator
 from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
 
-_PAPER = "helix_handover"
+_PAPER = "helix"
 
 
 def published_of(p: Parameters) -> Sequence[PublishedValue]:

@@ -71,7 +71,7 @@ class Parameters:
     @property
     def settings(self) -> dict[str, Any]:
         """Return the controller's parameters that the tuning stands for."""
-        return paper_values("helix_handover", self.tuning.name.lower())
+        return paper_values("helix", self.tuning.name.lower())
 
     def covered(self, side: Cover) -> tuple[float, float]:
         """Return from when until when a lens is covered, in seconds; (0, 0) where it is not."""

@@ -100,7 +100,7 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
 
 def _stall(arm: Helix1Arm, alpha: float) -> str:
     """Tell of a step size at which the error can stall above the threshold."""
-    settings = paper_values("helix_handover", arm.tuning.name.lower())
+    settings = paper_values("helix", arm.tuning.name.lower())
     stall = round(settings["epsilon_pose_bound"] / alpha, 6)
     if settings["epsilon_control"] > settings["epsilon_pose_bound"] or stall < settings["threshold_grasp"]:
         return ""

@@ -36,7 +36,7 @@ class Helix1Arm:
         """Pick the rows of a tuning."""
         mine = [row for row in table.rows if row["tuning"] == tuning.name.lower()]
         done = [row for row in mine if row["status"] == "done"]
-        alphas: list[float] = paper_values("helix_handover", "experiment")["alpha"]
+        alphas: list[float] = paper_values("helix", "experiment")["alpha"]
         rows = {alpha: [row for row in done if row["alpha"] == alpha] for alpha in alphas}
         return cls(tuning, rows, len(mine) - len(done))
 
@@ -96,7 +96,7 @@ def _time(row: Mapping[str, Any]) -> float:
 
 def published() -> dict[str, Any]:
     """Return the published values by name."""
-    return paper_values("helix_handover", "published")
+    return paper_values("helix", "published")
 
 
 def too_few(facts: dict[str, Any], what: str) -> Claim:

@@ -1,17 +1,13 @@
-import sys
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
-import pytest
-
-from handover.fmus.build import build_block
-
-sys.path.insert(0, str(Path(__file__).parent))  # the modules beside the tests
-
 import decay
+import pytest
 from driven_unit import DrivenUnit, Started
 from fmu_of import FmuOf
+
+from handover.fmus.build import build_block
 
 
 @pytest.fixture(scope="session")

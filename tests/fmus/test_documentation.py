@@ -55,7 +55,7 @@ def test_papers_are_called_as_where_their_numbers_are():
 
 
 def test_every_paper_that_a_block_cites_is_known():
-    sources = [file.read_text() for folder in ("plants", "controllers") for file in (HOUSE / folder).glob("*.py")]
+    sources = [file.read_text() for folder in ("plants", "controllers") for file in (HOUSE / folder).rglob("*.py")]
     dated = {key for source in sources for key in re.findall(r"\[([A-Z][a-z]+\d{4}\w?)\]", source)}
     after = {key for source in sources for key in re.findall(r"(?:after|of|see) \[([A-Z]\w+)\]", source)}
     assert dated | after == set(PAPERS) == set(cited("\n".join(sources)))

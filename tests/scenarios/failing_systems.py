@@ -1,7 +1,6 @@
 """Systems with a native unit that fails, as SSPs, and the command `handover` that runs them in a process of its own."""
 
 import contextlib
-import importlib
 import os
 import subprocess
 import sys
@@ -9,11 +8,10 @@ from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
+from native_units import native_fmu
+
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "cosim"))
-native_fmu: Callable[..., Path] = importlib.import_module("native_units").native_fmu
 
 _MAIN = "from handover.scenarios.cli.entry import main; main()"
 IN_TERMINAL = f"import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); {_MAIN}"

@@ -1,13 +1,9 @@
 """Every scenario can be seen in space: its replay is complete, finite and small."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # flyer_runs
-
 from flyer_runs import run
 
 from handover.cosim.record.reader import Record

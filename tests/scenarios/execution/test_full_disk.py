@@ -2,15 +2,11 @@
 
 import errno
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
-
 from failing_systems import failing_ssp
 
 from handover.cosim.record.reader import Record

@@ -9,9 +9,6 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from clusters import scheduler, worker
 from crew_orders import bad_job, job
 from living import lives, parent, servers, until

@@ -218,7 +218,7 @@ def test_says_nothing_leaves_no_file_and_gives_the_same_bits_in_another_process(
         "    arm.step(i * 0.02, 0.02, Inputs(dl_t=np.array([-6, 3, 2, -4, 0, 4, 3, -6, 2]) * 1e-3))\n"
         "print(hashlib.sha256(arm.get_state()).hexdigest())\n"
     )
-    env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=env, capture_output=True, text=True)
     arm = TendonArm(Params())
     run(arm, BENT, 5)

@@ -1,6 +1,6 @@
 """What a step of an FMU costs beyond that of the plain object, beside two other packages; what a picture costs.
 
-`pytest tests/fmus/test_runtime_speed.py --benchmark-enable -s` prints a table: CPU time of a host in C that sets 12
+`pytest tests/fmus/runtime/test_speed.py --benchmark-enable -s` prints a table: CPU time of a host in C that sets 12
 real inputs, steps and gets 13 outputs (step_loop.c), and of Python code that does the same to the block itself. With
 Python in a process of its own (`apart`) the host mostly waits, so that the wall time is what counts there.
 """

@@ -10,9 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from click.testing import CliRunner
 from crew_orders import bad_job, job
 from living import children, lives, until

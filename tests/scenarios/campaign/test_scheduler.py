@@ -2,15 +2,11 @@
 
 import asyncio
 import socket
-import sys
 import threading
 from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from clusters import closed_port, scheduler
 
 from handover.scenarios.campaign.scheduler import scheduler_address

@@ -10,9 +10,6 @@ from pathlib import Path
 
 import psutil
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from crew_orders import bad_job, job
 from living import family, lives, parent, servers, until
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import handover.scenarios.helix_handover
 import numpy as np
 import pytest
 import tomli
 
+import handover.scenarios.helix
 from handover.controllers.helix.servo_parameters import Params as ServoParams
 from handover.plants.helix.handover_partner import Params as HandParams
 from handover.plants.helix.stereo_camera import Params as CameraParams
@@ -18,12 +18,12 @@ from handover.scenarios.helix.parameters import Parameters, Place, Tuning
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
 
-FILES = sorted((Path(handover.scenarios.helix_handover.__file__).parent.parent).glob("*/paper.toml"))
+FILES = sorted((Path(handover.scenarios.helix.__file__).parent.parent).glob("*/paper.toml"))
 
 
 @pytest.fixture(scope="module")
 def paper() -> dict[str, dict[str, dict[str, Any]]]:
-    file = Path(handover.scenarios.helix_handover.__file__).parent / "paper.toml"
+    file = Path(handover.scenarios.helix.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
 
@@ -38,7 +38,7 @@ def test_every_value_has_its_unit_origin_and_status(file: Path):
 
 
 def test_every_robot_has_its_paper_file():
-    experiments = {e.__module__.split(".")[1] for e in SCENARIOS.values()}
+    experiments = {e.__module__.split(".")[2] for e in SCENARIOS.values()}
     assert {file.parent.name for file in FILES} == experiments
 
 

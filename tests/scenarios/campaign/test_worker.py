@@ -1,13 +1,9 @@
 """A worker of a cluster carries out what is wanted only."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from crew_orders import job
 from distributed import Client
 

@@ -1,16 +1,12 @@
 """What the end of a run and its report tell of the master: conversions, steps, pace, failures."""
 
 import json
-import sys
 from fractions import Fraction
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-
-sys.path.insert(0, str(Path(__file__).parent))  # failing_systems
-
 from failing_systems import failing_ssp, native_fmu
 
 from handover.cosim.ssp.writing import write_ssp
