@@ -101,7 +101,7 @@ class Buffers:
         """Take over what `to_bytes` gave.
 
         Raises:
-            UnfitState: the bytes are of other variables; nothing has changed.
+            InvalidState: the bytes are of other variables; nothing has changed.
         """
         parts = split(state)
         if len(parts) != 3 + len(self.binaries) + len(self.strings):
@@ -155,7 +155,7 @@ def split(whole: bytes) -> list[bytes]:
     """Return the parts that `join` put together.
 
     Raises:
-        UnfitState: the bytes were not made by `join`.
+        InvalidState: the bytes were not made by `join`.
     """
     parts: list[bytes] = []
     at = 0

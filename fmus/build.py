@@ -113,8 +113,8 @@ def build(
 
     Raises:
         UnknownBlock: the entry's block does not exist.
-        UnknownVersion, UnusableName, UnusableStep: the standard's version, the name or the step is not one that can be.
-        DeclarationError, DuplicateName, AmbiguousName, UnusableText: the block's declarations are not in order.
+        UnknownVersion, InvalidName, InvalidStep: the standard's version, the name or the step is not one that can be.
+        DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are not in order.
         NoFmi2Form: FMI 2 and the block has binary ports, or integers that start beyond 32 bits.
         UnknownPlatform: the runtime is not made for a platform.
         NotCompiled: there is no runtime and no compiler.

@@ -72,7 +72,7 @@ def input_reader(buffers: Buffers) -> Callable[[], Any]:
 def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     """Return a function that writes a block's outputs into the buffers.
 
-    It raises UnfitOutput if an output is not of its declared type or shape, AttributeError if one is missing.
+    It raises InvalidOutput if an output is not of its declared type or shape, AttributeError if one is missing.
     """
     layout = buffers.layout
     reals = layout.of(Causality.OUTPUT, Buffer.FLOAT64)
@@ -244,7 +244,7 @@ def derivative_reader(
     """Return a function that turns a seed into what a block takes and what turns the block's answer into a vector.
 
     Seed and answer are float64, the real inputs and the real outputs as they lie in the buffer. The block gets the
-    inputs by name of which an entry is not zero. What turns its answer raises UnfitDerivative.
+    inputs by name of which an entry is not zero. What turns its answer raises InvalidDerivative.
     """
     inputs = buffers.layout.of(Causality.INPUT, Buffer.FLOAT64)
     outputs = {s.variable.name: s for s in buffers.layout.of(Causality.OUTPUT, Buffer.FLOAT64)}

@@ -69,7 +69,7 @@ def text(root: ET.Element) -> bytes:
     """Return a document as indented UTF-8.
 
     Raises:
-        UnusableText: an attribute has a character that XML cannot carry.
+        InvalidText: an attribute has a character that XML cannot carry.
     """
     for element in root.iter():
         for name, value in element.attrib.items():

@@ -82,7 +82,7 @@ class Slave:
         """Advance from t by dt or to the first event, write the outputs, and how far it came in the place of dt.
 
         Raises:
-            UnfitAdvance: the block says that it went backwards, or farther than dt.
+            InvalidAdvance: the block says that it went backwards, or farther than dt.
         """
         t, dt = self._clock.tolist()
         reached, y = self._block.advance(t, dt, self._read())
@@ -124,7 +124,7 @@ class Slave:
         """Take over what `get_state` gave, here or in another instance.
 
         Raises:
-            UnfitState: it is a state of another unit; nothing has changed.
+            InvalidState: it is a state of another unit; nothing has changed.
             ParameterOutOfRange, UnknownItem: it has such a parameter; nothing has changed.
         """
         parts = split(state)

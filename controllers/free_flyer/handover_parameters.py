@@ -109,7 +109,7 @@ class Params:
         return self.task in (HandoverTask.ROBOT_TO_HUMAN, HandoverTask.COLLABORATIVE)
 
     def check(self) -> None:
-        """Raise UnusableHandover, with all faults, if this is no handover that can be done."""
+        """Raise InvalidHandoverParameters, with all faults, if this is no handover that can be done."""
         faults = self._place_faults() + self._velocity_faults() + self._time_faults()
         if faults:
             raise InvalidHandoverParameters(faults)

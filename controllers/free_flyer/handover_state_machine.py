@@ -106,9 +106,9 @@ class HandoverStateMachine:
     is not between the fingers.
 
     Raises:
-        UnusableHandover: by the constructor, for goals out of reach, or thresholds or times that cannot work; all are
-            named.
-        UnusableOrientation: the estimated attitude is zero or not finite.
+        InvalidHandoverParameters: by the constructor, for goals out of reach, or thresholds or times that cannot work;
+            all are named.
+        InvalidOrientation: the estimated attitude is zero or not finite.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(

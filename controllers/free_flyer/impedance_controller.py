@@ -101,9 +101,9 @@ class ImpedanceController:
     lag 26 ms. The period is that of Astrobee's software, 1/62.5 s; sec. 4.1.2 prints 67.5 Hz.
 
     Raises:
-        UnusableController: by the constructor, for an impossible body, gains that are not positive definite, or a loop
-            that is not stable.
-        UnusableOrientation: a quaternion is zero or not finite.
+        InvalidControllerParameters: by the constructor, for an impossible body, gains that are not positive definite,
+            or a loop that is not stable.
+        InvalidOrientation: a quaternion is zero or not finite.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {

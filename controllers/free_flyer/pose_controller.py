@@ -136,9 +136,9 @@ class PoseController:
     lag but without saturation.
 
     Raises:
-        UnusableController: by the constructor, for an impossible body, bounds beyond the thrust, or a loop that is not
-            stable.
-        UnusableOrientation: a quaternion is zero or not finite.
+        InvalidControllerParameters: by the constructor, for an impossible body, bounds beyond the thrust, or a loop
+            that is not stable.
+        InvalidOrientation: a quaternion is zero or not finite.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {

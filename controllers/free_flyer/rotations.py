@@ -27,7 +27,7 @@ def unit_quaternion(q: Floats, block: str, name: str) -> Quaternion:
     """Return a quaternion, scalar first, divided by its norm.
 
     Raises:
-        UnusableOrientation: it is zero or not finite.
+        InvalidOrientation: it is zero or not finite.
     """
     w, x, y, z = q.tolist()
     n = w * w + x * x + y * y + z * z

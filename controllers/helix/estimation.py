@@ -46,7 +46,7 @@ class PositionFilter:
             R: its covariance, shape (3, 3), in m^2, where it is not the filter's own.
 
         Raises:
-            UnusableMeasurement: X_new is not finite.
+            InvalidMeasurement: X_new is not finite.
         """
         if not np.isfinite(X_new).all():
             raise InvalidMeasurement(X_new)

@@ -106,7 +106,7 @@ class HandoverVision:
     The state is the last measurement, and whether it is fresh.
 
     Raises:
-        UnusableCalibration: a quaternion is not of unit length or a focal length not positive.
+        InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(

@@ -91,7 +91,7 @@ class Params:
     )
 
     def check(self) -> None:
-        """Raise UnusableParameters, with all faults, if the servo cannot work with these values."""
+        """Raise InvalidServoParameters, with all faults, if the servo cannot work with these values."""
         faults = self._value_faults() + self._limit_faults() + self._threshold_faults()
         if faults:
             raise InvalidServoParameters(faults)

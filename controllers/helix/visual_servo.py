@@ -78,8 +78,8 @@ class VisualServo:
     goal. The mount, B, is at the origin of W.
 
     Raises:
-        UnusableParameters: values that contradict each other or are out of range; all faults are named.
-        UnusableMeasurement: a measurement that is said to be seen is not finite.
+        InvalidServoParameters: values that contradict each other or are out of range; all faults are named.
+        InvalidMeasurement: a measurement that is said to be seen is not finite.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(

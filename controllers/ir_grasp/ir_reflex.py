@@ -119,8 +119,9 @@ class IrReflex:
     cost is at contact, where the fingers push the object away.
 
     Raises:
-        UnusableReflex: by the constructor, for values that contradict each other or are out of range; all are named.
-        UnusableReading: by `step`, for inputs that are not finite; all are named.
+        InvalidReflexParameters: by the constructor, for values that contradict each other or are out of range; all are
+            named.
+        InvalidReading: by `step`, for inputs that are not finite; all are named.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -321,7 +322,7 @@ class IrReflex:
 
 
 def _check_inputs(u: Inputs) -> None:
-    """Raise UnusableReading for what is no number: no move would ever arrive, and no finger would ever see."""
+    """Raise InvalidReading for what is no number: no move would ever arrive, and no finger would ever see."""
     facts = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
     wrong = [name for name, values in facts.items() if not all(map(math.isfinite, values))]
     if wrong:

@@ -142,7 +142,7 @@ class Params:
         return Calibration(self.a, self.b, self.c, self.d)
 
     def check(self) -> None:
-        """Raise UnusableReflex, with all faults, if the reflex cannot work with these values."""
+        """Raise InvalidReflexParameters, with all faults, if the reflex cannot work with these values."""
         faults = parameter_faults(self) or [*self.calibration.faults(), *self._input_faults(), *self._range_faults()]
         if faults:
             raise InvalidReflexParameters(faults)

@@ -1,6 +1,6 @@
 """The trained model of `HybridKinematics` that ships, as JSON.
 
-Generated; when the sources of the arm (plants/vsl_*.py) have changed, run again
+Generated; when the sources of the arm (plants/vsl/) have changed, run again
 
     handover vsl-train --points 1500 --seed 0 --out controllers/vsl/default_model.py
 """
@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "2ef7d1727064c5bb07d27496e5d6d95000f2366d3974ee406093e9fbb8e03a6d",
+   "key": "4d97e660bc2bfefef47cc515334da5e9e1ab5476467f50bc3b3867ffe2788bf3",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

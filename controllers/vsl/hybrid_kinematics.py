@@ -85,7 +85,7 @@ class HybridKinematics:
     `outside` says that the input of g or h has left the polytope of its training; see `Cubic` for what happens there.
 
     Raises:
-        UnusableModel: by the constructor, if HYBRID and the model cannot be read, or was trained for other links.
+        InvalidModel: by the constructor, if HYBRID and the model cannot be read, or was trained for other links.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -147,7 +147,7 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     """Return the model to be used.
 
     Raises:
-        UnusableModel: it cannot be read, or was trained for other links than these.
+        InvalidModel: it cannot be read, or was trained for other links than these.
     """
     model = read_model(Path(p.model)) if p.model else parse_model(DEFAULT_MODEL, "that ships")
     if model.kinematics != kinematics:

@@ -59,7 +59,7 @@ def read_model(path: Path) -> VslModel:
     """Read a model from a file.
 
     Raises:
-        UnusableModel: there is no such file, or it is not a model.
+        InvalidModel: there is no such file, or it is not a model.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def parse_model(text: str, source: str) -> VslModel:
     """Return the model that `model_text` wrote.
 
     Raises:
-        UnusableModel: it is not JSON, of another format or version, lacks something, or has a part of a wrong kind.
+        InvalidModel: it is not JSON, of another format or version, lacks something, or has a part of a wrong kind.
     """
     try:
         content: object = json.loads(text)

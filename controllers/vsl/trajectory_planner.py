@@ -88,7 +88,7 @@ class TrajectoryPlanner:
     turn instead of all the way back.
 
     Raises:
-        UnusablePath: by the constructor, for values out of range, points out of reach or singular, no length.
+        InvalidPath: by the constructor, for values out of range, points out of reach or singular, no length.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(

@@ -24,8 +24,8 @@ class Block(Protocol):
     What a block may offer besides: `handover.cosim.blocks.block.EventfulBlock`,
     `handover.cosim.blocks.block.DifferentiableBlock`.
 
-    Class attributes: `feedthrough` names, by output, the inputs that act on it at once (within the same communication
-    point); `period` is the sampling period of a block that is sampled, in seconds, else None.
+    Class attributes: `feedthrough` names, by output, the inputs with direct feedthrough to it (within the same
+    communication point); `period` is the sampling period of a block that is sampled, in seconds, else None.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]]
@@ -132,8 +132,8 @@ def step_through_events(block: EventfulBlock, t: float, dt: float, u: Any) -> An
     """Advance from t by dt with u held, handle the events on the way, and return the outputs at t + dt.
 
     Raises:
-        UnfitAdvance: the block went backwards, or farther than it was to.
-        EndlessEvents: there are more than MOST_EVENTS events in a row and no time passes.
+        InvalidAdvance: the block went backwards, or farther than it was to.
+        TooManyEvents: there are more than MOST_EVENTS events in a row and no time passes.
     """
     passed, idle = 0.0, 0
     while True:

@@ -50,7 +50,7 @@ def _period_fault(period: object) -> str:
 
 def _feedthrough_fault(block: type[Any]) -> str:
     given: object = block.feedthrough
-    example = 'such as {"y": ("u",)}, or {} where no input acts on an output at once'
+    example = 'such as {"y": ("u",)}, or {} where no input has direct feedthrough to an output'
     if not isinstance(given, Mapping):
         return f"{given!r} is not a mapping of outputs' names to tuples of inputs' names, {example}"
     for y, us in cast("Mapping[object, object]", given).items():
@@ -73,7 +73,7 @@ class Description:
         doc, module_doc: docstrings of the class and of its module; empty where there is none.
         params_type, inputs_type, outputs_type: the dataclasses of declared fields.
         parameters, inputs, outputs: their fields, in the order of their declaration.
-        feedthrough: by output, the inputs that act on it at once.
+        feedthrough: by output, the inputs with direct feedthrough to it.
         period: of a sampled block, in seconds.
         has_events: whether it is an `EventfulBlock`.
         has_derivatives: whether it is a `DifferentiableBlock`.

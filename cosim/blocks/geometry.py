@@ -128,7 +128,7 @@ class Pinhole:
         distortion: k1, k2, p1, p2, k3.
 
     Raises:
-        UnusableCalibration: q_WC is not of unit length, fx or fy is not positive, or an entry is not finite.
+        InvalidCalibration: q_WC is not of unit length, fx or fy is not positive, or an entry is not finite.
     """
 
     def __init__(self, name: str, p_WC: Floats, q_WC: Floats, intrinsics: Floats, distortion: Floats) -> None:

@@ -108,7 +108,7 @@ class EventInstance(Instance):
         """End an iteration in event mode at t; return whether the unit wants another one.
 
         Raises:
-            UnitEnded: it wants the simulation to end. UnitFailure: its call failed.
+            UnitTerminated: it wants the simulation to end. UnitFailure: its call failed.
         """
         self.time = t
         again, terminate, _, _, known = self._flags

@@ -158,7 +158,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     """Read a checkpoint. Python objects in it are unpickled, so it must be from someone whom one trusts.
 
     Raises:
-        BadCheckpoint: there is none, or it is damaged or of another version.
+        InvalidCheckpoint: there is none, or it is damaged or of another version.
     """
     try:
         with zipfile.ZipFile(path) as archive:

@@ -40,7 +40,7 @@ class Master:
 
     Raises:
         WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Method`.
-        UnitRefused: a unit did not accept its parameters or did not initialise.
+        InitializationError: a unit did not accept its parameters or did not initialise.
     """
 
     def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
@@ -109,7 +109,7 @@ class Master:
 
     @property
     def iterates(self) -> bool:
-        """Whether units go over steps again; the steps of others are plain."""
+        """Whether units repeat steps after a rollback; the steps of others are plain."""
         return self._factory.iterates
 
     @property

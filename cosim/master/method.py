@@ -27,7 +27,7 @@ class StepperFactory:
         schedule: the grid and the order of the units.
 
     Raises:
-        ScheduleError: see `Schedule`, `check_control` and `refuse_off_grid`, or units make circles that cannot be
+        ScheduleError: see `Schedule`, `check_control` and `check_off_grid`, or units make circles that cannot be
             solved.
     """
 
@@ -47,7 +47,7 @@ class StepperFactory:
 
     @property
     def iterates(self) -> bool:
-        """Whether units go over steps again."""
+        """Whether units repeat steps after a rollback."""
         going_back = self._options.algorithm is not Algorithm.JACOBI
         return going_back and any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
 

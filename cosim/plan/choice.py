@@ -21,7 +21,7 @@ def plan_stepper(
 ) -> PlanStepper | None:
     """Return what runs a system of fixed steps as a plan; None, with a line in the log, where the general path has to.
 
-    `coupling` does the same on the general path; `iterates` tells that units go over steps again.
+    `coupling` does the same on the general path; `iterates` tells that units repeat steps after a rollback.
     """
     reason = _obstacle(schedule, options, iterates)
     library = loop() if reason is None else None

@@ -73,7 +73,7 @@ class EventEnsemble(Ensemble):
         if unit not in self._begun:
             if unit not in self._warned:
                 self._warned.add(unit)
-                _log.warning("%s cannot go back to the event at t = %.9g s: it stays at the end of its step", unit, t)
+                _log.warning("%s cannot roll back to the event at t = %.9g s: it stays at the end of its step", unit, t)
             return False
         begin, state = self._begun[unit]
         instance = self.instances[unit]
@@ -86,7 +86,7 @@ class EventEnsemble(Ensemble):
         return True
 
     def get_begins(self, units: Iterable[str]) -> dict[str, tuple[float, str]]:
-        """Return where the steps of units began, and their serialised states there; of units that can go back."""
+        """Return where the steps of units began, and their serialised states there; of units that can roll back."""
         begins: dict[str, tuple[float, str]] = {}
         for unit in units:
             if unit in self._begun:
@@ -115,7 +115,7 @@ class EventEnsemble(Ensemble):
         if instance.name in self._staying:
             raise instance.discarded(end.reached, _unable([instance.name]))
         if others := [n for n in self._staying if n != instance.name]:
-            raise instance.discarded(end.reached, f"the others would have to go back too, and {_unable(others)}")
+            raise instance.discarded(end.reached, f"the others would have to roll back too, and {_unable(others)}")
         tried = dt
         while tried > dt * _MIN_STEP:
             came = end.reached - t

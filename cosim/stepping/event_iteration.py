@@ -35,7 +35,7 @@ class EventIteration:
             The units that were in event mode; all are in step mode again.
 
         Raises:
-            UnsettledEvents: there is no end. UnitEnded: a unit wants the simulation to end.
+            UnsettledEvents: there is no end. UnitTerminated: a unit wants the simulation to end.
             UnitFailure: a call failed, or a unit would have to tick that is not at t.
         """
         inside = {n for n in self._units if self._units[n].in_event_mode}
@@ -113,7 +113,7 @@ class EventIteration:
     def _check_present(self, t: float, unit: str, clock: str, present: Collection[str]) -> None:
         if unit not in present:
             at = self._ensemble.instances[unit].time
-            entries = f"that its clock {clock} ticks while it is at t = {at:.9g} s, and it cannot go back"
+            entries = f"that its clock {clock} ticks while it is at t = {at:.9g} s, and it cannot roll back"
             raise UnitFailure(unit, "fmi3SetClock", t, entries)
 
     def _disturbed(self, t: float, present: Collection[str]) -> set[str]:

@@ -34,7 +34,7 @@ class EventStepper:
 
     - A step ends at the next multiple of the unit's period, or before it at an event that is known: a tick of a clock
       or a `nextEventTime`, of any unit where the unit can vary its step, else of its own.
-    - Where a unit returns early, all that can go back (they save states and vary their steps) are taken back to the
+    - Where a unit returns early, all that can roll back (they save states and vary their steps) are taken back to the
       begin of their steps and come to the instant too, with the inputs they had; the others stay at the ends of their
       steps, which the log says once. Sampled units hold between their instants anyway.
     - At such an instant the event iteration settles what changes, then sampled units act on that, and what they change
@@ -159,7 +159,7 @@ class EventStepper:
         return any(float(c.reached) == self.time and c.reached % c.period for c in self._courses.values())
 
     def _bring_back(self) -> None:
-        """Bring the units that are ahead to this point, where they can go back."""
+        """Bring the units that are ahead to this point, where they can roll back."""
         for unit, course in self._courses.items():
             if float(course.reached) <= self.time:
                 continue

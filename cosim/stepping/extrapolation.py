@@ -106,10 +106,11 @@ class LinearExtrapolation:
     input over its step, so one value must stand for the step:
     - the one in its middle. The integral of a line over the step is the length times this value, so that states come
       out to second order in the step.
-    - the one at its end, for an input that is declared to act at once on an output that feeds another unit: the output
+    - the one at its end, for an input that is declared to have direct feedthrough to an output that feeds another unit:
+    the output
       counts for the end of the step, and so must what it follows. States of such a unit come out to first order.
 
-    Where units iterate, an input that leads back in a circle follows the line from what its source gave last to what
+    Where units iterate, an input that leads back in a cycle follows the line from what its source gave last to what
     it is presumed to be at the end of the step.
 
     Only real values that change between instants follow lines. What is discrete, or comes from or goes to a unit that
@@ -201,7 +202,7 @@ def _is_followed(system: System, c: Connection) -> bool:
 
 
 def _feedthrough_inputs(system: System) -> set[PortName]:
-    """Return the inputs that are declared to act at once on an output that feeds a unit."""
+    """Return the inputs that are declared to have direct feedthrough to an output that feeds a unit."""
     feeding = {c.source for c in system.connections}
     inputs: set[PortName] = set()
     for y in feeding:

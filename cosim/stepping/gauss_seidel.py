@@ -15,7 +15,7 @@ from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
 
 MakeSolver = Callable[[Interface], InterfaceSolver]
-"""Makes a solver for the inputs that lead back in a circle."""
+"""Makes a solver for the inputs that lead back in a cycle."""
 
 
 class GroupStepping:
@@ -98,7 +98,7 @@ class GroupStepping:
 class GaussSeidel:
     """At t, sampled units act on the values at t, then observers see all signals, then the others go on from t.
 
-    Units of a group with a circle are gone over again until they agree, see `IteratedStep`. With groups that hold the
+    Units of a group with a cycle are iterated until they converge, see `IteratedStep`. With groups that hold the
     algebraic loops only, this solves those and is Gauss-Seidel for the rest; with groups of all units whose data flow
     in a circle, it is the iterated (strong, implicit) coupling.
 

@@ -1,4 +1,4 @@
-"""The inputs that lead back in a circle of units, as one vector of numbers.
+"""The inputs that lead back in a cycle of units, as one vector of numbers.
 
 When signals of unlike size count as settled.
 """

@@ -1,4 +1,4 @@
-"""One step of units that act on each other in a circle, gone over again until they agree.
+"""One step of units that act on each other in a cycle, iterated until they converge.
 
 How much work iterating was.
 
@@ -26,7 +26,7 @@ class IterationCount:
     """Counts of a run so far, at its start not included.
 
     Attributes:
-        steps: steps that were iterated; units that act on each other in a circle make one together.
+        steps: steps that were iterated; units that act on each other in a cycle make one together.
         iterations: how often all units of a circle stepped to see whether they agree.
         rollbacks: how often they went back to the beginning of a step, for that or to see what acts on what.
         most: the most iterations of a step.
@@ -64,7 +64,7 @@ class IterationCount:
 
 
 class NotConverged(UnitFailure):
-    """Units that act on each other in a circle did not come to agree at a time.
+    """Units that act on each other in a cycle did not come to agree at a time.
 
     Attributes:
         units: their names.

@@ -28,7 +28,7 @@ class AdaptiveStep:
         uncontrolled: outputs, `unit.port`, whose error is not looked at: such as noise, which no step makes smooth.
 
     Raises:
-        BadOptions: with everything that is wrong.
+        InvalidOptions: with everything that is wrong.
     """
 
     relative: float = 1e-4
@@ -65,7 +65,7 @@ class Extrapolation(enum.Enum):
     """What a unit's inputs are during its step.
 
     HOLD: what their sources gave last. LINEAR: on the line through what their sources gave at their last two
-    communication points; see `LinearInputs`.
+    communication points; see `LinearExtrapolation`.
     """
 
     HOLD = "hold"
@@ -77,7 +77,7 @@ class Algorithm(enum.Enum):
 
     JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values; the units of
     an algebraic loop go over the step again until they agree. FIXED_POINT and NEWTON: the same for all units that are
-    connected in a circle (iterated, strong or implicit coupling), with inputs of the end of the step, by relaxed
+    connected in a cycle (iterated, strong or implicit coupling), with inputs of the end of the step, by relaxed
     fixed-point iteration or by Newton's method. Sampled units act one after another but in loops. The loops of all but
     FIXED_POINT, and those at the start, are solved by Newton's method.
     """
@@ -89,7 +89,7 @@ class Algorithm(enum.Enum):
 
     @property
     def iterates(self) -> bool:
-        """Whether all units that are connected in a circle go over steps again."""
+        """Whether all units that are connected in a cycle repeat steps after a rollback."""
         return self in (Algorithm.FIXED_POINT, Algorithm.NEWTON)
 
 
@@ -100,7 +100,7 @@ class MasterOptions:
     Attributes:
         algorithm: see `Algorithm`.
         tolerance: the largest difference, relative to a signal's magnitude, at which iterated signals agree.
-        most_iterations: after so many iterations of a step, the run fails.
+        max_iterations: after so many iterations of a step, the run fails.
         extrapolation: what inputs are between communication points; see `Extrapolation`.
         adaptive: how the step follows the error; None for fixed steps.
         cpu_times: whether `Master.cpu` has the CPU time of every step; to take it costs 0.2 us a step.
@@ -111,7 +111,7 @@ class MasterOptions:
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
 
     Raises:
-        BadOptions: with every value that makes no sense.
+        InvalidOptions: with every value that makes no sense.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL

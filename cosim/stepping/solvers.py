@@ -81,7 +81,7 @@ class FixedPoint:
 
     Args:
         magnitudes: measures what has converged.
-        most_iterations: after so many calls of g, it gives up.
+        max_iterations: after so many calls of g, it gives up.
     """
 
     def __init__(self, magnitudes: Magnitudes, max_iterations: int) -> None:
@@ -139,7 +139,7 @@ class InterfaceNewton:
 
     Args:
         magnitudes: measures what has converged; J is scaled by them.
-        most_iterations: after so many calls of g, differences not counted, it gives up.
+        max_iterations: after so many calls of g, differences not counted, it gives up.
     """
 
     def __init__(self, magnitudes: Magnitudes, max_iterations: int) -> None:

@@ -1,6 +1,6 @@
 """Algebraic loops: outputs that act on themselves at once, through direct feedthrough and connections.
 
-Units that have to be stepped together, because they act on each other in a circle.
+Units that have to be stepped together, because they act on each other in a cycle.
 
 Refuses circles of units that an algorithm cannot solve, before anything is loaded.
 """
@@ -27,7 +27,7 @@ class AlgebraicLoop:
     outputs: tuple[PortName, ...]
     connections: tuple[Connection, ...]
     message: str
-    """A shortest circle, spelled out: `a.y -> b.u, b.u acts on b.y at once, b.y -> a.u, ...`."""
+    """A shortest cycle, spelled out: `a.y -> b.u, b.u feeds through to b.y, b.y -> a.u, ...`."""
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -108,7 +108,7 @@ def groups_of_loops(units: Sequence[str], loops: Sequence[AlgebraicLoop]) -> lis
 
 
 def groups_of_data_flow(system: System, units: Sequence[str], loops: Sequence[AlgebraicLoop]) -> list[Group]:
-    """Return the units, those together that are connected in a circle, in an order in which the data flow.
+    """Return the units, those together that are connected in a cycle, in an order in which the data flow.
 
     Values of one instant are needed: units of different periods, whose steps end at different times, make a circle only
     where they are in an algebraic loop; else they get each other's newest values.
@@ -174,12 +174,12 @@ def _silent(_chosen: object, _waits: object) -> None:
 
 _CURE = (
     "what would help: units that save their state (canGetAndSetFMUState) in their place, the algorithm jacobi, in "
-    "which every connection acts a step later, or a unit in the loop whose output does not act at once"
+    "which every connection acts a step later, or a unit in the loop whose output has no direct feedthrough"
 )
 
 
 def check_loops(system: System, loops: Sequence[AlgebraicLoop], rolls_back: bool) -> None:
-    """Check that algebraic loops can be solved: their signals are real, and units can go over a step again.
+    """Check that algebraic loops can be solved: their signals are real, and units can roll back a step.
 
     Args:
         system: it has no faults of wiring.
@@ -198,7 +198,7 @@ def check_loops(system: System, loops: Sequence[AlgebraicLoop], rolls_back: bool
 
 
 def check_cycles(system: System, groups: Sequence[Group]) -> None:
-    """Check that all units which are connected in a circle can go over a step again.
+    """Check that all units which are connected in a cycle can roll back a step.
 
     Raises:
         ScheduleError: with all that cannot.
@@ -207,9 +207,9 @@ def check_cycles(system: System, groups: Sequence[Group]) -> None:
     faults = [(group, stateless) for group in cycles if (stateless := _stateless(system, group.units))]
     if not faults:
         return
-    text = "".join(f"\n  - {', '.join(names)} (connected in a circle: {_list(g.units)})" for g, names in faults)
+    text = "".join(f"\n  - {', '.join(names)} (connected in a cycle: {_list(g.units)})" for g, names in faults)
     raise ScheduleError(
-        "iterating goes over steps again, which takes units that save their state (canGetAndSetFMUState), but these "
+        "iterating rolls steps back, which takes units that save their state (canGetAndSetFMUState), but these "
         f"do not:{text}\n  gauss-seidel and jacobi do without"
     )
 
@@ -224,7 +224,7 @@ def _fault(system: System, loop: AlgebraicLoop, rolls_back: bool) -> str | None:
     stateless = _stateless(system, loop.units) if rolls_back else []
     if stateless:
         verb = "do not save their states" if len(stateless) > 1 else "does not save its state"
-        return f"{', '.join(stateless)} {verb}, so a step cannot be gone over again; {_CURE}"
+        return f"{', '.join(stateless)} {verb}, so a step cannot be rolled back; {_CURE}"
     return None
 
 

@@ -33,10 +33,10 @@ class Schedule:
     stand in `continuous`: they go from t to t + period. A command therefore acts in the step that follows the picture
     it was made from.
 
-    Within each of the two a unit comes after those whose outputs act on its own at once (direct feedthrough), else
+    Within each of the two a unit comes after those whose outputs have direct feedthrough to its own, else
     units keep the order in which they were added. Units in an algebraic loop make a `Group` and stand side by side; an
     algorithm may solve it. Feedthrough that an FMU does not declare is presumed, but where presumed feedthrough would
-    close a loop it is left out of account. Units may need each other's outputs in a circle that is no loop, as each
+    close a loop it is left out of account. Units may need each other's outputs in a cycle that is no loop, as each
     output can be worked out after others: one of them then gets former values. Both are told in the log.
 
     Attributes:
@@ -44,7 +44,7 @@ class Schedule:
         initial_passes: how often to go through all units in order until all values at the start are worked out.
 
     Raises:
-        ScheduleError: periods fit no common grid.
+        ScheduleError: periods have no common communication step.
     """
 
     def __init__(self, system: System) -> None:
@@ -90,7 +90,7 @@ class Schedule:
 
         def log_presumed(group: int, waits: set[int]) -> None:
             names, others = ", ".join(groups[group].units), units_of(waits, presumed, group)
-            _log.warning("%s does not declare what acts at once; it gets the former values of %s", names, others)
+            _log.warning("%s does not declare its direct feedthrough; it gets the former values of %s", names, others)
 
         def log_declared(group: int, waits: set[int]) -> None:
             late = {n for i in waits for n in groups[i].units}
@@ -115,7 +115,7 @@ def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
     tick = Fraction(math.gcd(*(int(u.period * denominator) for u in units)), denominator)
     if tick * _MAX_TICKS_PER_STEP < min(u.period for u in units):
         text = ", ".join(f"{u.name} {u.period} s" for u in units)
-        raise ScheduleError(f"the communication steps of these units fit no common grid: {text}")
+        raise ScheduleError(f"the communication steps of these units have no common communication step: {text}")
     return tick
 
 
@@ -124,6 +124,6 @@ def _feedthrough_ports(unit: PlacedUnit) -> set[str]:
 
 
 def _feeding_through(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:
-    """Return the units that feed inputs which act on outputs at once."""
+    """Return the units that feed inputs with direct feedthrough to outputs."""
     acting = {u for us in feedthrough.values() for u in us}
     return {unit for port, unit in sources.items() if port in acting}

@@ -76,7 +76,7 @@ class Params:
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:
-        """Raise UnusableFlyer, with all faults, if no rigid body has these values."""
+        """Raise InvalidFlyerParameters, with all faults, if no rigid body has these values."""
         faults = inertia_faults(self.mass, self.I_B) + unit_faults("q_WB_0", self.q_WB_0)
         if faults:
             raise InvalidFlyerParameters(faults)
@@ -121,7 +121,8 @@ class FreeFlyer:
     in the robot's frame.
 
     Raises:
-        UnusableFlyer: by the constructor, for an inertia that no rigid body has or a quaternion that is not unit.
+        InvalidFlyerParameters: by the constructor, for an inertia that no rigid body has or a quaternion that is not
+            unit.
         TurnsTooFast: by `step`, where the robot turns by more than half a turn in it.
     """
 

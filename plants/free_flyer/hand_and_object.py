@@ -123,8 +123,8 @@ class HandAndObject:
     acts on the robot in the next step.
 
     Raises:
-        UnusableHand: by the constructor, for parameters that contradict each other; by the first step, if the gripper
-            starts in the hand or has the free object in its palm or its closed fingers.
+        InvalidHandParameters: by the constructor, for parameters that contradict each other; by the first step, if the
+            gripper starts in the hand or has the free object in its palm or its closed fingers.
         TurnsTooFast: see `RigidBody`.
     """
 

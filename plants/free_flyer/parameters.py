@@ -136,7 +136,7 @@ class Params:
         return self.angle_empty + (self.angle_open - self.angle_empty) * float(self.object_size[2]) / self.aperture
 
     def check(self) -> None:
-        """Raise UnusableHand, with all faults, if values contradict each other."""
+        """Raise InvalidHandParameters, with all faults, if values contradict each other."""
         faults = self._object_faults() + self._gripper_faults() + self._person_faults()
         if faults:
             raise InvalidHandParameters(faults)

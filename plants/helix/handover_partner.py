@@ -78,7 +78,7 @@ class Params:
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:
-        """Raise UnusablePartner, with all faults, if values contradict each other."""
+        """Raise InvalidPartnerParameters, with all faults, if values contradict each other."""
         faults: list[str] = []
         if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
             faults.append(
@@ -131,7 +131,7 @@ class HandoverPartner:
     its end follow from the inputs held during it. Force and ball therefore trail the gripper by one step.
 
     Raises:
-        UnusablePartner: by the constructor, for parameters that contradict each other.
+        InvalidPartnerParameters: by the constructor, for parameters that contradict each other.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}

@@ -159,8 +159,8 @@ class StereoCamera:
     The state is that of the noise: the generator and where the last pair's noise was taken from.
 
     Raises:
-        UnusableCalibration: a quaternion is not of unit length or a focal length not positive.
-        BadCover: a cover ends before it begins.
+        InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
+        InvalidCover: a cover ends before it begins.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(

@@ -74,7 +74,7 @@ class TendonArm:
     Quaternions are continuous: they start at (0, 1, 0, 0) and do not flip however far the arm bends.
 
     Raises:
-        UnusableArm: by the constructor, for parameters of which no arm can be built.
+        InvalidArmParameters: by the constructor, for parameters of which no arm can be built.
         StepSizeError: by `step`, for steps that are no multiple of `internal_step`.
         SolverFailure: by `step`, if there is no solution; the arm stays where it was.
     """

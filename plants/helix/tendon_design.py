@@ -88,7 +88,7 @@ class Params:
     internal_step: Second = parameter(0.005, "time step of the integrator", minimum=1e-4, maximum=0.01)
 
     def check(self) -> None:
-        """Raise UnusableArm, with all faults, if a value lies outside its range."""
+        """Raise InvalidArmParameters, with all faults, if a value lies outside its range."""
         faults = parameter_faults(self)
         if faults:
             raise InvalidArmParameters(faults)
@@ -106,7 +106,7 @@ class TendonDesign:
     farther tendons are sheathed.
 
     Raises:
-        UnusableArm: a parameter is out of range, or the tendons of a segment would hang slack.
+        InvalidArmParameters: a parameter is out of range, or the tendons of a segment would hang slack.
     """
 
     def __init__(self, params: Params) -> None:

@@ -35,7 +35,7 @@ class InfraredSensor:
         exponent: n of the law of incidence; 1 is Lambert's.
 
     Raises:
-        UnusableSensor: the characteristic does not fall strictly or does not cover the operating range.
+        InvalidSensorParameters: the characteristic does not fall strictly or does not cover the operating range.
     """
 
     def __init__(

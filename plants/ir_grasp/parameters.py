@@ -114,13 +114,13 @@ class Params:
         """Return one of the sensors.
 
         Raises:
-            UnusableSensor: its characteristic cannot be inverted.
+            InvalidSensorParameters: its characteristic cannot be inverted.
         """
         coefficients = (self.a, self.b, self.c, self.d)
         return InfraredSensor(*coefficients, self.nearest, self.farthest, self.contact_share, self.incidence_exponent)
 
     def check(self) -> None:
-        """Raise UnusableScene, with all faults: ranges, mass, an object beside the table, an unusable sensor."""
+        """Raise InvalidSceneParameters, with all faults: ranges, mass, an object beside the table, a sensor."""
         faults = parameter_faults(self)
         if not faults:
             if 0.0 < self.mass_O < _LIGHTEST:

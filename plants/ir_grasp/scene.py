@@ -84,10 +84,10 @@ class GraspScene:
     velocities every 500 internal steps; a state is that snapshot and the commands since, which `set_state` replays.
 
     Raises:
-        UnusableScene: by the constructor, for parameters of which no scene can be built, or a hand that would start
-            in the object.
+        InvalidSceneParameters: by the constructor, for parameters of which no scene can be built, or a hand that would
+            start in the object.
         StepSizeError: by `step`, for steps that are no multiple of 1 ms.
-        UnusableCommand: by `step`, for commands that are not finite; all are named.
+        InvalidCommand: by `step`, for commands that are not finite; all are named.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}

@@ -82,8 +82,8 @@ class VslArm:
     velocity. A step ends with the rest or motion under the inputs held during it.
 
     Raises:
-        UnusableVslArm: by the constructor, for parameters of which no arm can be built.
-        UnusableInput: by `outputs` and `step`, which then change nothing.
+        InvalidVslArmParameters: by the constructor, for parameters of which no arm can be built.
+        InvalidInput: by `outputs` and `step`, which then change nothing.
         NoEquilibrium: by `outputs` and `step`, if the arm buckles.
         NoConvergence: by `step`, if there is no solution of the equations of motion.
     """
@@ -225,7 +225,7 @@ class VslArm:
 
 
 def _check_inputs(u: Inputs) -> None:
-    """Raise UnusableInput for what is no number, or no load or pressure."""
+    """Raise InvalidInput for what is no number, or no load or pressure."""
     faults: list[str] = []
     if not np.isfinite((*u.q_cmd, *u.qd_cmd, *u.p_cmd)).all():
         faults.append(f"q_cmd {u.q_cmd}, qd_cmd {u.qd_cmd} and p_cmd {u.p_cmd} must be finite")

@@ -122,7 +122,7 @@ class Params:
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:
-        """Raise UnusableVslArm, with all faults, if values lie outside their ranges or contradict each other."""
+        """Raise InvalidVslArmParameters, with all faults, for values out of range or that contradict each other."""
         faults = parameter_faults(self) or self._contradictions()
         if faults:
             raise InvalidVslArmParameters(faults)

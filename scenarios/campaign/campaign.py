@@ -1,4 +1,4 @@
-"""Carries out a campaign: all is checked, what is done is kept, the rest is given to a crew, and the table is kept."""
+"""Runs a campaign: checks all of it, keeps what is done, gives the rest to a worker pool, writes the table."""
 
 import contextlib
 import shutil
@@ -25,14 +25,14 @@ def run_campaign(
 ) -> CampaignTable:
     """Carry out the runs of a campaign that are not done yet, and return the table of all.
 
-    Whatever ends it, what was done stays, and the same call goes on: a run is done when it has left its folder,
-    also if a unit failed in it. Lost runs are tried again by the next call. The table is completed in a block of
-    `settling`, which can keep an interruption from it.
+    Whatever ends it, what was done stays; run the same command again to resume: a run is done when it has left its
+    folder, also if a unit failed in it. Lost runs are tried again by the next call. The table is completed in a block
+    of `settling`, which can keep an interruption from it.
 
     Raises:
-        BadRunFolder, BadCrew: before anything was written.
+        InvalidRunFolder, PoolError: before anything was written.
         RecordNotWritten: there is no room.
-        CrewLost: there are no workers any more.
+        ClusterLost: there are no workers any more.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
     check = _nothing if folder.has_all(ready.plan) else pool.check

@@ -1,4 +1,4 @@
-"""The workers of a Dask cluster as a crew.
+"""The workers of a Dask cluster as a worker pool.
 
 Waiting, for a while, for who may never answer.
 """
@@ -101,7 +101,7 @@ class ClusterPool:
         """Check that all workers give the same numbers as this process, and write to the same folder.
 
         Raises:
-            BadCrew: some do not; the first of them are named.
+            PoolError: some do not; the first of them are named.
             RecordNotWritten: this process cannot write there itself.
         """
         value = self._ask(package_versions)
@@ -125,7 +125,7 @@ class ClusterPool:
         is left before its end, runs under way are ended and leave nothing.
 
         Raises:
-            CrewLost: the scheduler has gone, or no worker has been there for a while.
+            ClusterLost: the scheduler has gone, or no worker has been there for a while.
         """
         waiting = iter(jobs)
         going: dict[Any, tuple[RunJob, Future[JobResult]]] = {}
@@ -192,7 +192,7 @@ class ClusterPool:
         return {f"worker {worker}": answer for worker, answer in value.items()}
 
     def _raise_faults(self, faults: Mapping[str, str]) -> None:
-        """Raise BadCrew if there is a fault."""
+        """Raise PoolError if there is a fault."""
         bad = [f"{worker} {fault}" for worker, fault in faults.items() if fault]
         if bad:
             more = f"; and {len(bad) - _MAX_REPORTED} workers more" if len(bad) > _MAX_REPORTED else ""

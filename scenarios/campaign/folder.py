@@ -72,7 +72,7 @@ class CampaignFolder:
         """Return what `campaign.json` says.
 
         Raises:
-            BadRunFolder: it is not the folder of a campaign, or damaged.
+            InvalidRunFolder: it is not the folder of a campaign, or damaged.
         """
         return read_object(self.path / _FILE, f"it is not the folder of a campaign: it has no {_FILE}")
 
@@ -80,7 +80,7 @@ class CampaignFolder:
         """Check that a campaign can begin or go on here; nothing is written.
 
         Raises:
-            BadRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
+            InvalidRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
         """
         self._check_place()
         if not self.path.exists() or not any(self._counts(p) for p in self.path.iterdir()):
@@ -96,7 +96,7 @@ class CampaignFolder:
         """Check that no other command is at work on it, if it is there.
 
         Raises:
-            BadRunFolder: one is.
+            InvalidRunFolder: one is.
         """
         if self.path.is_dir():
             with self.held():
@@ -115,7 +115,7 @@ class CampaignFolder:
         files of one name, that of the unit before it.
 
         Raises:
-            BadRunFolder: as by `check`; or another command holds it, or it cannot be made.
+            InvalidRunFolder: as by `check`; or another command holds it, or it cannot be made.
             RecordNotWritten: it cannot be written to.
         """
         with contextlib.ExitStack() as held:
@@ -181,7 +181,7 @@ class CampaignFolder:
         """Keep other commands from it in a block.
 
         Raises:
-            BadRunFolder: one is at work on it.
+            InvalidRunFolder: one is at work on it.
         """
         return folder_held(self.path, "another command carries this campaign out")
 

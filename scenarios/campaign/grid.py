@@ -20,7 +20,7 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
     Where nothing is given, there is one point, which sets nothing.
 
     Raises:
-        BadParameter: with every fault of the given texts.
+        InvalidParameter: with every fault of the given texts.
     """
     known = {v.name: v for v in experiment.parameters()}
     texts, faults = texts_by_name(experiment, given, "name=v1,v2,... or name=START:STOP:N")
@@ -42,7 +42,7 @@ def set_parameters(
     """Return the parameters that are the same at all points, in the order in which they are given.
 
     Raises:
-        BadParameter: one is unknown, given twice, varied, or given several values.
+        InvalidParameter: one is unknown, given twice, varied, or given several values.
     """
     fixed, faults = texts_by_name(experiment, given)
     both = [name for name in fixed if any(name in point for point in varied)]

@@ -47,7 +47,7 @@ def local_cluster(workers: int | None) -> Generator[ClusterPool, None, None]:
     They hear of no Ctrl-C, end with this process, however it ends, and listen on the loopback interface alone.
 
     Raises:
-        BadCrew: they cannot be started.
+        PoolError: they cannot be started.
     """
     with _quiet(), config.set({**_SETTINGS, **_STILL}), contextlib.ExitStack() as opened:
         try:
@@ -77,7 +77,7 @@ def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
     """Use the workers of a cluster that the user runs; the address is one that `scheduler_address` has returned.
 
     Raises:
-        BadCrew: no scheduler answers there any more, or it has no workers.
+        PoolError: no scheduler answers there any more, or it has no workers.
     """
     with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
         try:
@@ -95,7 +95,7 @@ def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
 
 @contextlib.contextmanager
 def _quiet() -> Generator[None, None, None]:
-    """Keep what Dask tells of itself from the terminal: what matters is told by `BadCrew` and in answers."""
+    """Keep what Dask tells of itself from the terminal: what matters is told by `PoolError` and in answers."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     before = [logger.level for logger in loggers]
     with warnings.catch_warnings():

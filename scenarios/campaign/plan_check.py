@@ -51,8 +51,8 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
     """Return the plan with each value in the one text that all plans of the same values have.
 
     Raises:
-        BadCall: there is no such scenario.
-        BadParameter: it has too many runs or none, values do not fit the scenario, or do not fit each other.
+        UsageError: there is no such scenario.
+        InvalidParameter: it has too many runs or none, values do not fit the scenario, or do not fit each other.
     """
     experiment = find_scenario(plan.scenario)
     _check_size(plan)
@@ -80,7 +80,7 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
     """Return the FMU of each unit: that of the plan, or the catalog's.
 
     Raises:
-        BadCall: the plan has one for a unit that the scenario does not have, or the catalog's cannot be built.
+        UsageError: the plan has one for a unit that the scenario does not have, or the catalog's cannot be built.
     """
     experiment = find_scenario(plan.scenario)
     others = replacement_fmus(experiment, [f"{name}={file}" for name, file in plan.units.items()])

@@ -35,7 +35,7 @@ class PoolConfig:
         """Find out whether a scheduler is where the call says.
 
         Raises:
-            BadCrew: the address is malformed, or no scheduler answers there.
+            PoolError: the address is malformed, or no scheduler answers there.
         """
         if self.scheduler is not None:
             _ = self._address
@@ -44,7 +44,7 @@ class PoolConfig:
         """Return the workers; entering starts them.
 
         Raises:
-            BadCrew: here or on entering, if they cannot be started or used.
+            PoolError: here or on entering, if they cannot be started or used.
         """
         from handover.scenarios.campaign.local_cluster import connect_cluster, local_cluster
 
@@ -59,10 +59,10 @@ class PoolConfig:
 
 
 class LazyPool:
-    """Starts a crew when it is checked, or with its first order if it was not: a campaign may seem to need none.
+    """Starts a worker pool when it is checked, or with its first order if it was not: a campaign may seem to need none.
 
     Args:
-        start: gives the crew.
+        start: gives the worker pool.
         opened: ends it.
     """
 
@@ -73,18 +73,18 @@ class LazyPool:
         self._pool: WorkerPool | None = None
 
     def check(self, folder: Path) -> None:
-        """Start the crew and check it.
+        """Start the worker pool and check it.
 
         Raises:
-            BadCrew: it cannot be started or used. RecordNotWritten: as `Crew.check`.
+            PoolError: it cannot be started or used. RecordNotWritten: as `WorkerPool.check`.
         """
         self._pool = self._checked(folder)
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        """Let the crew carry out orders.
+        """Let the worker pool carry out orders.
 
         Raises:
-            BadCrew, RecordNotWritten: as `check`, if that was not called. CrewLost: it has gone.
+            PoolError, RecordNotWritten: as `check`, if that was not called. ClusterLost: it has gone.
         """
         pool = self._pool or self._checked(Path(jobs[0].runs))
         return pool.run_jobs(jobs)

@@ -30,7 +30,7 @@ def run_job(job: RunJob, folder: Path) -> None:
     """Run an order into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `carry_out` and `parse_parameters`, but for a refusal of the run. BadCall: there is no such scenario.
+        As `carry_out` and `parse_parameters`, but for a refusal of the run. UsageError: there is no such scenario.
     """
     task, clock = _task(job, folder), ElapsedTime().clock()
     try:

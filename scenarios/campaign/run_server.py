@@ -1,8 +1,8 @@
 """A process that carries out one run after the other, each in a child of its own: `python -m` this module.
 
 It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads orders from
-standard input and answers on standard output, all pickled: an order is a `RunOrder` and the folder for its files while
-it runs; the answer is a `RunAnswer`. It ends with its input, and a run under way with it.
+standard input and answers on standard output, all pickled: an order is a `RunJob` and the folder for its files while
+it runs; the answer is a `JobResult`. It ends with its input, and a run under way with it.
 
 Where processes cannot be forked (Windows) it carries runs out itself: what a unit does to the process, it does to it.
 """

@@ -27,7 +27,7 @@ def probe_port(address: str, host: str, port: int) -> None:
         port: its number there.
 
     Raises:
-        BadCrew: nothing is there, or it says nothing.
+        PoolError: nothing is there, or it says nothing.
     """
     try:
         with socket.create_connection((host, port), timeout=_CONNECT_TIMEOUT) as connection:
@@ -49,7 +49,7 @@ def scheduler_address(text: str) -> str:
     """Return the whole address of a scheduler that has answered.
 
     Raises:
-        BadCrew: the address is malformed, nothing is there, or no scheduler is.
+        PoolError: the address is malformed, nothing is there, or no scheduler is.
     """
     address, host, port = _parts(text)
     if address.startswith("tcp:"):

@@ -40,7 +40,7 @@ class CampaignTable:
         """Read a campaign's table, given by its file or by the campaign's folder.
 
         Raises:
-            BadRunFolder: there is none, or it is damaged.
+            InvalidRunFolder: there is none, or it is damaged.
         """
         file = path / "runs.parquet" if path.is_dir() else path
         try:

@@ -198,7 +198,7 @@ def rebuild_table(folder: CampaignFolder) -> None:
     written to, or if `campaign.json` is damaged.
 
     Raises:
-        BadRunFolder: there is no `campaign.json`, or it cannot be read.
+        InvalidRunFolder: there is no `campaign.json`, or it cannot be read.
         RecordNotWritten: there is no room.
     """
     plan = _plan_of(folder.read())

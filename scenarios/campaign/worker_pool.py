@@ -61,7 +61,7 @@ class WorkerPool(Protocol):
             folder: an existing one, into which runs are to be written.
 
         Raises:
-            BadCrew: some do not. RecordNotWritten: nothing can be written there, as on a full disk.
+            PoolError: some do not. RecordNotWritten: nothing can be written there, as on a full disk.
         """
         ...
 
@@ -72,7 +72,7 @@ class WorkerPool(Protocol):
         before its end, runs under way are ended and leave nothing.
 
         Raises:
-            CrewLost: all of them have gone for good.
+            ClusterLost: all of them have gone for good.
         """
         ...
 

@@ -72,7 +72,7 @@ def _verdict(results: CampaignResults) -> Markup:
     entries += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
     sentence = "; ".join(entries) + "."
     if ended < planned:
-        begun = Markup("<b>{} of {} runs so far</b>; the same call goes on.").format(ended, planned)
+        begun = Markup("<b>{} of {} runs so far</b>; run the same command again to resume.").format(ended, planned)
         return Markup("<p class='verdict'>{} {}</p>").format(begun, sentence[0].upper() + sentence[1:])
     kind = " bad" if failed or lost else ""
     number = "1 run" if planned == 1 else f"{planned} runs"
@@ -124,7 +124,7 @@ def read_results(folder: CampaignFolder) -> CampaignResults:
     """Read a campaign's plan and its table.
 
     Raises:
-        BadRunFolder: it is not the folder of a campaign, or one of the files is damaged.
+        InvalidRunFolder: it is not the folder of a campaign, or one of the files is damaged.
     """
     content = folder.read()
     faults = [f"{n!r} is {content.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(content.get(n), form)]
@@ -145,7 +145,7 @@ def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
     """Read what became of a paper's claims; none if the campaign is of none, or not that far.
 
     Raises:
-        BadRunFolder: the file is damaged.
+        InvalidRunFolder: the file is damaged.
     """
     file = folder.path / "claims.json"
     if not file.exists():
@@ -165,7 +165,7 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
         file: where the page goes; by default `report.html` in the folder, beside which the runs' pages are linked.
 
     Raises:
-        BadRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
+        InvalidRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
         RecordNotWritten: there is no room.
     """
     with tempfile.TemporaryDirectory(prefix="handover-") as figures:
@@ -181,7 +181,7 @@ def write_campaign_report(folder: CampaignFolder, file: Path | None = None, pape
         paper: what the runs say of the paper, if that is known already.
 
     Raises:
-        BadRunFolder, RecordNotWritten: as `write_campaign_page`.
+        InvalidRunFolder, RecordNotWritten: as `write_campaign_page`.
     """
     results = read_results(folder)
     claims, tables = (read_claims(folder), None) if paper is None else (paper.claims, paper.tables)

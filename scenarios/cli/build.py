@@ -35,7 +35,7 @@ def load_user_block(path: str, step: str | None) -> Entry:
     Its step is that which is given, a number or a fraction of seconds, else the block's period, else 0.01 s.
 
     Raises:
-        BadCall: there is no such class, its module does not load, it is no block, or the step is none.
+        UsageError: there is no such class, its module does not load, it is no block, or the step is none.
     """
     here = str(Path.cwd())
     if here not in sys.path:

@@ -214,7 +214,7 @@ def workforce_of(workers: int | None, scheduler: str | None) -> PoolConfig:
     """Return workers of this machine, or those of a scheduler.
 
     Raises:
-        BadCall: both are given.
+        UsageError: both are given.
     """
     if workers is not None and scheduler is not None:
         raise UsageError("--workers and --scheduler: a scheduler has workers of its own; one of both is right")
@@ -227,7 +227,7 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: PoolConfig, fin
     Interrupted, the command ends here, with the status that says so.
 
     Raises:
-        BadCall, RunNotWritten, WorkersLost: with what was wrong, in a line.
+        UsageError, RunNotWritten, WorkersLost: with what was wrong, in a line.
     """
     progress = CampaignProgress(sys.stderr)
     folder = None
@@ -279,7 +279,7 @@ def _run(
         if progress.counts is None:
             raise
         stopped = WorkersLost if isinstance(e, ClusterLost) else RunNotWritten
-        raise stopped(f"{e}; {format_progress(progress.counts)}; the same call goes on") from e
+        raise stopped(f"{e}; {format_progress(progress.counts)}; run the same command again to resume") from e
 
 
 @contextlib.contextmanager
@@ -298,7 +298,9 @@ def _started(workers: PoolConfig, interruption: CampaignInterruption) -> Generat
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:
     if folder is None or progress.counts is None:
         kept = folder is not None and folder.is_there
-        click.echo(f"Aborted! The same call goes on with {folder.path}" if folder and kept else "Aborted!", err=True)
+        click.echo(
+            f"Aborted! Run the same command again to resume {folder.path}" if folder and kept else "Aborted!", err=True
+        )
         sys.exit(ABORTED)
-    click.echo(f"{format_progress(progress.counts)} in {folder.path}; the same call goes on", err=True)
+    click.echo(f"{format_progress(progress.counts)} in {folder.path}; run the same command again to resume", err=True)
     sys.exit(INTERRUPTED)

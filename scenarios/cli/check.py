@@ -29,7 +29,7 @@ its environment then, as in other tools: see there.
 Exit status
   0  no faults; there may be notes and warnings
   1  faults were found
-  2  bad call: a FILE is not there or cannot be read
+  2  usage error: a FILE is not there or cannot be read
 """
 
 

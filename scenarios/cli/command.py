@@ -32,8 +32,8 @@ Exchange
 \b
 Exit status
   0    the task succeeded; of a campaign: all runs ended
-  1    the run ended, but the task failed; of a campaign: interrupted, the same call goes on
-  2    bad call or bad input; nothing was written
+  1    the run ended, but the task failed; of a campaign: interrupted, run the same command again to resume
+  2    usage error or invalid input; nothing was written
   3    a unit failed, a run was killed or lost, or the disk is full; what was recorded until then is kept
   130  aborted with Ctrl-C: before the run, or by a second one during it
 

@@ -1,4 +1,4 @@
-"""Tells what the process of a run died of, when what it left is completed."""
+"""Tells how the process of a run crashed, when what it left is completed."""
 
 import sys
 
@@ -15,7 +15,7 @@ _BY_SIGNAL = 128  # what shells add to a signal's number
 
 
 def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
-    """Complete what a run has left, tell what it died of, and return the exit status that says so.
+    """Complete what a run has left, tell how it crashed, and return the exit status that says so.
 
     For the arguments see `Death`.
     """

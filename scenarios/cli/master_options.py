@@ -105,7 +105,7 @@ _OPTIONS = (
     _step_option(
         "--repeat-discarded",
         is_flag=True,
-        help="Let all units go back and take a step shorter that one of them discards, as with --adaptive anyway.",
+        help="Roll all units back and take a shorter step where one of them discards it, as with --adaptive anyway.",
     ),
 )
 _CONTROL_FIELDS: Mapping[str, str] = {
@@ -128,7 +128,7 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options as those of `MasterOptions`; `given` has their values by name, and no others.
 
     Raises:
-        BadCall: options of the control of the step are given without it. BadOptions: they contradict each other.
+        UsageError: options of the control of the step are given without it. InvalidOptions: they contradict each other.
     """
     limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] not in (None, ())}
     if given["adaptive"] is None and limits:

@@ -33,13 +33,13 @@ by. Rules were laid down before the runs. Intervals are at 95 %: Clopper and Pea
 and distances.
 
 The folder is that of a campaign, as of `handover sweep`, with claims.json, and figures for papers in figures/. However
-it was ended, the same call goes on and repeats nothing that is done.
+it was ended, run the same command again to resume; nothing that is done is repeated.
 
 \b
 Exit status
   0    it ran, whatever the verdicts
-  1    interrupted with Ctrl-C; the same call goes on
-  2    bad call or bad input; nothing was written
+  1    interrupted with Ctrl-C; run the same command again to resume
+  2    usage error or invalid input; nothing was written
   3    a unit failed in a run, a run was lost, or the disk is full; what is done is kept
   130  aborted with Ctrl-C: before the first run, or by a second one
 """

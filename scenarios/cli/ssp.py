@@ -26,7 +26,7 @@ def reject_for_ssp(**given: Any) -> None:
     """Refuse options that are for scenarios.
 
     Raises:
-        BadCall: one of them is given.
+        UsageError: one of them is given.
     """
     used = [name for name, value in given.items() if value]
     if used:

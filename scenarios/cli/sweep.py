@@ -35,9 +35,10 @@ Examples
 The folder of a campaign has a folder for each run in runs/, and runs.parquet with a row for each: parameters, seed,
 success, metrics. The table is written as results come.
 
-However a campaign was ended, the same call goes on and repeats nothing that is done. A run in which a unit fails is a
-row with its reason; a run that was lost, as with its machine, is tried again by the next call. A larger --repeat adds
-runs. Without --out, the call goes on with its newest campaign in campaigns/ that is not complete, or begins one.
+However a campaign was ended, run the same command again to resume; nothing that is done is repeated. A run in which a
+unit fails is a row with its reason; a run that was lost, as with its machine, is tried again by the next call. A larger
+--repeat adds runs. Without --out, the call goes on with its newest campaign in campaigns/ that is not complete, or
+begins one.
 
 A run's seed follows from --seed, its point and its repetition.
 
@@ -46,8 +47,8 @@ Progress goes to standard error: a bar on a terminal, else a line every half min
 \b
 Exit status
   0    every run has ended, whether or not its task succeeded
-  1    interrupted with Ctrl-C; the same call goes on
-  2    bad call or bad input; nothing was written
+  1    interrupted with Ctrl-C; run the same command again to resume
+  2    usage error or invalid input; nothing was written
   3    a unit failed in a run, a run was lost, or the disk is full; what is done is kept
   130  aborted with Ctrl-C: before the first run, or by a second one
 """

@@ -39,14 +39,14 @@ class RunNotWritten(click.ClickException):
 
 
 class WorkersLost(click.ClickException):
-    """A campaign whose workers have gone; what has ended is kept, and the same call goes on."""
+    """A campaign whose workers have gone; what has ended is kept; run the same command again to resume."""
 
     exit_code = UNIT_FAILED
 
 
 @contextmanager
 def one_line_errors() -> Generator[None, None, None]:
-    """Tell what a user's input, or the lack of a compiler, leads to as BadCall, without a traceback.
+    """Tell what a user's input, or the lack of a compiler, leads to as UsageError, without a traceback.
 
     A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten,
     a cluster that has gone as WorkersLost.

@@ -30,7 +30,7 @@ def complete_signals(folder: RunFolder) -> int:
     """Complete the record of a run that a process has left, as far as it goes; return its rows, 0 if there is none.
 
     Raises:
-        BadRunFolder: the run still goes on, or the record cannot be completed. RecordNotWritten: the disk is full.
+        InvalidRunFolder: the run still goes on, or the record cannot be completed. RecordNotWritten: the disk is full.
     """
     try:
         return complete_record(folder.signals)
@@ -50,8 +50,8 @@ class InterruptedRun:
     """A run's folder, whose record is completed as far as it goes; nothing else is changed.
 
     Raises:
-        BadRunFolder: it is not the folder of a run, or of one that goes on, or has ended, or is of other versions than
-            are installed. BadCheckpoint: it has no checkpoint that can be used.
+        InvalidRunFolder: it is not the folder of a run, or of one that goes on, or has ended, or is of other versions
+            than are installed. InvalidCheckpoint: it has no checkpoint that can be used.
     """
 
     def __init__(self, folder: RunFolder) -> None:
@@ -70,7 +70,7 @@ class InterruptedRun:
         """Return what the run was to do; `opened` closes what that opens.
 
         Raises:
-            BadRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
+            InvalidRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
         """
         value = self._description
         try:

@@ -32,7 +32,7 @@ def unpack(path: Path) -> Resumption:
     """Read a run's checkpoint. Python objects are unpickled: it must be from someone whom one trusts.
 
     Raises:
-        BadCheckpoint: there is none, or it cannot be used.
+        InvalidCheckpoint: there is none, or it cannot be used.
     """
     checkpoint = read_checkpoint(path)
     try:

@@ -36,7 +36,8 @@ def run_task(
     """Run a scenario to its end, its failure or its interruption and write its folder; or go on with a run.
 
     Raises:
-        WiringError, ScheduleError, InvalidFmu, UnitRefused, StateNotSaved, BadRunFolder: before anything was written.
+        WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder: before anything
+            was written.
         UnitHung: a unit does not return as it is loaded or initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
         RecordNotWritten: there is no room for what it leaves; what was recorded stays.

@@ -15,7 +15,7 @@ def find_scenario(name: str) -> type[Experiment[Any]]:
     """Return the scenario of a name.
 
     Raises:
-        BadCall: there is none; with the nearest names.
+        UsageError: there is none; with the nearest names.
     """
     if name not in SCENARIOS:
         if name in UNITS:
@@ -28,7 +28,7 @@ def replacement_fmus(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     """Return the files in `NAME=FILE` texts, by the units whose place they take.
 
     Raises:
-        BadCall: a text is of another form, or names no unit of the scenario.
+        UsageError: a text is of another form, or names no unit of the scenario.
     """
     found: dict[str, Path] = {}
     for text in given:
@@ -49,7 +49,7 @@ def select_fmus(
     """Return the FMU of each unit of a scenario: one of the others, or what `built` makes of the catalog's unit.
 
     Raises:
-        BadCall: the folder of built units cannot be used.
+        UsageError: the folder of built units cannot be used.
     """
     try:
         return {name: others.get(name) or built(unit) for name, unit in experiment.units.items()}

@@ -88,7 +88,7 @@ def open_experiment(
     """Open an SSP as an experiment; `opened` closes it.
 
     Raises:
-        InvalidSsp: see `SspFile`. BadCall: neither the file nor the call says when it ends.
+        InvalidSsp: see `SspFile`. UsageError: neither the file nor the call says when it ends.
     """
     ssp = opened.enter_context(SspFile(path, step))
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))

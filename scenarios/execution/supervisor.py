@@ -122,7 +122,7 @@ def _pass_on(child: int) -> None:
 
 
 def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
-    """End as the child did; where it was not done, tell what it died of."""
+    """End as the child did; where it was not done, tell how it crashed."""
     if end.signal is not None and end.signal in ORDERS:
         signal.signal(end.signal, signal.SIG_DFL)
         os.kill(os.getpid(), end.signal)

@@ -25,7 +25,7 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     Numbers are in SI units; arrays are numbers between commas; enumerations are given by name.
 
     Raises:
-        BadParameter: with every fault of the given texts.
+        InvalidParameter: with every fault of the given texts.
     """
     known = {v.name: v for v in experiment.parameters()}
     texts, faults = texts_by_name(experiment, given)
@@ -69,7 +69,7 @@ def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) ->
     """Return the scenario's parameters as `run.json` keeps them.
 
     Raises:
-        BadParameter: it keeps some that the scenario does not have, or values that they cannot take.
+        InvalidParameter: it keeps some that the scenario does not have, or values that they cannot take.
     """
     return parse_parameters(experiment, [f"{name}={_as_text(value)}" for name, value in kept.items()])
 

@@ -74,7 +74,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         """Wire robot, thrusters, controllers and person.
 
         Raises:
-            BadParameter: the handover place is out of the person's reach.
+            InvalidParameter: the handover place is out of the person's reach.
         """
         p = parameters
         _check_reach(p.p_WG_handover)

@@ -80,7 +80,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
         """Wire scene and controller.
 
         Raises:
-            BadParameter: the shortest shift of a perturbed object is longer than the longest.
+            InvalidParameter: the shortest shift of a perturbed object is longer than the longest.
         """
         if parameters.shift_least > parameters.shift_most:
             shift_min, shift_max = parameters.shift_least, parameters.shift_most

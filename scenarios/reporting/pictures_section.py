@@ -39,7 +39,7 @@ def pictures_section(folder: RunFolder) -> Section | None:
     """Return the pictures in a run's folder, those of one moment beside each other; None where there are none.
 
     Raises:
-        BadRunFolder: they are damaged.
+        InvalidRunFolder: they are damaged.
     """
     pictures = read_picture_files(folder.pictures)
     if not pictures:

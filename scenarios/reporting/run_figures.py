@@ -33,7 +33,7 @@ def draw_run(folder: RunFolder) -> Sequence[Figure]:
     """Draw a run's figures into `figures/`, in place of those of the same names, all or none.
 
     Raises:
-        BadRunFolder: it is not the folder of a run, it is damaged, or it has nothing that can be drawn.
+        InvalidRunFolder: it is not the folder of a run, it is damaged, or it has nothing that can be drawn.
         RecordNotWritten: they cannot be written.
     """
     facts, record = RunFacts.read(folder), record_of(folder)

@@ -96,7 +96,7 @@ def master_section(facts: RunFacts) -> Section | None:
     """Return how the units were coupled, and which units of measure were converted.
 
     Raises:
-        BadRunFolder: what the folder tells of it is damaged.
+        InvalidRunFolder: what the folder tells of it is damaged.
     """
     try:
         rows = master_rows(facts.summary) if "master" in facts.summary else []
@@ -172,7 +172,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
         file: where the page goes; by default `report.html` in the folder.
 
     Raises:
-        BadRunFolder: it is not the folder of a run, or it is damaged; nothing is written.
+        InvalidRunFolder: it is not the folder of a run, or it is damaged; nothing is written.
         RecordNotWritten: the page cannot be written.
     """
     facts = RunFacts.read(folder)

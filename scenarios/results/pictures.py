@@ -40,7 +40,7 @@ def read_picture_files(folder: Path) -> list[CameraPicture]:
     """Return the pictures in a folder, in their order; none where there is no folder of the kind.
 
     Raises:
-        BadRunFolder: it is damaged.
+        InvalidRunFolder: it is damaged.
     """
     listed = folder / "pictures.json"
     if not listed.is_file():

@@ -40,7 +40,7 @@ class RunFacts:
         """Read and check both files.
 
         Raises:
-            BadRunFolder: it is not the folder of a run, or one of the files is damaged.
+            InvalidRunFolder: it is not the folder of a run, or one of the files is damaged.
         """
         run, summary = folder.read_run(), folder.read_summary()
         _check(folder, "run.json", run, RunData)
@@ -95,7 +95,7 @@ def record_of(folder: RunFolder) -> Record | None:
     """Return a run's record; None where there is none, or one of less than two rows, which shows nothing over time.
 
     Raises:
-        BadRunFolder: it is damaged.
+        InvalidRunFolder: it is damaged.
     """
     if not folder.signals.exists():
         return None

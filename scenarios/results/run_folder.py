@@ -30,7 +30,7 @@ def check_place(path: Path) -> None:
     """Check that files can be written to a folder, which need not exist yet.
 
     Raises:
-        BadRunFolder: they cannot.
+        InvalidRunFolder: they cannot.
     """
     existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
     if not existing.is_dir():
@@ -45,7 +45,7 @@ class RunFolder:
     While it goes on there are the files of a `Recorder`, and `checkpoint.zip` if it was asked for.
 
     Raises:
-        BadRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
+        InvalidRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -98,7 +98,7 @@ class RunFolder:
         """Make the folder.
 
         Raises:
-            BadRunFolder: it cannot be made.
+            InvalidRunFolder: it cannot be made.
         """
         try:
             self.figures.mkdir(parents=True)
@@ -121,7 +121,7 @@ class RunFolder:
         """Keep other processes that call this from the folder that a run has left.
 
         Raises:
-            BadRunFolder: another process holds it, or it is not there.
+            InvalidRunFolder: another process holds it, or it is not there.
         """
         with folder_held(self.path, "the run still goes on"):
             yield
@@ -138,7 +138,7 @@ class RunFolder:
         """Add facts to `run.json`.
 
         Raises:
-            BadRunFolder: there is none.
+            InvalidRunFolder: there is none.
         """
         _write_json(self.path / "run.json", {**self.read_run(), **facts})
 
@@ -146,7 +146,7 @@ class RunFolder:
         """Return what `write_run` wrote.
 
         Raises:
-            BadRunFolder: there is nothing of the kind.
+            InvalidRunFolder: there is nothing of the kind.
         """
         return read_object(self.path / "run.json", "it is not the folder of a run: it has no run.json")
 
@@ -154,7 +154,7 @@ class RunFolder:
         """Return what `write_summary` wrote; nothing if the run has not come so far.
 
         Raises:
-            BadRunFolder: it is damaged.
+            InvalidRunFolder: it is damaged.
         """
         file = self.path / "summary.json"
         return read_object(file, "") if file.exists() else {}
@@ -164,7 +164,7 @@ def read_object(file: Path, missing: str) -> dict[str, Any]:
     """Return the JSON object in a file of a folder.
 
     Raises:
-        BadRunFolder: it is damaged, or cannot be read, which is told as `missing`.
+        InvalidRunFolder: it is damaged, or cannot be read, which is told as `missing`.
     """
     try:
         content = json.loads(file.read_bytes())
@@ -182,7 +182,7 @@ def folder_held(path: Path, by_another: str) -> Generator[None, None, None]:
     """Keep other processes that call this from a folder.
 
     Raises:
-        BadRunFolder: another process holds it, which is told as `by_another`, or it is not there.
+        InvalidRunFolder: another process holds it, which is told as `by_another`, or it is not there.
     """
     with contextlib.ExitStack() as held:
         try:

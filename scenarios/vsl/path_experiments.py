@@ -58,7 +58,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         """Wire planner, kinematics and arm.
 
         Raises:
-            BadParameter: an end of the path is below the ground, or is given for a path that does not have it.
+            InvalidParameter: an end of the path is below the ground, or is given for a path that does not have it.
         """
         p = parameters
         if faults := p.path_faults():

@@ -31,7 +31,7 @@ _MIN_VARIATION = 1e-9
 
 _MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
 
-Generated; when the sources of the arm (plants/vsl_*.py) have changed, run again
+Generated; when the sources of the arm (plants/vsl/) have changed, run again
 
     handover vsl-train --points {points} --seed {seed}{elbow} --out controllers/vsl/default_model.py
 """
@@ -85,7 +85,7 @@ class VslTraining:
         """Return the model, whose provenance has no date or path, and its errors.
 
         Raises:
-            InvalidFmu, UnitRefused, UnitFailure: the arm cannot be used, does not start, or fails.
+            InvalidFmu, InitializationError, UnitFailure: the arm cannot be used, does not start, or fails.
             NothingToLearn: fewer than half of the tips are within reach, or an input is the same at all points.
         """
         d = describe_arm(self.fmu)

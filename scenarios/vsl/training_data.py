@@ -120,7 +120,7 @@ def collect(
         progress: told the simulated time and its end, s.
 
     Raises:
-        InvalidFmu, UnitRefused, UnitFailure: the arm does not load, start or step.
+        InvalidFmu, InitializationError, UnitFailure: the arm does not load, start or step.
     """
     rows: list[tuple[Floats, Floats]] = []
     with tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True) as folder:

@@ -54,7 +54,7 @@ def jobs(runs: Path, count: int) -> Sequence[RunJob]:
 
 
 def carried_out(pool: WorkerPool, given: Sequence[RunJob]) -> tuple[float, float]:
-    """Return the seconds that a crew takes for orders, and the runs' own seconds in all."""
+    """Return the seconds that a worker pool takes for orders, and the runs' own seconds in all."""
     began = time.perf_counter()
     results = list(pool.run_jobs(given))
     took = time.perf_counter() - began

@@ -1,4 +1,4 @@
-"""A crew in this process, for tests of what is around crews: it carries runs out one after another."""
+"""A worker pool in this process, for tests of what is around worker pools: it carries runs out one after another."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""Which units iterate: those in a circle, that are due together; the others step once in the order of the data."""
+"""Which units iterate: those in a cycle, that are due together; the others step once in the order of the data."""
 
 import json
 from collections import Counter
@@ -62,7 +62,7 @@ def test_units_off_the_circle_step_once(steps: Counter[str]):
 def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorithm: Algorithm):
     with pytest.raises(ScheduleError) as caught:
         Master(TwoMasses(k_c=1.0).system(PERIOD, canGetAndSetFMUState=False), MasterOptions(algorithm=algorithm))
-    assert "a, b (connected in a circle: a, b)" in str(caught.value)
+    assert "a, b (connected in a cycle: a, b)" in str(caught.value)
     s = System()
     first, second = (s.add(n, native_fmu("gain", canGetAndSetFMUState=False)) for n in ("first", "second"))
     s.connect(first.y.y, second.u.u)

@@ -61,7 +61,7 @@ def test_a_unit_that_cannot_go_back_is_told():
 
 def test_others_that_cannot_go_back_are_told():
     s = system(2, "fixed_step")
-    with pytest.raises(StepDiscarded, match="the others would have to go back too, and other cannot save its state"):
+    with pytest.raises(StepDiscarded, match="the others would have to roll back too, and other cannot save its state"):
         seen(s, Fraction(1, 2), "short.y", options=REPEATING)
 
 

@@ -97,7 +97,7 @@ def test_a_unit_that_cannot_go_back_stays_at_the_end_of_its_step(caplog: pytest.
     rows = seen(s, Fraction(2), "ball.h", "fixed.y")
     assert len(rows) == 25
     output = [r.message for r in caplog.records if "fixed" in r.message]
-    assert output == ["fixed cannot go back to the event at t = 0.451523641 s: it stays at the end of its step"]
+    assert output == ["fixed cannot roll back to the event at t = 0.451523641 s: it stays at the end of its step"]
     assert rows[2.0][1] == pytest.approx(2.0)
 
 

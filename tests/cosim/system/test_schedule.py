@@ -77,7 +77,7 @@ def test_presumed_feedthrough_orders_but_does_not_make_a_loop(caplog: pytest.Log
     loop = system(presumed="a b")
     connect(loop, "a>b", "b>a")
     assert [x.unit for x in Schedule(loop).slots] == ["a", "b"]
-    assert "a does not declare what acts at once" in caplog.text
+    assert "a does not declare its direct feedthrough" in caplog.text
 
 
 def test_units_that_do_not_depend_on_each_other_keep_their_order():
@@ -91,7 +91,7 @@ def test_units_of_a_loop_stand_together_between_those_before_and_after():
     schedule = Schedule(s)
     assert schedule.loops
     assert [g.units for g in schedule.groups] == [("b", "c", "a"), ("after",), ("plant",)]
-    assert schedule.groups[0].message.startswith("b.y -> c.u, c.u acts on c.y at once, c.y -> a.u")
+    assert schedule.groups[0].message.startswith("b.y -> c.u, c.u feeds through to c.y, c.y -> a.u")
     assert [str(c.source) for c in schedule.groups[0].back(["a", "b", "c"])] == ["a.y"]
     assert [str(c.source) for c in schedule.groups[0].back(["a", "b"])] == ["a.y"]
     assert schedule.groups[0].back(["b", "c"]) == []

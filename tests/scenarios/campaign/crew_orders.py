@@ -1,4 +1,4 @@
-"""Orders for crews: short grasps, also with units that fail."""
+"""Orders for worker pools: short grasps, also with units that fail."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""A program that gives orders to a crew, embedded or at an address, and prints the answers: to be killed meanwhile."""
+"""A program that gives jobs to a worker pool, local or at an address, and prints the results; tests kill it meanwhile."""
 
 import pickle
 import sys

@@ -1,4 +1,4 @@
-"""A campaign on a disk that is full ends in one line, with status 3, and the same call goes on."""
+"""A campaign on a disk that is full ends in one line, with status 3; run the same command again to resume."""
 
 import contextlib
 import errno
@@ -35,7 +35,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def sweep(monkeypatch: pytest.MonkeyPatch, pool: WorkerPool) -> Result:
-    """Return how the command ended with a crew."""
+    """Return how the command ended with a worker pool."""
 
     @contextlib.contextmanager
     def given(_workers: int | None) -> Generator[WorkerPool, None, None]:
@@ -74,7 +74,10 @@ def test_a_run_without_room_stops_it_and_what_is_done_stays(monkeypatch: pytest.
             raise AssertionError("no other run is waited for")
 
     result = sweep(monkeypatch, Full())
-    text = "c/runs/000_r0001 cannot be written: Disk quota exceeded; 1 of 3 runs done; the same call goes on"
+    text = (
+        "c/runs/000_r0001 cannot be written: Disk quota exceeded; 1 of 3 runs done; "
+        "run the same command again to resume"
+    )
     assert (result.exit_code, result.output) == (3, f"{BEGINNING}Error: {text}\n")
     assert CampaignTable.read(Path("c")).column("run").tolist() == ["000_r0000"]
 
@@ -116,6 +119,6 @@ def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):
     assert (result.exit_code, result.output) == (
         3,
         f"{BEGINNING}Error: c/runs.parquet cannot be written: No space left on device; "
-        "1 of 3 runs done; the same call goes on\n",
+        "1 of 3 runs done; run the same command again to resume\n",
     )
     assert sorted(p.name for p in Path("c").iterdir()) == ["campaign.json", "fmus", "runs"]

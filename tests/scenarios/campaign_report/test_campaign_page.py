@@ -33,7 +33,7 @@ def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTa
 
 def test_a_campaign_that_is_not_complete_says_how_far_it_is(tmp_path: Path):
     html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=30), table_of(POINTS, repetitions=2))
-    assert "<b>4 of 60 runs so far</b>; the same call goes on." in html
+    assert "<b>4 of 60 runs so far</b>; run the same command again to resume." in html
     assert "In 2 of 4 runs done the task succeeded." in html
 
 

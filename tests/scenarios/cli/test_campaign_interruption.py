@@ -75,5 +75,8 @@ def test_as_the_workers_are_ended(tmp_path: Path, capsys: pytest.CaptureFixture[
         call_campaign(PLAN, tmp_path / "c", workers, lambda _folder, _table: None)
     assert caught.value.code == 1
     assert workers.ended
-    assert capsys.readouterr().err.splitlines()[-1] == f"2 of 2 runs done in {tmp_path / 'c'}; the same call goes on"
+    assert (
+        capsys.readouterr().err.splitlines()[-1]
+        == f"2 of 2 runs done in {tmp_path / 'c'}; run the same command again to resume"
+    )
     assert CampaignTable.read(tmp_path / "c").column("run").tolist() == NAMES

@@ -97,7 +97,10 @@ def test_a_campaign_ends_with_a_row_for_each_point(monkeypatch: pytest.MonkeyPat
 @pytest.mark.slow
 def test_an_interrupted_call_goes_on(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(KeyboardInterrupt(), at=1))
-    assert (result.exit_code, result.output) == (1, f"{BEGINNING}1 of 2 runs done in c; the same call goes on\n")
+    assert (result.exit_code, result.output) == (
+        1,
+        f"{BEGINNING}1 of 2 runs done in c; run the same command again to resume\n",
+    )
     assert len(CampaignTable.read(Path("c"))) == 1
     result, begun = sweep(monkeypatch, *CALL)
     assert (result.exit_code, begun) == (0, [ALL[1]])
@@ -132,7 +135,7 @@ def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyP
     (folder,) = Path("campaigns").iterdir()
     assert result.output.splitlines() == [
         f"2 runs of ir_grasp on 2 workers into {folder}",
-        f"1 of 2 runs done in {folder}; the same call goes on",
+        f"1 of 2 runs done in {folder}; run the same command again to resume",
     ]
     result, begun = sweep(monkeypatch, *call)
     assert (result.exit_code, begun) == (0, [ALL[1]])
@@ -153,7 +156,7 @@ def test_workers_that_go_stop_it(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=raising(ClusterLost("the scheduler is gone"), at=1))
     assert (result.exit_code, result.output) == (
         3,
-        f"{BEGINNING}Error: the scheduler is gone; 1 of 2 runs done; the same call goes on\n",
+        f"{BEGINNING}Error: the scheduler is gone; 1 of 2 runs done; run the same command again to resume\n",
     )
 
 

@@ -37,7 +37,7 @@ def test_the_first_signal_ends_it_in_order(number: signal.Signals, tmp_path: Pat
         wait_for_end_of(family)
     done = len(runs_in(out))
     assert (status, value) == (1, "")
-    assert errors.splitlines()[-1] == f"{done} of 200 runs done in {out}; the same call goes on"
+    assert errors.splitlines()[-1] == f"{done} of 200 runs done in {out}; run the same command again to resume"
     assert 3 <= len(CampaignTable.read(out)) == done < 200
     assert list((out / "runs").glob(".*")) == []
     assert list(out.glob("*.part")) == []
