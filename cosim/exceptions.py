@@ -1,4 +1,8 @@
-"""What can be wrong with a file, a wiring or a running unit; each carries its data and says what would be right."""
+"""Exceptions of the engine: invalid files, wiring and options, and failing units. Each carries its data.
+
+Messages say what is wrong, where, and what would be valid. The helpers at the top make them one-line and readable: they
+suggest the nearest valid name and find in a unit's log the line that gives the cause.
+"""
 
 import difflib
 import re
@@ -8,7 +12,7 @@ from typing import Any, ClassVar
 
 _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
-_PLACE = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
+_LOCATION = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
@@ -31,12 +35,14 @@ def log_lines(log: Iterable[str]) -> list[str]:
 def last_line(log: Iterable[str]) -> str:
     """Return the last line of a log that says anything, without status and call: of a traceback, what was raised.
 
-    What is wrong with a source is told with its file and line, which a traceback tells before.
+    A syntax error gets its file and line appended, which a traceback gives in an earlier line.
     """
     lines = [line.strip() for line in log_lines(log)]
-    text = _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
-    places = [place for line in lines if (place := _PLACE.search(line))]
-    return f"{text} ({places[-1][1]}, line {places[-1][2]})" if places and _SYNTAX.match(text) else text
+    message = _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
+    locations = [location for line in lines if (location := _LOCATION.search(line))]
+    if not locations or not _SYNTAX.match(message):
+        return message
+    return f"{message} ({locations[-1][1]}, line {locations[-1][2]})"
 
 
 def one_line(e: BaseException) -> str:
@@ -45,13 +51,13 @@ def one_line(e: BaseException) -> str:
 
 
 class CosimError(Exception):
-    """Base of what this engine raises on purpose."""
+    """Base class of the engine's own exceptions."""
 
 
 class InvalidFmu(CosimError):
     """A file that should be an FMU is missing, damaged, or not one that this machine can run.
 
-    `log` holds what its unit logged, if it came so far.
+    `log` holds what its unit logged, if it got as far as being instantiated.
     """
 
     def __init__(self, path: Path, fault: str, log: Sequence[str] = ()) -> None:
@@ -60,7 +66,7 @@ class InvalidFmu(CosimError):
 
 
 class InvalidSsp(CosimError):
-    """A file is not an SSP that can be used; `faults` lists all that is wrong with it, and where."""
+    """A file is not a valid SSP; `faults` lists everything that is wrong with it, and where."""
 
     def __init__(self, path: Path, faults: Sequence[str]) -> None:
         super().__init__(f"{path}: {'; '.join(faults)}")
@@ -68,7 +74,7 @@ class InvalidSsp(CosimError):
 
 
 class NotExportable(CosimError):
-    """A system cannot be written as an SSP; `faults` lists what stands against it."""
+    """A system cannot be written as an SSP; `faults` lists everything in it that an SSP cannot express."""
 
     def __init__(self, faults: Sequence[str]) -> None:
         super().__init__(f"it cannot be written as an SSP: {'; '.join(faults)}")
@@ -93,19 +99,19 @@ class WiringError(CosimError):
 
 
 class ScheduleError(CosimError):
-    """Units cannot be put in an order, or their steps do not fit one grid."""
+    """Units cannot be ordered, or their steps have no common communication step."""
 
 
 class UnitFailure(CosimError):
-    """A unit's call failed; `failures` has a type for each way in which it can.
+    """A unit's call failed; `handover.cosim.fmu.failures` has a subclass for each way in which it can.
 
     Attributes:
-        kind: which way, as one word for programs that read a run's summary.
-        verdict: what came of it, in words that a run's reason begins with.
-        unit: the instance.
+        kind: the way in which it failed, as one word for programs that read a run's summary.
+        verdict: the outcome, in the words with which a run's reason begins.
+        unit: the instance's name.
         call: the FMI call, or what else was done with the unit.
         t: simulated time in seconds.
-        status: what the call answered, or what happened instead.
+        status: what the call returned, or what happened instead.
         log: the unit's last log lines.
     """
 
@@ -114,8 +120,8 @@ class UnitFailure(CosimError):
 
     def __init__(self, unit: str, call: str, t: float, status: str, log: Sequence[str] = ()) -> None:
         self.unit, self.call, self.t, self.status, self.log = unit, call, t, status, tuple(log)
-        text = "".join(f"\n  {line}" for line in log)
-        super().__init__(self.headline + text)
+        log_text = "".join(f"\n  {line}" for line in log)
+        super().__init__(self.headline + log_text)
 
     @property
     def headline(self) -> str:
@@ -138,7 +144,7 @@ class UnitFailure(CosimError):
         return f"{self.unit}: {self.call} at t = {self.t:.6g} s: {self.message}"
 
     def as_data(self) -> dict[str, Any]:
-        """Return the failure as JSON can hold it."""
+        """Return the failure as a JSON object."""
         return {
             "kind": self.kind,
             "instance": self.unit,
@@ -158,7 +164,7 @@ class InitializationError(CosimError):
 
 
 class InvalidOptions(CosimError, ValueError):
-    """Options of a master that make no sense; `faults` lists everything that is wrong with them."""
+    """Options of a master that are invalid or contradict each other; `faults` lists everything that is wrong."""
 
     def __init__(self, faults: Sequence[str]) -> None:
         super().__init__("; ".join(faults))

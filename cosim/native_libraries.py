@@ -40,14 +40,14 @@ FLAGS = (
     "-Wno-unused-parameter",
 )
 STAMP = "sources.sha256"
-"""The name of the file beside compiled libraries that tells what they were made from."""
+"""The name of the file beside compiled libraries that holds the fingerprint of the sources they were made from."""
 
 Compiler = Callable[["list[str]"], "subprocess.CompletedProcess[str]"]
-"""Takes a C compiler's arguments; returns what it said in `stdout`."""
+"""Takes a C compiler's arguments; its messages are in the returned `stdout`."""
 
 
 class CompilationError(RuntimeError):
-    """Libraries could not be compiled for a platform; the message holds what the compiler said."""
+    """Libraries could not be compiled for a platform; the message holds the compiler's output."""
 
     def __init__(self, what: str, target: str, output: str) -> None:
         super().__init__(f"the {what} does not compile for {target}:\n{output}")
@@ -56,12 +56,13 @@ class CompilationError(RuntimeError):
 
 @dataclass(frozen=True)
 class NativeLibraries:
-    """Libraries that are made of the C sources in one folder and lie below it, or else in the cache.
+    """Libraries compiled from the C sources in one folder; they are kept below it, or else in the cache.
 
     Attributes:
-        what: what they are, for messages; `cache_name` is its folder in the cache.
+        what: what they are, for messages.
+        cache_name: their folder in the cache.
         folder: where the sources are.
-        sources: by library's name, the files that it is made of.
+        sources: by library's name, the source files that it is compiled from.
         compiler: compiles a library.
     """
 
@@ -72,29 +73,29 @@ class NativeLibraries:
     compiler: Compiler
 
     def library(self, target: str, name: str) -> Path:
-        """Return where a library for a platform lies, or, if it is not compiled, where it should."""
+        """Return the path of a library for a platform or, if it is not compiled, the path that it will have."""
         return (self._current(target) or self.folder / "bin" / target) / f"{name}{TARGETS[target][1]}"
 
     def is_current(self, target: str) -> bool:
-        """Tell whether the libraries for a platform are there and made from the sources as they are."""
+        """Return whether the libraries for a platform exist and were compiled from the present sources."""
         return target in TARGETS and self._current(target) is not None
 
     def compile(self, target: str) -> None:
-        """Compile what is missing or older than its sources; safe when two processes do it at once.
+        """Compile what is missing or older than its sources; safe when two processes do it at the same time.
 
-        The libraries go beside the sources, as in a checkout, or into the cache where that place cannot be written.
+        The libraries go beside the sources, as in a checkout, or into the cache where that folder is not writable.
 
         Raises:
-            CompilationError: the compiler refused or is missing, or there is no place for the libraries.
+            CompilationError: the compiler failed or is missing, or neither folder is writable.
         """
         if self.is_current(target):
             return
         fingerprint = self._fingerprint()
-        folder = self._place_to_write(target, fingerprint)
+        folder = self._writable_folder(target, fingerprint)
         names = {name: f"{name}{TARGETS[target][1]}" for name in self.sources}
         with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as scratch:
-            for name, own in self.sources.items():
-                files = [str(self.folder / source) for source in own]
+            for name, sources in self.sources.items():
+                files = [str(self.folder / source) for source in sources]
                 done = self.compiler([*_arguments(target, Path(scratch) / names[name]), *files])
                 if done.returncode:
                     raise CompilationError(self.what, target, done.stdout)
@@ -104,26 +105,26 @@ class NativeLibraries:
 
     def _current(self, target: str) -> "Path | None":
         fingerprint = self._fingerprint()
-        for place in self._places(target, fingerprint):
-            made = all((place / f"{name}{TARGETS[target][1]}").is_file() for name in self.sources)
-            if made and (place / STAMP).is_file() and (place / STAMP).read_text() == fingerprint:
-                return place
+        for folder in self._folders(target, fingerprint):
+            is_complete = all((folder / f"{name}{TARGETS[target][1]}").is_file() for name in self.sources)
+            if is_complete and (folder / STAMP).is_file() and (folder / STAMP).read_text() == fingerprint:
+                return folder
         return None
 
-    def _places(self, target: str, fingerprint: str) -> "tuple[Path, Path]":
+    def _folders(self, target: str, fingerprint: str) -> "tuple[Path, Path]":
         """Return a platform's folder beside the sources, and in the cache, where versions of sources are kept apart."""
         return self.folder / "bin" / target, cache_folder() / self.cache_name / fingerprint[:16] / target
 
-    def _place_to_write(self, target: str, fingerprint: str) -> Path:
-        why = ""
-        for place in self._places(target, fingerprint):
+    def _writable_folder(self, target: str, fingerprint: str) -> Path:
+        reasons = ""
+        for folder in self._folders(target, fingerprint):
             try:
-                place.mkdir(parents=True, exist_ok=True)
-                with tempfile.TemporaryFile(dir=place):
-                    return place
+                folder.mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=folder):
+                    return folder
             except OSError as e:
-                why += f"{e}\n"
-        raise CompilationError(self.what, target, f"{why}HANDOVER_CACHE must be a folder that can be written")
+                reasons += f"{e}\n"
+        raise CompilationError(self.what, target, f"{reasons}HANDOVER_CACHE must be a writable folder")
 
     def _fingerprint(self) -> str:
         digest = hashlib.sha256(repr((sorted(self.sources.items()), TARGETS, FLAGS)).encode())
@@ -141,15 +142,15 @@ def host_platform() -> str:
 
 
 def has_compiler() -> bool:
-    """Tell whether this Python has ziglang."""
+    """Return whether the ziglang package is installed for this Python."""
     return importlib.util.find_spec("ziglang") is not None
 
 
 def cache_folder() -> Path:
     """Return the folder HANDOVER_CACHE, or the one for this project in the user's cache folder."""
-    given = os.environ.get("HANDOVER_CACHE")
+    configured = os.environ.get("HANDOVER_CACHE")
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
-    return Path(given) if given else Path(base) / "handover-cosim"
+    return Path(configured) if configured else Path(base) / "handover-cosim"
 
 
 def zig_cc(arguments: "list[str]") -> "subprocess.CompletedProcess[str]":
@@ -166,10 +167,11 @@ def zig_cc(arguments: "list[str]") -> "subprocess.CompletedProcess[str]":
     )
 
 
-def _arguments(target: str, made: Path) -> "list[str]":
-    arguments = [*FLAGS, "-target", TARGETS[target][0], "-o", str(made)]
+def _arguments(target: str, library: Path) -> "list[str]":
+    arguments = [*FLAGS, "-target", TARGETS[target][0], "-o", str(library)]
     if target.endswith("linux"):
         arguments.append("-ldl")
     if target.endswith("darwin"):
-        arguments.append(f"-Wl,-install_name,@rpath/{made.name}")  # else the scratch folder's name stays in it
+        # the default name would be the path in the scratch folder, which differs with every compilation
+        arguments.append(f"-Wl,-install_name,@rpath/{library.name}")
     return arguments

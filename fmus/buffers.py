@@ -1,4 +1,4 @@
-"""An instance's variables in memory: what the C runtime copies to and from, and the block's side sees as arrays."""
+"""An instance's variables in memory: buffers that the C runtime reads and writes, and Python sees as arrays."""
 
 import struct
 import sys
@@ -17,7 +17,7 @@ ALIGNMENT = 64
 
 
 class InvalidState(ValueError):
-    """A saved state does not fit the unit that is to take it."""
+    """A saved state is of another unit than the one that is to restore it."""
 
     is_refusal = True
 
@@ -29,29 +29,29 @@ class Buffers:
     """The buffers of one instance. Their addresses never change.
 
     Attributes:
-        floats: the time, the step size, then the real variables.
+        floats: the time and the step size in s, then the real variables in SI units.
         integers: int64 whatever the width; a UInt64 variable's 64 bits are read as int64.
         strings: UTF-8, as the host sees them.
         binaries: a buffer of fixed capacity for each of `binary_variables`, of which `sizes` are in use.
 
     Args:
         layout: of the variables.
-        memory: gives memory of that many bytes for all but the strings, such as some that is shared with a host in
-            another process; its content does not matter. Without it the memory is this process's own.
+        memory: allocates that many bytes for all variables but the strings, for instance shared with a host in another
+            process; they need not be zero. Without it the memory is this process's own.
     """
 
     def __init__(self, layout: Layout, memory: Callable[[int], Any] | None = None) -> None:
         self.layout = layout
         self.strings = [b""] * layout.lengths[Buffer.STRING]
         self.binary_variables = [slot.variable for slot in layout.in_buffer(Buffer.BINARY)]
-        wanted: list[tuple[int, type[np.generic]]] = [
+        sizes: list[tuple[int, type[np.generic]]] = [
             (layout.lengths[Buffer.FLOAT64], np.float64),
             (layout.lengths[Buffer.INT64], np.int64),
             (layout.lengths[Buffer.BOOLEAN], np.bool_),
             (len(self.binary_variables), np.uint64),
             *((capacity(v), np.uint8) for v in self.binary_variables),
         ]
-        arrays = _arrays(wanted, memory or (lambda size: np.zeros(size, dtype=np.uint8)))
+        arrays = _arrays(sizes, memory or (lambda size: np.zeros(size, dtype=np.uint8)))
         self.floats, self.integers, self.booleans, self.sizes, *self.binaries = arrays
         self.reset()
 
@@ -98,10 +98,10 @@ class Buffers:
         return join([self.floats.tobytes(), self.integers.tobytes(), self.booleans.tobytes(), *used, *self.strings])
 
     def from_bytes(self, state: bytes) -> None:
-        """Take over what `to_bytes` gave.
+        """Restore what `to_bytes` returned.
 
         Raises:
-            InvalidState: the bytes are of other variables; nothing has changed.
+            InvalidState: the bytes are of other variables; nothing is changed.
         """
         parts = split(state)
         if len(parts) != 3 + len(self.binaries) + len(self.strings):
@@ -120,25 +120,25 @@ class Buffers:
         self.strings[:] = strings
 
 
-def _arrays(wanted: list[tuple[int, type[np.generic]]], memory: Callable[[int], Any]) -> list[NDArray[Any]]:
-    """Return arrays of these lengths and types, one behind the other in one piece of memory."""
+def _arrays(sizes: list[tuple[int, type[np.generic]]], memory: Callable[[int], Any]) -> list[NDArray[Any]]:
+    """Return arrays of these lengths and types, one after another in one piece of memory."""
     places = [0]
-    for n, kind in wanted:
+    for n, kind in sizes:
         end = places[-1] + n * np.dtype(kind).itemsize
         places.append(end + -end % ALIGNMENT)
     whole = np.frombuffer(memory(places[-1]), dtype=np.uint8)
     return [
-        whole[at : at + n * np.dtype(kind).itemsize].view(kind) for at, (n, kind) in zip(places, wanted, strict=False)
+        whole[at : at + n * np.dtype(kind).itemsize].view(kind) for at, (n, kind) in zip(places, sizes, strict=False)
     ]
 
 
 def to_signed(number: int) -> int:
-    """Return the int64 of the same 64 bits as a uint64 that has no place in one; others as they are."""
+    """Return the int64 with the same 64 bits as a uint64 that is too large for one; smaller numbers as they are."""
     return number - 2**64 if number >= 2**63 else number
 
 
 def to_unsigned(number: int) -> int:
-    """Return the uint64 that `to_signed` was given."""
+    """Return the uint64 from which `to_signed` made a number."""
     return number + 2**64 if number < 0 else number
 
 
@@ -147,12 +147,12 @@ def _fits(variable: Variable, part: bytes) -> bool:
 
 
 def join(parts: Iterable[bytes]) -> bytes:
-    """Return parts as one, each led by its length."""
+    """Return the parts as one, each preceded by its length (uint64, native byte order)."""
     return b"".join(struct.pack("=Q", len(part)) + part for part in parts)
 
 
 def split(whole: bytes) -> list[bytes]:
-    """Return the parts that `join` put together.
+    """Return the parts from which `join` made the whole.
 
     Raises:
         InvalidState: the bytes were not made by `join`.

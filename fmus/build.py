@@ -1,4 +1,8 @@
-"""Turns a unit into a file: an FMU of FMI 2.0 or FMI 3.0 for co-simulation."""
+"""Builds FMUs of FMI 2.0 or 3.0 for co-simulation, from the catalog's units or from any block class.
+
+An FMU holds the model description, a documentation page, the runtime in C, and the Python sources that its block needs.
+Its token and the prefix of its modules are hashes of its content, so that the same content gives the same file.
+"""
 
 import hashlib
 import importlib.util
@@ -27,7 +31,7 @@ from handover.fmus.sources import Carried, closure
 
 
 class UnknownVersion(ValueError):
-    """Only FMI 2 and 3 are offered."""
+    """FMUs are built for FMI 2 and FMI 3 only."""
 
     def __init__(self, fmi: object) -> None:
         super().__init__(f"FMI version {fmi!r}; there are 2 (FMI 2.0) and 3 (FMI 3.0)")
@@ -35,30 +39,31 @@ class UnknownVersion(ValueError):
 
 
 class InvalidName(ValueError):
-    """An FMU's name is also that of its library and, in FMI, an identifier of C."""
+    """An FMU's name is no identifier in C, which FMI requires as it is also the name of its library."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(f"an FMU cannot be named {name!r}: letters of ASCII, digits and underscores make a name")
+        super().__init__(f"an FMU cannot be named {name!r}: a name consists of ASCII letters, digits and underscores")
         self.name = name
 
 
 class InvalidStep(ValueError):
-    """A communication step is a positive number of seconds, and exact."""
+    """A communication step is not a positive, exact number of seconds."""
 
     def __init__(self, step: object) -> None:
-        wanted = "an int or a Fraction above 0, such as Fraction(1, 100), is right"
-        super().__init__(f"a communication step of {step!r} s; {wanted}")
+        super().__init__(
+            f"invalid communication step of {step!r} s: give an int or a Fraction above 0, such as Fraction(1, 100)"
+        )
         self.step = step
 
 
 def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
-    """Return a catalog unit's FMU, built unless the cache has the one of the present sources; see `build`.
+    """Return a catalog unit's FMU; it is built if the cache has none of the present sources, see `build`.
 
-    The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit at once.
+    The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit concurrently.
 
     Raises:
         UnknownUnit: no unit has this name.
-        NoFmi2Form: an FMI 2 is wanted of a unit with binary ports.
+        NoFmi2Form: FMI 2 was asked for, but the unit has binary ports.
     """
     entry = find_unit(name)
     carried = closure(entry.block)
@@ -84,9 +89,9 @@ def build_block(
         block: path of the class, such as `package.module:Class`; its module must be importable.
         fmi: 2 or 3.
         out_dir: folder of the FMU.
-        step: communication step that suits it, in seconds.
-        summary: one line of description; without it the first line of the class's docstring.
-        name: the FMU's name, without it the class's.
+        step: default communication step, in seconds.
+        summary: one line of description; by default the first line of the class's docstring.
+        name: the FMU's name; by default the class's.
         scalar: see `build`.
         platforms: see `build`.
 
@@ -106,17 +111,17 @@ def build(
         entry: the unit.
         fmi: 2 or 3.
         out_dir: folder of the FMU.
-        scalar: make every entry of an array a variable of its own in FMI 3, for hosts that know no arrays; FMI 2 has
-            no arrays, there this changes nothing.
-        platforms: those to have the runtime for, such as `x86_64-windows`, or `host`, or `all`; without it all that
-            it is compiled for.
+        scalar: make every entry of an array a variable of its own in FMI 3, for hosts without arrays; without effect
+            in FMI 2, which has no arrays.
+        platforms: for which the FMU has the runtime, such as `x86_64-windows`, or `host`, or `all`; by default all for
+            which it is compiled.
 
     Raises:
         UnknownBlock: the entry's block does not exist.
-        UnknownVersion, InvalidName, InvalidStep: the standard's version, the name or the step is not one that can be.
-        DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are not in order.
-        NoFmi2Form: FMI 2 and the block has binary ports, or integers that start beyond 32 bits.
-        UnknownPlatform: the runtime is not made for a platform.
+        UnknownVersion, InvalidName, InvalidStep: the standard's version, the name or the step is invalid.
+        DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are invalid.
+        NoFmi2Form: FMI 2 was asked for, but the block has binary ports, or integers that start beyond 32 bits.
+        UnknownPlatform: the runtime is not available for a platform.
         NotCompiled: there is no runtime and no compiler.
     """
     form = _form(fmi, scalar=scalar)
@@ -181,7 +186,7 @@ def _model(entry: Entry, form: Form, token: str) -> Model:
 
 
 def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
-    """Return what changes whenever the FMU would: sources, packages, interpreter, runtime, and the builder itself."""
+    """Return a hash of all that an FMU depends on: sources, packages, interpreter, runtime, and the builder itself."""
     builder = sorted(Path(__file__).parent.glob("*.*"))
     parts = {path: file.read_bytes() for path, file in carried.files.items()}
     parts |= {f"builder/{file.name}": file.read_bytes() for file in builder if file.is_file()}
@@ -192,7 +197,7 @@ def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
 
 
 def _version_mark(module: str) -> bytes:
-    """Return what changes when a package is replaced; asking for its version takes too long."""
+    """Return a package's file and its modification time: looking up its version would take longer."""
     spec = importlib.util.find_spec(module)
     origin = Path(spec.origin) if spec and spec.origin else None
     return f"{origin} {origin.stat().st_mtime_ns if origin and origin.is_file() else ''}".encode()

@@ -1,6 +1,6 @@
-"""The units: robots, sensors and controllers that are offered as FMUs.
+"""The catalog: robots, sensors and controllers that are available as FMUs.
 
-Blocks are named, not imported: looking at the catalog loads no physics engine.
+It names the blocks' classes and does not import them, so that reading it loads no physics engine.
 """
 
 from collections.abc import Mapping
@@ -32,15 +32,15 @@ class UnknownBlock(LookupError):
 
 @dataclass(frozen=True)
 class Entry:
-    """A unit.
+    """A unit of the catalog.
 
     Attributes:
         name: the FMU's name; letters, digits and underscores.
         block: path of the block's class.
-        step: the communication step that suits it, in seconds.
+        step: its default communication step, in seconds.
         summary: one line for lists.
-        deferred: modules that the block's constructor loads, not its module: they take long, and its ports are read
-            without them. What is to make many instances loads them beforehand.
+        deferred: modules that the block's constructor imports, as they take long to load and its ports can be read
+            without them. A process that makes many instances imports them beforehand.
     """
 
     name: str
@@ -171,7 +171,7 @@ def import_block(path: str) -> type[Any]:
         UnknownBlock: the module has no such class.
     """
     module, _, name = path.partition(":")
-    found = getattr(import_module(module), name, None)
-    if not isinstance(found, type):
+    block = getattr(import_module(module), name, None)
+    if not isinstance(block, type):
         raise UnknownBlock(path, f"module {module!r} has no class {name!r}")
-    return found
+    return block

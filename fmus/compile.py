@@ -1,8 +1,8 @@
 """Compiles the FMI runtime: `fmus/runtime/*.c` to one shared library per standard and platform, with `zig cc`.
 
 Used by `setup.py` while the package is built, where nothing but the standard library and ziglang is installed, and by
-`handover.fmus.binaries` for what is missing or out of date. `python -m handover.fmus.compile [PLATFORM...]` compiles by
-hand.
+`handover.fmus.binaries` for libraries that are missing or out of date. `python -m handover.fmus.compile [PLATFORM...]`
+compiles from the command line.
 """
 
 import argparse
@@ -60,7 +60,7 @@ SOURCES = {
 
 
 class UnknownPlatform(ValueError):
-    """A platform's name is none of those that the runtime is made for."""
+    """A name is of no platform for which the runtime can be compiled."""
 
     def __init__(self, unknown: "list[str]") -> None:
         super().__init__(
@@ -70,10 +70,10 @@ class UnknownPlatform(ValueError):
 
 
 def named_platforms(names: "Iterable[str]") -> "tuple[str, ...]":
-    """Return the platforms of names, each once: FMI 3.0's, `host` or `all`, singly or several with commas between.
+    """Return the platforms that names stand for, each once: FMI 3.0's names, `host` or `all`, also several with commas.
 
     Raises:
-        UnknownPlatform: a name is none of them, or this machine is.
+        UnknownPlatform: a name is none of them, or `host` is a machine of another kind.
     """
     given = [part.strip() for name in names for part in name.split(",")]
     wanted = {host_platform() if name == "host" else name for name in given if name}
@@ -95,25 +95,25 @@ def wanted_platforms() -> "tuple[str, ...]":
 
 
 def library(target: str, fmi: int) -> Path:
-    """Return where the runtime for a platform and a standard lies, or, if it is not compiled, where it should."""
+    """Return the path of the runtime for a platform and a version of FMI, whether it is compiled or not."""
     return _libraries().library(target, f"fmi{fmi}")
 
 
 def compile_runtime(targets: "Iterable[str] | None" = None) -> None:
-    """Compile whatever is missing or older than its sources; safe when two processes do it at once.
+    """Compile whatever is missing or older than its sources; safe when two processes do it concurrently.
 
     The libraries go beside the sources, as in a checkout, or into the cache where that place cannot be written.
 
     Raises:
         UnknownPlatform: a platform is not known.
-        CompilationError: the compiler refused or is missing, or there is no place for the libraries.
+        CompilationError: the compiler failed or is missing, or the libraries cannot be written anywhere.
     """
     for target in wanted_platforms() if targets is None else named_platforms(targets):
         _libraries().compile(target)
 
 
 def is_current(target: str) -> bool:
-    """Tell whether the compiled runtime for a platform is there and made from the sources as they are."""
+    """Return whether the compiled runtime for a platform is there and made from the sources as they are."""
     return _libraries().is_current(target)
 
 

@@ -1,8 +1,7 @@
-"""documentation/index.html of an FMU: what the block declares and what its docstring says, as a page.
+"""documentation/index.html of an FMU: a page of the block's declarations and docstring, with the papers that it cites.
 
-A docstring's parts as the documentation page has them: paragraphs, lists, formulas, and the errors that it names.
-
-The papers that blocks are after, by the key with which docstrings cite them.
+A docstring's parts are paragraphs, lists (lines that begin with `- `), formulas (indented lines) and the errors of its
+section `Raises:`. `[key]` cites a paper. The page's template is unit.html.
 """
 
 import enum
@@ -20,73 +19,6 @@ from handover.fmus.layout import SAMPLE_CLOCK, Form
 from handover.fmus.model_description import Model, enumerations
 from handover.fmus.sources import Package
 
-_RAISES = "Raises:"
-_NAMES = re.compile(r"(\w+(?:, \w+)*): (.*)", re.DOTALL)
-
-
-@dataclass(frozen=True)
-class Part:
-    """A part of a docstring.
-
-    Attributes:
-        kind: `paragraph`, `list` or `formula`.
-        texts: one text, or one for each item of a list; a formula's keeps its lines.
-    """
-
-    kind: str
-    texts: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Docstring:
-    """What a docstring says, and the errors it names: their names with when they are raised."""
-
-    parts: tuple[Part, ...]
-    errors: tuple[tuple[str, str], ...]
-
-
-def parse(text: str) -> Docstring:
-    """Return a docstring's parts; `text` is without the indentation that it has in its source."""
-    parts: list[Part] = []
-    errors: list[tuple[str, str]] = []
-    for chunk in re.split(r"\n[ \t]*\n", text.strip("\n")):
-        lines = chunk.splitlines()
-        if lines and lines[0].strip() == _RAISES:
-            errors += [_error(item) for item in _markdown_items(lines[1:], r"    \S")]
-        elif chunk.startswith("    "):
-            parts.append(Part("formula", ("\n".join(line.removeprefix("    ") for line in lines),)))
-        elif chunk.strip():
-            parts += _markdown_prose(lines)
-    return Docstring(tuple(parts), tuple(errors))
-
-
-def _markdown_prose(lines: list[str]) -> list[Part]:
-    """Return a paragraph, a list, or a list that follows upon a line of text."""
-    first = next((i for i, line in enumerate(lines) if line.startswith("- ")), len(lines))
-    paragraph = [Part("paragraph", (_joined(lines[:first]),))] if first else []
-    items = tuple(item.removeprefix("- ") for item in _markdown_items(lines[first:], "- "))
-    return [*paragraph, Part("list", items)] if items else paragraph
-
-
-def _markdown_items(lines: list[str], begin: str) -> list[str]:
-    """Return the items of lines, of which each first one matches `begin`, as one line each."""
-    found: list[list[str]] = []
-    for line in lines:
-        if re.match(begin, line) or not found:
-            found.append([])
-        found[-1].append(line)
-    return [_joined(item) for item in found]
-
-
-def _joined(lines: list[str]) -> str:
-    return " ".join(line.strip() for line in lines)
-
-
-def _error(text: str) -> tuple[str, str]:
-    match = _NAMES.fullmatch(text)
-    return (match[1], match[2]) if match else ("", text)
-
-
 PAPERS = {
     "Fernandes2020": 'Fernandes, "Object handover between humans and robots in microgravity", MSc thesis, '
     "Instituto Superior Tecnico, Lisbon 2020",
@@ -96,6 +28,7 @@ PAPERS = {
     "Vervloet2025": 'Vervloet, "A first step to visual servoing based autonomous handovers with soft robots", '
     "TU Delft 2025",
 }
+"""The papers that blocks follow, by the keys with which docstrings cite them."""
 
 
 def cited(text: str) -> dict[str, str]:
@@ -113,7 +46,7 @@ _GROUPS = (("Parameters", Causality.PARAMETER), ("Inputs", Causality.INPUT), ("O
 
 @dataclass(frozen=True)
 class Row:
-    """A variable's line in a table."""
+    """A variable's row in a table."""
 
     name: str
     kind: str
@@ -126,7 +59,7 @@ class Row:
 
 def page(model: Model, packages: list[Package]) -> bytes:
     """Return the page as HTML."""
-    import jinja2  # long to load, and most builds are found in the cache
+    import jinja2  # slow to load, and most FMUs are found in the cache
 
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
@@ -160,13 +93,13 @@ def page(model: Model, packages: list[Package]) -> bytes:
 
 
 def seconds(time: Fraction) -> str:
-    """Return a time as a decimal number where that is exact, as in `0.016 s`, else as a fraction, as in `1/30 s`."""
+    """Return a time as a decimal number if that is exact, as in `0.016 s`, else as a fraction, as in `1/30 s`."""
     decimal = repr(float(time))
     return f"{decimal if Fraction(decimal) == time else time} s"
 
 
 def _prose(text: str) -> Markup:
-    """Return a docstring's text with what is between backquotes as code."""
+    """Return a docstring's text as HTML, with what is between backquotes as code."""
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
@@ -183,7 +116,7 @@ def _row(v: Variable, form: Form) -> Row:
 
 
 def _type(v: Variable, form: Form) -> str:
-    """Return a type as the model description has it, of enumerations its name, of pictures their MIME type besides."""
+    """Return a type as in the model description; an enumeration's name; for a picture its MIME type as well."""
     if v.enumeration:
         return v.enumeration.__name__
     if form is Form.FMI2 or v.width is None:
@@ -209,3 +142,70 @@ def _range(v: Variable) -> str:
 
 def _items(enumeration: Iterable[enum.IntEnum]) -> str:
     return ", ".join(f"{int(item)} {item.name}" for item in enumeration)
+
+
+_RAISES = "Raises:"
+_NAMES = re.compile(r"(\w+(?:, \w+)*): (.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a docstring.
+
+    Attributes:
+        kind: `paragraph`, `list` or `formula`.
+        texts: one text, or one for each item of a list; a formula's keeps its lines.
+    """
+
+    kind: str
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Docstring:
+    """A docstring's parts, and the errors of its section `Raises:` as pairs of names and of when they are raised."""
+
+    parts: tuple[Part, ...]
+    errors: tuple[tuple[str, str], ...]
+
+
+def parse(text: str) -> Docstring:
+    """Return a docstring's parts; `text` must be without the indentation of its source."""
+    parts: list[Part] = []
+    errors: list[tuple[str, str]] = []
+    for chunk in re.split(r"\n[ \t]*\n", text.strip("\n")):
+        lines = chunk.splitlines()
+        if lines and lines[0].strip() == _RAISES:
+            errors += [_error(item) for item in _markdown_items(lines[1:], r"    \S")]
+        elif chunk.startswith("    "):
+            parts.append(Part("formula", ("\n".join(line.removeprefix("    ") for line in lines),)))
+        elif chunk.strip():
+            parts += _markdown_prose(lines)
+    return Docstring(tuple(parts), tuple(errors))
+
+
+def _markdown_prose(lines: list[str]) -> list[Part]:
+    """Return a paragraph, a list, or both if text is followed by a list."""
+    first = next((i for i, line in enumerate(lines) if line.startswith("- ")), len(lines))
+    paragraph = [Part("paragraph", (_joined(lines[:first]),))] if first else []
+    items = tuple(item.removeprefix("- ") for item in _markdown_items(lines[first:], "- "))
+    return [*paragraph, Part("list", items)] if items else paragraph
+
+
+def _markdown_items(lines: list[str], begin: str) -> list[str]:
+    """Return the items of lines, each as one line; an item begins at a line that matches `begin`."""
+    items: list[list[str]] = []
+    for line in lines:
+        if re.match(begin, line) or not items:
+            items.append([])
+        items[-1].append(line)
+    return [_joined(item) for item in items]
+
+
+def _joined(lines: list[str]) -> str:
+    return " ".join(line.strip() for line in lines)
+
+
+def _error(text: str) -> tuple[str, str]:
+    match = _NAMES.fullmatch(text)
+    return (match[1], match[2]) if match else ("", text)

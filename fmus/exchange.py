@@ -1,8 +1,7 @@
-"""Between an instance's buffers and its block: inputs in, outputs out.
+"""Moves values between an instance's buffers and its block: inputs, outputs and directional derivatives.
 
-What a step costs beyond the block's own work is spent here, so all that can be prepared is prepared once.
-
-Between the C runtime's vectors of derivatives and a block's `directional_derivative`.
+Most of what a step costs beyond the block's own work is spent here, so all that can be prepared is prepared once, as a
+function.
 """
 
 import functools
@@ -42,9 +41,9 @@ class InvalidOutput(TypeError):
 
 
 def input_reader(buffers: Buffers) -> Callable[[], Any]:
-    """Return a function that fills one and the same inputs object from the buffers and returns it.
+    """Return a function that fills an inputs object, always the same one, from the buffers and returns it.
 
-    Arrays in it are read-only views. The function raises UnknownItem if an enumeration's number is none of its items.
+    Arrays in it are read-only views. The function raises UnknownItem for a number that is no item of its enumeration.
     """
     layout = buffers.layout
     inputs = layout.description.inputs_type()
@@ -72,7 +71,9 @@ def input_reader(buffers: Buffers) -> Callable[[], Any]:
 def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     """Return a function that writes a block's outputs into the buffers.
 
-    It raises InvalidOutput if an output is not of its declared type or shape, AttributeError if one is missing.
+    It raises InvalidOutput if an output is not of its declared type or shape, AttributeError if one is missing. It
+    tries the exact types first, which is fast; only if that fails it goes through the outputs one after another,
+    converts what may be converted and finds the output at fault.
     """
     layout = buffers.layout
     reals = layout.of(Causality.OUTPUT, Buffer.FLOAT64)
@@ -88,13 +89,13 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
             write_scalars(y)
             write_exact(y)
         except (struct.error, TypeError, ValueError, OverflowError):
-            write_with_care(y)
+            write_checked(y)
 
-    def write_with_care(y: Any) -> None:
+    def write_checked(y: Any) -> None:
         try:
             write_scalars(y)
         except struct.error:
-            _blame(scalars, y)
+            _raise_for_invalid_scalar(scalars, y)
         for variable, shape, view in arrays:
             value = getattr(y, variable.name)
             array: NDArray[Any] = np.asarray(value)
@@ -112,10 +113,10 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
 
 
 def _exact_writer(buffers: Buffers, slots: Sequence[Slot]) -> Callable[[Any], None]:
-    """Return a function that writes outputs of the very types that are declared.
+    """Return a function that writes outputs that have exactly the declared types.
 
-    It raises TypeError for others, which may still be some that can be taken, as an array of whole numbers is. Written
-    out, the checks take half the time of a loop over variables.
+    It raises TypeError for all others, although some of them can be converted, such as an array of integers. As
+    generated code the checks take half the time of a loop over variables.
     """
     names: dict[str, Any] = {"array": np.ndarray, "real": np.dtype(np.float64)}
     lines: list[str] = []
@@ -158,16 +159,16 @@ def _scalar_writer(buffers: Buffers, reals: Sequence[Slot], names: Sequence[str]
 
 
 def _compiled(statement: str, names: dict[str, Any]) -> Callable[[Any], None]:
-    """Return a function of x that runs a statement.
+    """Return a function of x that runs generated code.
 
-    A dozen attributes written out are set or read in a third of the time that a loop over their names takes.
+    It gets or sets a dozen attributes in a third of the time that a loop over their names takes.
     """
     exec(f"def run(x):\n    {statement}\n", names)
     run: Callable[[Any], None] = names.pop("run")  # else the function and its names would hold each other
     return run
 
 
-def _blame(scalars: Sequence[Variable], y: Any) -> None:
+def _raise_for_invalid_scalar(scalars: Sequence[Variable], y: Any) -> None:
     for variable in scalars:
         value = getattr(y, variable.name)
         try:
@@ -177,7 +178,7 @@ def _blame(scalars: Sequence[Variable], y: Any) -> None:
 
 
 def _writer(buffers: Buffers, slot: Slot) -> Callable[[Any], None]:
-    """Return what writes one output that is not real; it raises TypeError, ValueError or OverflowError."""
+    """Return a function that writes one output that is not real; it raises TypeError, ValueError or OverflowError."""
     at = slot.offset
     if slot.buffer is Buffer.INT64:
         number = functools.partial(_number, slot.variable)
@@ -222,7 +223,7 @@ def _picture_writer(buffers: Buffers, slot: Slot, raster: Raster) -> Callable[[A
 def _write_bytes(buffers: Buffers, slot: Slot, value: Any) -> None:
     _instance(value, bytes)
     if len(value) > capacity(slot.variable):
-        raise ValueError(f"{len(value)} bytes where {capacity(slot.variable)} have room")
+        raise ValueError(f"{len(value)} bytes where {capacity(slot.variable)} fit")
     buffers.binaries[slot.offset][: len(value)] = np.frombuffer(value, dtype=np.uint8)
     buffers.sizes[slot.offset] = len(value)
 
@@ -231,7 +232,7 @@ Derivative = float | NDArray[np.float64]
 
 
 class InvalidDerivative(TypeError):
-    """A block gave a derivative that is no real output's, or not of that output's shape."""
+    """A block returned a derivative of something that is no real output, or not of that output's shape."""
 
     def __init__(self, name: str, fault: str) -> None:
         super().__init__(f"directional_derivative gave {name!r}: {fault}")
@@ -241,16 +242,16 @@ class InvalidDerivative(TypeError):
 def derivative_reader(
     buffers: Buffers,
 ) -> Callable[[bytes], tuple[dict[str, Derivative], Callable[[Mapping[str, Any]], bytes]]]:
-    """Return a function that turns a seed into what a block takes and what turns the block's answer into a vector.
+    """Return a function that turns a seed into a block's du, and a function that turns the block's dy into a vector.
 
-    Seed and answer are float64, the real inputs and the real outputs as they lie in the buffer. The block gets the
-    inputs by name of which an entry is not zero. What turns its answer raises InvalidDerivative.
+    Seed and vector are float64: one entry for each entry of the real inputs and of the real outputs, in the buffer's
+    order. In du are the inputs, by name, with an entry that is not zero. The second function raises InvalidDerivative.
     """
     inputs = buffers.layout.of(Causality.INPUT, Buffer.FLOAT64)
     outputs = {s.variable.name: s for s in buffers.layout.of(Causality.OUTPUT, Buffer.FLOAT64)}
     span = buffers.layout.span(Causality.OUTPUT, Buffer.FLOAT64)
 
-    def write(dy: Mapping[str, Any]) -> bytes:
+    def to_vector(dy: Mapping[str, Any]) -> bytes:
         vector = np.zeros(span.stop - span.start)
         for name, value in dy.items():
             slot = outputs.get(name)
@@ -261,10 +262,10 @@ def derivative_reader(
             vector[slot.offset - span.start : slot.entries.stop - span.start] = np.ravel(value)
         return vector.tobytes()
 
-    def read(seed: bytes) -> tuple[dict[str, Derivative], Callable[[Mapping[str, Any]], bytes]]:
-        return _directions(inputs, np.frombuffer(seed)), write
+    def from_seed(seed: bytes) -> tuple[dict[str, Derivative], Callable[[Mapping[str, Any]], bytes]]:
+        return _directions(inputs, np.frombuffer(seed)), to_vector
 
-    return read
+    return from_seed
 
 
 def _directions(inputs: list[Slot], vector: NDArray[np.float64]) -> dict[str, Derivative]:

@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0: arrays become scalars, `p_WG[1]`, `cov_O[1,1]`, in row-major order."""
+"""modelDescription.xml of FMI 2.0: arrays become scalars, named `p_WG[1]` or `cov_O[1,1]`, in row-major order."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
@@ -17,15 +17,15 @@ from handover.fmus.model_description import (
     boolean,
     bounds,
     enumerations,
-    known_at_start,
+    initial_dependencies,
     number,
-    text,
+    to_xml,
     variability,
 )
 
 
 class NoFmi2Form(ValueError):
-    """A unit has ports for which FMI 2 has no type; `reason` says why."""
+    """A unit has ports that FMI 2 cannot represent; `reason` says why."""
 
     def __init__(self, unit: str, reason: str, ports: list[str]) -> None:
         super().__init__(f"{unit} has no FMI 2 form: {reason} ({', '.join(ports)}); use FMI 3")
@@ -68,14 +68,14 @@ def fmi2_description(model: Model) -> bytes:
     for v in model.layout.shown(Form.FMI2):
         _add_variable(variables, model, v)
     _add_structure(root, model)
-    return text(root)
+    return to_xml(root)
 
 
 def _check_form(model: Model) -> None:
     shown = model.description.variables
     binaries = [v.name for v in shown if v.kind is Kind.BINARY]
     if binaries:
-        raise NoFmi2Form(model.name, "FMI 2 knows no binary variables", binaries)
+        raise NoFmi2Form(model.name, "FMI 2 has no binary variables", binaries)
     long = [v.name for v in shown if v.kind is Kind.INTEGER and not Width.INT32.holds(v.start)]
     if long:
         raise NoFmi2Form(model.name, "FMI 2's integers have 32 bits, too few for start values", long)
@@ -106,9 +106,9 @@ def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> N
         variability="fixed" if is_parameter else variability(model, v),
         attrib={"initial": "exact"} if is_parameter else {"initial": "calculated"} if is_output else {},
     )
-    tag, facts = _type(v)
+    tag, attributes = _type(v)
     start = {} if is_output else {"start": _start(v, shown.entries.start)}
-    ET.SubElement(scalar, tag, {**facts, **start})
+    ET.SubElement(scalar, tag, {**attributes, **start})
 
 
 def _type(v: Variable) -> tuple[str, dict[str, str]]:
@@ -122,7 +122,7 @@ def _type(v: Variable) -> tuple[str, dict[str, str]]:
 
 
 def _integer_bounds(v: Variable) -> dict[str, str]:
-    """Return `min` and `max`, those of the width where none are declared; what 32 bits cannot pass is no bound."""
+    """Return `min` and `max`, those of the width if none are declared; bounds outside of 32 bits are left out."""
     limits = {} if v.width in (None, Width.INT32) else {"min": str(v.width.lowest), "max": str(v.width.highest)}
     return {name: bound for name, bound in {**limits, **bounds(v)}.items() if Width.INT32.holds(int(bound))}
 
@@ -136,7 +136,7 @@ def _start(v: Variable, i: int) -> str:
 
 
 def _add_structure(root: ET.Element, model: Model) -> None:
-    """Indices here count the scalar variables from 1."""
+    """Add outputs and initial unknowns with their dependencies, as indices that count the scalar variables from 1."""
     references = model.layout.references(Form.FMI2)
 
     def indices(names: Iterable[str]) -> list[int]:
@@ -146,10 +146,10 @@ def _add_structure(root: ET.Element, model: Model) -> None:
     outputs = ET.SubElement(structure, "Outputs")
     initial = ET.SubElement(structure, "InitialUnknowns")
     for v in model.description.outputs:
-        now = " ".join(map(str, sorted(indices(model.description.feedthrough.get(v.name, ())))))
-        first = " ".join(map(str, sorted(indices(known_at_start(model, v.name)))))
+        dependencies = " ".join(map(str, sorted(indices(model.description.feedthrough.get(v.name, ())))))
+        initial_ones = " ".join(map(str, sorted(indices(initial_dependencies(model, v.name)))))
         for index in indices([v.name]):
-            ET.SubElement(outputs, "Unknown", index=str(index), dependencies=now)
-            ET.SubElement(initial, "Unknown", index=str(index), dependencies=first)
+            ET.SubElement(outputs, "Unknown", index=str(index), dependencies=dependencies)
+            ET.SubElement(initial, "Unknown", index=str(index), dependencies=initial_ones)
     for empty in (e for e in (outputs, initial) if len(e) == 0):
         structure.remove(empty)

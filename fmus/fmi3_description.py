@@ -20,9 +20,9 @@ from handover.fmus.model_description import (
     boolean,
     bounds,
     enumerations,
-    known_at_start,
+    initial_dependencies,
     number,
-    text,
+    to_xml,
     variability,
 )
 
@@ -60,7 +60,7 @@ def fmi3_description(model: Model) -> bytes:
     if model.description.period is not None and model.layout.has_clock(model.form):
         _add_clock(variables, model.description.period)
     _add_structure(root, model)
-    return text(root)
+    return to_xml(root)
 
 
 def _add_interface(root: ET.Element, model: Model) -> None:
@@ -85,10 +85,10 @@ def _add_interface(root: ET.Element, model: Model) -> None:
 
 
 def _add_clock(variables: ET.Element, period: Fraction) -> None:
-    """Add a sampled unit's clock after all other variables; the runtime finds its value reference by that.
+    """Add a sampled unit's clock after all other variables: there the runtime expects its value reference.
 
-    No port names it in `clocks`: a clocked variable has a value only while its clock is active, so hosts without event
-    mode could not reach it, and these outputs hold between ticks.
+    No port names it in its attribute `clocks`: a clocked variable has a value only while its clock is active, so hosts
+    without event mode could not read it, although a sampled unit's outputs hold between ticks.
     """
     ET.SubElement(
         variables,
@@ -122,7 +122,7 @@ def _add_types(root: ET.Element, variables: Iterable[Variable]) -> None:
 def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> None:
     v = shown.variable
     is_parameter, is_output = v.causality is Causality.PARAMETER, v.causality is Causality.OUTPUT
-    tag, facts = _type(v)
+    tag, type_attributes = _type(v)
     attributes = {
         "name": shown.name,
         "valueReference": str(shown.reference),
@@ -132,7 +132,7 @@ def _add_variable(variables: ET.Element, model: Model, shown: HostVariable) -> N
     }
     if is_parameter or is_output:
         attributes["initial"] = "exact" if is_parameter else "calculated"
-    attributes.update(facts)
+    attributes.update(type_attributes)
     start = None if is_output else _start(shown)
     in_attribute = v.kind not in (Kind.STRING, Kind.BINARY)
     if start is not None and in_attribute:
@@ -157,7 +157,7 @@ def _type(v: Variable) -> tuple[str, dict[str, str]]:
 
 
 def _start(shown: HostVariable) -> str:
-    """Return the start value; a picture's is empty, which the runtime takes for black."""
+    """Return the start value; a picture's is empty, which means black to the runtime."""
     v = shown.variable
     if v.kind is Kind.REAL:
         return " ".join(number(np.ravel(v.start)[i]) for i in shown.entries)
@@ -176,10 +176,10 @@ def _add_structure(root: ET.Element, model: Model) -> None:
 
     structure = ET.SubElement(root, "ModelStructure")
     for v in model.description.outputs:
-        now = listed(model.description.feedthrough.get(v.name, ()))
+        dependencies = listed(model.description.feedthrough.get(v.name, ()))
         for reference in references[v.name]:
-            ET.SubElement(structure, "Output", valueReference=str(reference), dependencies=now)
+            ET.SubElement(structure, "Output", valueReference=str(reference), dependencies=dependencies)
     for v in model.description.outputs:
-        first = listed(known_at_start(model, v.name))
+        initial_ones = listed(initial_dependencies(model, v.name))
         for reference in references[v.name]:
-            ET.SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=first)
+            ET.SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=initial_ones)

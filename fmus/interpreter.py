@@ -1,8 +1,8 @@
-"""What a host that is not Python must know of an interpreter to run FMUs in it.
+"""Describes a Python interpreter for hosts that are not Python, which load it to run an FMU's block.
 
-The builder notes it in each FMU (resources/python.txt). Carried in the FMU and run as a script it tells of the
-interpreter that runs it: that is how the runtime asks the `python3` on the PATH, on Windows the `python`. Standard
-library only.
+The builder writes the description of its own interpreter into each FMU (resources/python.txt). The FMU also contains
+this file: run as a script, it prints the description of the interpreter that runs it. So the runtime queries the
+`python3` on the PATH, on Windows the `python`. Standard library only.
 """
 
 import os
@@ -13,13 +13,13 @@ import sysconfig
 def describe() -> str:
     """Return lines `name = value`: executable, library (empty if Python was built without one), version, site."""
     folders = [p for p in sys.path if os.path.basename(p) in ("site-packages", "dist-packages") and os.path.isdir(p)]
-    facts = [
+    properties = [
         ("executable", sys.executable),
         ("library", library()),
         ("version", f"{sys.version_info.major}.{sys.version_info.minor}"),
         *[("site", folder) for folder in folders],
     ]
-    return "".join(f"{name} = {value}\n" for name, value in facts)
+    return "".join(f"{name} = {value}\n" for name, value in properties)
 
 
 def library() -> str:

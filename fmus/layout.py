@@ -1,7 +1,8 @@
-"""Where a block's variables lie in an instance's buffers, and by which value reference a host finds them.
+"""Where a block's variables lie in an instance's buffers, and which value references they have.
 
-There is one buffer per kind. The real one begins with the time and the step size; then, as in every buffer, come the
-parameters, the inputs and the outputs. Scalars stand before arrays, so that all real input scalars are one slice.
+There is one buffer per kind of variable. The real one begins with the time and the step size; then, as in every buffer,
+come the parameters, the inputs and the outputs, of each the scalars before the arrays, so that all real input scalars
+are one slice.
 """
 
 import dataclasses
@@ -24,7 +25,7 @@ SAMPLE_CLOCK = "sample_clock"
 """Name of a sampled unit's clock in FMI 3; it has no place in the buffers."""
 
 BYTES_CAPACITY = 1 << 16
-"""Most bytes in a binary variable that is not a picture."""
+"""Maximum size, in bytes, of a binary variable that is not a picture."""
 
 
 class Buffer(enum.IntEnum):
@@ -48,7 +49,7 @@ BUFFER_OF = {
 
 
 class Form(enum.Enum):
-    """How an FMU shows a block's variables to its host; the values are part of files' names."""
+    """How an FMU presents a block's variables to its host; the values are part of files' names."""
 
     FMI2 = "fmi2"
     FMI3 = "fmi3"
@@ -69,9 +70,9 @@ CAUSALITIES = (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
 
 
 class DuplicateName(ValueError):
-    """A parameter, an input and an output of one block must not share a name: an FMU has one list of variables.
+    """Two of a block's parameters, inputs and outputs have the same name, but an FMU has one list of variables.
 
-    FMI 3 has the time among them, and a sampled block's clock.
+    In FMI 3 the time is one of them, and so is a sampled block's clock.
     """
 
     def __init__(self, block: str, names: list[str]) -> None:
@@ -125,8 +126,8 @@ class HostVariable:
         variable: the block's variable.
         name: `p_WG`, or an entry's `p_WG[1]`, `cov_O[1,1]`.
         reference: the value reference.
-        buffer, offset: where its first value lies.
-        entries: which of the block's variable's entries it has, in row-major order.
+        buffer, offset: place of its first value.
+        entries: indices of its values among the entries of the block's variable, in row-major order.
         shape: empty for a scalar.
     """
 
@@ -143,13 +144,13 @@ class Layout:
     """The places of all variables of a block.
 
     Raises:
-        DuplicateName: two variables share a name, or one is called `time`, or as a sampled block's clock.
+        DuplicateName: two variables share a name, or one has that of the time or of a sampled block's clock.
     """
 
     def __init__(self, description: Description) -> None:
         names = [v.name for v in description.variables]
-        taken = [TIME, *names] if description.period is None else [TIME, SAMPLE_CLOCK, *names]
-        duplicates = sorted({name for name in taken if taken.count(name) > 1})
+        fmu_names = [TIME, *names] if description.period is None else [TIME, SAMPLE_CLOCK, *names]
+        duplicates = sorted({name for name in fmu_names if fmu_names.count(name) > 1})
         if duplicates:
             raise DuplicateName(description.name, duplicates)
         self.description = description
@@ -175,33 +176,34 @@ class Layout:
         return slice(slots[0].offset, slots[-1].entries.stop) if slots else slice(0, 0)
 
     def has_clock(self, form: Form) -> bool:
-        """Tell whether there is a clock among what a host is shown.
+        """Return whether the host sees a clock.
 
-        The scalar form has none, it is for tools that know little of FMI 3: when Ecos 0.7 unloads a unit with a clock,
-        it crashes with `double free`.
+        There is none in the scalar form, which is for tools that support little of FMI 3: when Ecos 0.7 unloads a unit
+        with a clock, it crashes with `double free`.
         """
         return form is Form.FMI3 and self.description.period is not None
 
     def shown(self, form: Form) -> list[HostVariable]:
         """Return the variables as a host sees them, by value reference. FMI 3's value reference 0 is the time.
 
-        In FMI 3's scalar form integers are Int32 if what is declared of them allows it: Ecos, for which that form is
-        made, has 32 bits for each and writes beyond its memory when it reads several Int64 at once.
+        In FMI 3's scalar form integers are Int32 if their start value and range allow it: Ecos, for which that form is
+        made, has 32 bits for each and writes beyond its memory when it reads several Int64 in one call.
         """
-        made: list[HostVariable] = []
+        variables: list[HostVariable] = []
         first = 0 if form is Form.FMI2 else 1
         for name, slot in self.slots.items():
             v = _narrow(slot.variable) if form is Form.FMI3_SCALAR else slot.variable
             if form.has_arrays:
-                made.append(HostVariable(v, name, first + len(made), slot.buffer, slot.offset, range(v.size), v.shape))
+                reference = first + len(variables)
+                variables.append(HostVariable(v, name, reference, slot.buffer, slot.offset, range(v.size), v.shape))
                 continue
             for i, element in enumerate(element_names(v)):
-                reference, offset = first + len(made), slot.offset + i
-                made.append(HostVariable(v, element, reference, slot.buffer, offset, range(i, i + 1), ()))
-        return made
+                reference, offset = first + len(variables), slot.offset + i
+                variables.append(HostVariable(v, element, reference, slot.buffer, offset, range(i, i + 1), ()))
+        return variables
 
     def references(self, form: Form) -> dict[str, tuple[int, ...]]:
-        """Return the value references by the block's variables: one each, or one for each entry of an array."""
+        """Return the value references by the block's variables' names: one each, or one for each entry of an array."""
         references: dict[str, tuple[int, ...]] = {}
         for shown in self.shown(form):
             name = shown.variable.name
@@ -224,5 +226,5 @@ def element_names(variable: Variable) -> list[str]:
 
 
 def capacity(variable: Variable) -> int:
-    """Return how many bytes a binary variable's buffer has."""
+    """Return the size of a binary variable's buffer in bytes."""
     return variable.raster.size if variable.raster else BYTES_CAPACITY

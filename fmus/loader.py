@@ -1,8 +1,8 @@
-"""Starts an FMU's Python side inside a host: the first of its files that runs, and the only one not imported.
+"""Starts an FMU's Python side inside a host: the first of its Python files to run, and the only one not imported.
 
 An FMU's modules live in `sys.modules` under a prefix made of their content's hash, as in `_fmu_8d3f.plants.tendon_arm`;
-their imports are resolved by an `__import__` of their own. So the host's modules of the same names, and those of other
-FMUs or of other versions of this one, are neither seen nor touched. Standard library only.
+their imports are resolved by an `__import__` of their own. So they neither see nor change modules of the same names
+that belong to the host, to other FMUs or to other versions of this one. Standard library only.
 """
 
 import builtins
@@ -25,25 +25,25 @@ from typing import Any
 _builtin_import = builtins.__import__
 
 _PREFIX = re.compile(r"(?<![\w./\\])_fmu_\w+\.(?=\w)")
-"""The prefix before a module's name; not a part of a path."""
+"""The prefix of a module's name, but not where it is a part of a path."""
 
 
 class HostError(Exception):
-    """The host or its installation is at fault; the message says all, a traceback would only distract."""
+    """The host or its installation is at fault; logged without a traceback, which would not help."""
 
     is_refusal = True
 
 
 def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = None) -> Any:
-    """Make an instance's Python side, a `handover.fmus.slave.Slave`.
+    """Return an instance's Python side, a `handover.fmus.slave.Slave`.
 
     Args:
-        resources: the FMU's folder of that name, unpacked.
-        token: the GUID or instantiation token that the host read in the model description.
-        memory: gives the memory for that many bytes of variables; without it they lie in this process's own.
+        resources: the unpacked FMU's folder `resources`.
+        token: the GUID or instantiation token that the host read from the model description.
+        memory: allocates that many bytes for the variables; without it the memory is this process's own.
 
     Raises:
-        Refusal: the token is that of another FMU, or packages are missing.
+        HostError: the token is that of another FMU, or packages are missing.
     """
     with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
         unit = json.load(file)
@@ -59,19 +59,21 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
 
 
 def warning(resources: str) -> str:
-    """Return what the log is to say of packages that are older than those that the FMU was built with, or nothing."""
+    """Return a warning for the log if packages are older than when the FMU was built, else an empty string."""
     with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
         packages: list[dict[str, str]] = json.load(file)["packages"]
-    found = [(p["distribution"], p["version"], _installed(p["distribution"])) for p in packages]
+    versions = [(p["distribution"], p["version"], _installed(p["distribution"])) for p in packages]
     return "; ".join(
-        f"{name}: built with {built}, found {here}" for name, built, here in found if _release(here) < _release(built)
+        f"{name}: built with {built}, found {present}"
+        for name, built, present in versions
+        if _release(present) < _release(built)
     )
 
 
 def explain(error: BaseException) -> str:
-    """Return what the log says of an exception: its message if that is enough, else the traceback.
+    """Return an exception as text for the log: its message if it rejects a call, else the traceback.
 
-    Names of the FMU's modules are those that the reader knows, without the prefix under which they are kept.
+    The FMU's modules have their usual names in it, without the prefix under which they are kept.
     """
     if getattr(error, "is_refusal", False):
         return _PREFIX.sub("", str(error))
@@ -79,10 +81,12 @@ def explain(error: BaseException) -> str:
 
 
 def _require(unit: dict[str, Any], resources: str) -> None:
-    """Make sure that the packages are importable; those of the environment that built the FMU are the last resort."""
+    """Check that the packages are importable; if not, try those of the environment in which the FMU was built."""
     if not _missing(unit):
         return
-    if sys.flags.ignore_environment:  # so the runtime starts Python; an installation may rest on this variable
+    if (
+        sys.flags.ignore_environment
+    ):  # as when the runtime has started Python; an installation may depend on this variable
         sys.path += [f for f in os.environ.get("PYTHONPATH", "").split(os.pathsep) if f and f not in sys.path]
     noted = _noted(os.path.join(resources, "python.txt"))
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
@@ -122,7 +126,7 @@ def _installed(distribution: str) -> str:
 
 
 def _release(version: str) -> tuple[int, ...]:
-    """Return major and minor; a version that is not known, or not made of numbers, counts as the newest."""
+    """Return major and minor; a version that is unknown, or does not begin with a number, counts as the newest."""
     numbers = re.match(r"(\d+)(?:\.(\d+))?", version)
     return tuple(int(n or 0) for n in numbers.groups()) if numbers else (sys.maxsize,)
 
@@ -139,7 +143,7 @@ def _noted(path: str) -> dict[str, list[str]]:
 
 
 def _modules(prefix: str, folder: str) -> "_PrivateModules":
-    """Return the modules under a prefix; those already loaded by another instance of the same FMU are shared."""
+    """Return the modules under a prefix; instances of the same FMU share those that are loaded."""
     root = types.ModuleType(prefix, "Modules of an FMU.")
     root.__path__ = []
     vars(root)["modules"] = _PrivateModules(prefix)
@@ -149,7 +153,7 @@ def _modules(prefix: str, folder: str) -> "_PrivateModules":
 
 
 class _PrivateModules:
-    """The modules of one FMU. Names in the methods' arguments are without the prefix."""
+    """The modules of one FMU. The methods take names without the prefix."""
 
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
@@ -158,7 +162,7 @@ class _PrivateModules:
         self.builtins = {**vars(builtins), "__import__": self.import_from}
 
     def load(self, name: str) -> types.ModuleType:
-        """Return a module, loaded if need be, its packages before it."""
+        """Return a module; it is loaded if it is not yet, after the packages that contain it."""
         with self.lock:
             full = f"{self.prefix}.{name}"
             if full not in sys.modules:
@@ -175,7 +179,7 @@ class _PrivateModules:
         fromlist: Sequence[str] | None = (),
         level: int = 0,
     ) -> types.ModuleType:
-        """Stand in for `__import__` in the FMU's modules."""
+        """Import as `__import__` does; the FMU's modules call this in its place."""
         if level and globals:
             name = importlib.util.resolve_name("." * level + name, globals["__package__"])[len(self.prefix) + 1 :]
         elif self._place(name.partition(".")[0]) is None:
@@ -183,13 +187,13 @@ class _PrivateModules:
         module = self.load(name)
         if not fromlist:
             return self.load(name.partition(".")[0])
-        for item in fromlist:
-            if item != "*" and not hasattr(module, item) and self._place(f"{name}.{item}"):
-                self.load(f"{name}.{item}")
+        for imported in fromlist:
+            if imported != "*" and not hasattr(module, imported) and self._place(f"{name}.{imported}"):
+                self.load(f"{name}.{imported}")
         return module
 
     def _place(self, name: str) -> str | None:
-        """Return the file that a module is made of; of a package its `__init__.py`, or else its folder."""
+        """Return a module's file; for a package its `__init__.py`, or its folder if it has none."""
         base = os.path.join(self.folder, *name.split("."))
         candidates = (f"{base}.py", os.path.join(base, "__init__.py"), base)
         return next((c for c in candidates if os.path.exists(c)), None)
@@ -217,7 +221,7 @@ class _PrivateModules:
 
 
 def _source(path: str) -> str:
-    """Return a module's source; tracebacks keep its lines though the host may delete the FMU's folder."""
+    """Return a module's source; its lines are cached for tracebacks, as the host may delete the FMU's folder."""
     if os.path.isdir(path):
         return ""
     with open(path, "rb") as file:

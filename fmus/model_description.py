@@ -1,4 +1,4 @@
-"""What both standards' model descriptions share: units, log categories, numbers as text."""
+"""What the model descriptions of FMI 2 and FMI 3 share: units, log categories, dependencies, values as text."""
 
 import enum
 import math
@@ -16,17 +16,17 @@ from handover.fmus.layout import Form, Layout
 GENERATOR = "handover-cosim"
 
 LOG_CATEGORIES = {
-    "logStatusError": "refused calls and failures, with the traceback of an exception; told even while logging is off",
-    "logStatusWarning": "calls that are answered, but perhaps not as expected",
-    "logAll": "all the others, and the beginning and end of a run",
+    "logStatusError": "rejected calls and failures, with tracebacks of exceptions; logged even while logging is off",
+    "logStatusWarning": "calls that succeed, but perhaps not as expected",
+    "logAll": "all other messages, and the beginning and end of a run",
 }
-
+"""Descriptions of the log categories that the runtime has (runtime/log.c)."""
 
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 class AmbiguousName(ValueError):
-    """Two things of one block that an FMU tells apart by name have the same."""
+    """Two things of one block that an FMU distinguishes by name have the same name."""
 
     def __init__(self, what: str, name: str) -> None:
         super().__init__(f"{what} {name!r}: something else in the block has this name; rename one of them")
@@ -47,7 +47,7 @@ class Model:
 
     Attributes:
         name: the unit's name, also the name of its shared library.
-        step: the communication step that suits the unit, in seconds.
+        step: the default communication step, in seconds.
         token: GUID of FMI 2, instantiation token of FMI 3.
         description: the block's declarations.
         layout: its variables' places.
@@ -65,8 +65,8 @@ class Model:
     variable_step: bool
 
 
-def text(root: ET.Element) -> bytes:
-    """Return a document as indented UTF-8.
+def to_xml(root: ET.Element) -> bytes:
+    """Return a document as indented XML in UTF-8.
 
     Raises:
         InvalidText: an attribute has a character that XML cannot carry.
@@ -80,17 +80,17 @@ def text(root: ET.Element) -> bytes:
 
 
 def number(value: float) -> str:
-    """Return the shortest text from which the same float64 is read."""
+    """Return the shortest decimal number that is parsed as the same float64."""
     return repr(float(value))
 
 
 def boolean(value: object) -> str:
-    """Return `true` or `false`."""
+    """Return `true` or `false`, as XML Schema has them."""
     return "true" if value else "false"
 
 
 def bounds(variable: Variable) -> dict[str, str]:
-    """Return the attributes `min` and `max` as far as they are declared and finite."""
+    """Return the attributes `min` and `max`, each if it is declared and finite."""
     pairs = {"min": variable.minimum, "max": variable.maximum}
     return {
         name: number(value) if variable.kind is Kind.REAL else str(int(value))
@@ -103,7 +103,7 @@ def add_units(root: ET.Element, variables: Iterable[Variable]) -> None:
     """Add the units in use: value in SI = factor * value + offset, with the exponents of the base units.
 
     Raises:
-        AmbiguousName: two different units are called the same.
+        AmbiguousName: two different units have the same symbol.
     """
     units: dict[str, Unit] = {}
     for v in variables:
@@ -122,14 +122,14 @@ def add_units(root: ET.Element, variables: Iterable[Variable]) -> None:
 
 
 def add_log_categories(root: ET.Element) -> None:
-    """Add the log categories that the runtime knows (runtime/log.c)."""
+    """Add the runtime's log categories."""
     categories = ET.SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", name=name, description=description)
 
 
 def add_default_experiment(root: ET.Element, model: Model) -> None:
-    """Add the start time 0 and the step that suits the unit."""
+    """Add the start time 0 and the unit's default step."""
     ET.SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=number(float(model.step)))
 
 
@@ -137,7 +137,7 @@ def enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:
     """Return the enumeration types in use, by name.
 
     Raises:
-        AmbiguousName: two of them are called the same, or one as a variable, which FMI forbids.
+        AmbiguousName: two of them have the same name, or one has a variable's name, which FMI forbids.
     """
     listed = list(variables)
     names = [v.name for v in listed]
@@ -149,12 +149,12 @@ def enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:
 
 
 def variability(model: Model, variable: Variable) -> str:
-    """Return a port's variability: real ports are continuous but the outputs of a sampled block."""
+    """Return a port's variability: real ports are continuous, except the outputs of a sampled block."""
     sampled_output = variable.causality.value == "output" and model.description.period is not None
     return "continuous" if variable.kind is Kind.REAL and not sampled_output else "discrete"
 
 
-def known_at_start(model: Model, output: str) -> list[str]:
-    """Return what an output's first value is worked out from: the inputs that feed through to it, all parameters."""
+def initial_dependencies(model: Model, output: str) -> list[str]:
+    """Return what an output depends on during initialisation: inputs with direct feedthrough to it, all parameters."""
     inputs = model.description.feedthrough.get(output, ())
     return [*inputs, *(v.name for v in model.description.parameters)]

@@ -1,4 +1,4 @@
-"""Values as a block is to see them, and the parameters from which it is made."""
+"""Reads a block's parameters, and single values, from the buffers and checks them against their declarations."""
 
 import enum
 from typing import Any
@@ -13,7 +13,7 @@ from handover.fmus.layout import Buffer, Slot
 
 
 class ParameterOutOfRange(ValueError):
-    """A parameter's value is outside the range that its declaration allows."""
+    """A parameter's value is outside its declared range."""
 
     is_refusal = True
 
@@ -34,7 +34,7 @@ class UnknownItem(ValueError):
 
 
 def read_parameters(buffers: Buffers) -> Any:
-    """Make a block's parameters from the buffers.
+    """Return a block's parameters from the buffers.
 
     Raises:
         ParameterOutOfRange, UnknownItem: a value is not one that its declaration allows.
@@ -50,7 +50,7 @@ def read_parameters(buffers: Buffers) -> Any:
 
 
 def read_value(buffers: Buffers, slot: Slot) -> Any:
-    """Return a variable's value as the type it is declared with, not shared with the buffers.
+    """Return a copy of a variable's value, of its declared type.
 
     Raises:
         UnknownItem: an enumeration's number is none of its items.

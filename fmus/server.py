@@ -1,6 +1,6 @@
 """Runs an FMU's Python side in a process of its own: the script that runtime/remote.c starts.
 
-It answers the host's calls, one after another, until the host closes the channel or ends. Standard library only.
+It executes the host's calls, one after another, until the host closes the channel or ends. Standard library only.
 """
 
 import ctypes
@@ -17,25 +17,26 @@ from types import ModuleType
 from typing import Any
 
 CALL = struct.Struct("=32sqQQ")
-"""CallHead of remote.c: the method, its index or -1, the number of bytes that follow, whether they are an argument."""
+"""CallHead in remote.c: the method, its index or -1, the number of bytes that follow, whether they are an argument."""
 
 ANSWER = struct.Struct("=QQ")
-"""AnswerHead: outcome, the number of bytes that follow."""
+"""AnswerHead in remote.c: the outcome, the number of bytes that follow."""
 
 BEGUN = struct.Struct("=QQQ")
-"""Begun: address and size of the buffers' memory, the number of bytes of a warning."""
+"""Begun in remote.c: address and size of the buffers' memory, the number of bytes of a warning."""
 
 ANSWERED, REFUSED, RAISED = 0, 1, 2
+"""Outcomes, as in runtime/side.h: the method returned, rejected the call and changed nothing, or failed."""
 
 PATIENCE = 5.0
-"""Seconds that a block has for coming back once the host has gone."""
+"""Seconds that a call may take to return once the host has ended."""
 
 
 class Channel:
-    """Bytes from and to the host: a socket, or on Windows a pipe.
+    """Carries bytes from and to the host: a socket, or on Windows a pipe.
 
     Args:
-        number: of the descriptor; on Windows of the handle.
+        number: of the file descriptor; on Windows of the handle.
     """
 
     def __init__(self, number: int) -> None:
@@ -60,7 +61,7 @@ class Channel:
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def send(self, data: bytes) -> None:
-        """Send all of them.
+        """Send all bytes.
 
         Raises:
             SystemExit: the host has closed the channel, or has ended.
@@ -74,11 +75,11 @@ class Channel:
 
 
 class Server:
-    """One instance's Python side.
+    """One instance's Python side: receives calls, calls the slave, sends results.
 
     Args:
         channel: to the host.
-        memory: number of the file that is shared with the host, empty or left by a process that has ended.
+        memory: number of the file that is shared with the host; empty, or with what a process wrote that has ended.
     """
 
     def __init__(self, channel: Channel, memory: int) -> None:
@@ -90,7 +91,7 @@ class Server:
         self._slave: Any = None
 
     def run(self) -> None:
-        """Answer calls until the host closes the channel."""
+        """Execute calls until the host closes the channel."""
         while True:
             method, index, size, given = CALL.unpack(self._channel.receive(CALL.size))
             arguments: list[Any] = [] if index < 0 else [index]
@@ -130,7 +131,7 @@ class Server:
     def _share(self, size: int) -> mmap.mmap:
         """Return the memory that is shared with the host; the file gets its size."""
         os.ftruncate(self._file, size)
-        if hasattr(os, "posix_fallocate"):  # an error here, where writing would end the process
+        if hasattr(os, "posix_fallocate"):  # raises if the disk is full, where writing to the memory would crash
             os.posix_fallocate(self._file, 0, size)
         self._memory = mmap.mmap(self._file, size)
         return self._memory
@@ -149,36 +150,37 @@ def _descriptor(number: int) -> int:
 
 
 def _module(name: str) -> ModuleType:
+    """Import a module that only some systems have; by name, as type checkers know it on one system only."""
     return __import__(name)
 
 
 def _close_all_but(kept: tuple[int, ...]) -> None:
-    """Close what the host let be inherited: its files and sockets are not to live on here."""
+    """Close the descriptors that were inherited from the host: its files and sockets must not stay open here."""
     if os.path.isdir("/dev/fd"):
         for name in os.listdir("/dev/fd"):
             if int(name) not in kept:
                 try:
                     os.close(int(name))
-                except OSError:  # that of the folder itself
+                except OSError:  # the descriptor of the listing itself, which is closed already
                     continue
 
 
 def _end_with_the_host(number: int) -> None:
-    """Watch the channel: a block that never comes back must not outlive the host."""
+    """End the process when the host has closed the channel: a block that never returns must not outlive the host."""
     select: Any = _module("select")
-    watch = select.poll()
-    watch.register(number, 0)  # hang-ups are reported, whatever is asked for
-    while not any(event & (select.POLLHUP | select.POLLERR) for _, event in watch.poll()):
+    poller = select.poll()
+    poller.register(number, 0)  # hang-ups are reported whatever events are asked for
+    while not any(event & (select.POLLHUP | select.POLLERR) for _, event in poller.poll()):
         pass
     threading.Event().wait(PATIENCE)
     os._exit(1)
 
 
 def main() -> None:
-    """Serve the host; the arguments are the script, the channel, the shared memory."""
+    """Serve the host; the last two arguments are the numbers of the channel and of the shared memory."""
     channel, memory = (int(number) for number in sys.argv[-2:])
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the host
-    if sys.platform != "win32":  # where the host's job ends this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's to handle
+    if sys.platform != "win32":  # on Windows the host's job object ends this process
         _close_all_but((0, 1, 2, channel, memory))
         threading.Thread(target=_end_with_the_host, args=(channel,), daemon=True).start()
     sys.argv[1:] = []

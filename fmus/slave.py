@@ -14,14 +14,14 @@ from handover.fmus.table import table
 
 
 class Slave:
-    """One instance: a block, its buffers, and the way between them.
+    """One instance: a block, its buffers, and the functions that move values between them.
 
-    The block is made from the parameters when outputs are first needed, and again if a parameter changed after that.
+    The block is made from the parameters when outputs are first needed, and again if a parameter has changed since.
 
     Args:
         block: the block's class.
-        form: a value of `Form`; it decides what a value reference stands for.
-        memory: where the variables lie, see `Buffers`.
+        form: a value of `Form`; it determines the value references.
+        memory: allocates the variables' memory, see `Buffers`.
     """
 
     _block: Any  # a handover.cosim.blocks.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
@@ -41,14 +41,14 @@ class Slave:
             self._derive = derivative_reader(self._buffers)
 
     def table(self) -> bytes:
-        """Return what the C runtime must know of the buffers."""
+        """Return the table that describes the buffers to the C runtime, see `handover.fmus.table`."""
         return table(self._buffers, self._form)
 
     def initialise(self) -> None:
-        """Work out the outputs at the start.
+        """Compute the outputs at the start.
 
-        However often a host asks while it initialises, the block starts from its fresh state each time: the outcome
-        does not depend on the host's ways.
+        The block starts from its fresh state each time, so that the result does not depend on how often a host gets
+        outputs while it initialises.
 
         Raises:
             ParameterOutOfRange: a parameter is outside its declared range.
@@ -60,12 +60,12 @@ class Slave:
         self._write(self._block.outputs(float(self._clock[0]), self._read()))
 
     def step(self) -> None:
-        """Advance from t by dt, as the buffers have them, and write the outputs; a sampled block's dt is its period."""
+        """Step from t by dt, which are in the buffers, and write the outputs; a sampled block's dt is its period."""
         t, dt = self._clock.tolist()
         self._write(self._block.step(t, dt, self._read()))
 
     def evaluate(self) -> None:
-        """Step as `step` does, but for trial: when called again, from the same state as at the first time."""
+        """Step as `step` does, but tentatively: called again, it steps from the same state as the first time."""
         t, dt = self._clock.tolist()
         u = self._read()
         if self._before_tick is None:
@@ -75,14 +75,14 @@ class Slave:
         self._write(self._block.step(t, dt, u))
 
     def settle(self) -> None:
-        """Make the step that was last tried the one that was done."""
+        """Make the last tentative step the actual one."""
         self._before_tick = None
 
     def advance(self) -> None:
-        """Advance from t by dt or to the first event, write the outputs, and how far it came in the place of dt.
+        """Advance from t by dt or to the first event; write the outputs and, in the place of dt, how far it advanced.
 
         Raises:
-            InvalidAdvance: the block says that it went backwards, or farther than dt.
+            InvalidAdvance: by the block's return value it went backwards, or farther than dt.
         """
         t, dt = self._clock.tolist()
         reached, y = self._block.advance(t, dt, self._read())
@@ -92,28 +92,28 @@ class Slave:
         self._clock[1] = reached
 
     def handle_event(self) -> None:
-        """Change at t what an event changes, and write the outputs."""
+        """Let the block handle an event at t, and write the outputs."""
         self._write(self._block.handle_event(float(self._clock[0]), self._read()))
 
     def next_event(self) -> None:
-        """Write the time of the next event that is known beforehand, or infinity, in the place of dt."""
-        following = self._block.next_event(float(self._clock[0]))
-        self._clock[1] = math.inf if following is None else following
+        """Write the time of the next time event, or infinity, in the place of dt."""
+        event_time = self._block.next_event(float(self._clock[0]))
+        self._clock[1] = math.inf if event_time is None else event_time
 
     def derivative(self, seed: bytes) -> bytes:
-        """Return the real outputs' derivatives in a direction of the real inputs; float64, as in the buffers."""
-        du, give = self._derive(seed)
-        return give(self._block.directional_derivative(float(self._clock[0]), self._read(), du))
+        """Return the directional derivative of the real outputs by the real inputs; float64, in the buffers' order."""
+        du, to_vector = self._derive(seed)
+        return to_vector(self._block.directional_derivative(float(self._clock[0]), self._read(), du))
 
     def reset(self) -> None:
-        """Go back to where a new instance is."""
+        """Restore the state of a new instance."""
         self._buffers.reset()
         self._made_from = self._before_tick = None
 
     def get_state(self) -> bytes:
         """Return the variables, the time, and the block's state if there is a block that fits its parameters.
 
-        While a step is tried, that is the state before it.
+        During a tentative step, that is the state before it.
         """
         parts = [self._buffers.to_bytes()]
         if self._made_from == self._buffers.parameters():
@@ -121,11 +121,11 @@ class Slave:
         return join(parts)
 
     def set_state(self, state: bytes) -> None:
-        """Take over what `get_state` gave, here or in another instance.
+        """Restore what `get_state` returned, here or in another instance.
 
         Raises:
-            InvalidState: it is a state of another unit; nothing has changed.
-            ParameterOutOfRange, UnknownItem: it has such a parameter; nothing has changed.
+            InvalidState: it is a state of another unit; nothing is changed.
+            ParameterOutOfRange, UnknownItem: a parameter in it is invalid; nothing is changed.
         """
         parts = split(state)
         if len(parts) not in (1, 2):
@@ -145,7 +145,7 @@ class Slave:
         self._block.set_state(parts[1])
 
     def get_string(self, index: int) -> bytes:
-        """Return a string variable as UTF-8; the bytes stay alive until the variable changes."""
+        """Return a string variable as UTF-8; the bytes live until the variable changes."""
         return self._buffers.strings[index]
 
     def set_string(self, index: int, value: bytes) -> None:
@@ -158,7 +158,7 @@ class Slave:
         self._buffers.strings[index] = value
 
     def _make(self) -> None:
-        """Make a block of the parameters; if that fails, the block of before stays, with what it was made from."""
+        """Make a block from the parameters; if that fails, the previous block and its parameters are kept."""
         block = self._type(read_parameters(self._buffers))
         self._fresh = block.get_state()
         self._block, self._made_from = block, self._buffers.parameters()

@@ -1,6 +1,6 @@
-"""Which modules an FMU must carry to run its block, and which packages it needs from its environment.
+"""Which modules an FMU must contain to run its block, and which packages it needs from its environment.
 
-Found in the sources' import statements, without running them: what a block imports, what that imports, and so on.
+They are found by following the import statements in the sources, without running them.
 """
 
 import ast
@@ -15,16 +15,16 @@ from pathlib import Path
 
 from handover.fmus.catalog import UnknownBlock
 
-HOUSE = "handover"
-"""The package of which every FMU carries sources."""
+OWN_PACKAGE = "handover"
+"""The package of which every FMU contains sources."""
 
 SLAVE_SIDE = ("handover.fmus.slave", "handover.fmus.loader", "handover.fmus.server", "handover.fmus.interpreter")
-"""Modules that every FMU carries, whatever its block imports."""
+"""Modules that every FMU contains, whatever its block imports."""
 
 
 @dataclass(frozen=True)
 class Package:
-    """A package of the environment: the module's name, and the distribution that has it."""
+    """A package of the environment: its top-level module, and the distribution that installs it."""
 
     module: str
     distribution: str
@@ -33,10 +33,10 @@ class Package:
 
 @dataclass(frozen=True)
 class Carried:
-    """What goes into an FMU.
+    """The Python code of an FMU.
 
     Attributes:
-        files: sources by their path in the FMU, such as `handover/plants/helix/tendon_arm.py`.
+        files: sources by their paths in the FMU, such as `handover/plants/helix/tendon_arm.py`.
         modules: top-level modules of the environment that they import, sorted.
     """
 
@@ -44,24 +44,24 @@ class Carried:
     modules: tuple[str, ...]
 
     def packages(self) -> list[Package]:
-        """Return the environment's packages with their versions; those of no distribution are left out."""
-        found = [(module, name) for module in self.modules for name in _distributions().get(module, [])[:1]]
-        return [Package(module, name, metadata.version(name)) for module, name in found]
+        """Return the environment's packages with their versions; modules of no distribution are left out."""
+        named = [(module, name) for module in self.modules for name in _distributions().get(module, [])[:1]]
+        return [Package(module, name, metadata.version(name)) for module, name in named]
 
 
 @cache
 def _distributions() -> dict[str, list[str]]:
-    """Return the names of distributions by top-level module; Python 3.10's own function misses most of them."""
-    found: dict[str, set[str]] = {}
+    """Return distributions by top-level module; `packages_distributions` of Python 3.10 misses most of them."""
+    by_module: dict[str, set[str]] = {}
     for distribution in metadata.distributions():
         listed = (distribution.read_text("top_level.txt") or "").split()
         for top in listed or {file.parts[0].partition(".")[0] for file in distribution.files or ()}:
-            found.setdefault(top, set()).add(distribution.metadata["Name"])
-    return {top: sorted(names) for top, names in found.items()}
+            by_module.setdefault(top, set()).add(distribution.metadata["Name"])
+    return {top: sorted(names) for top, names in by_module.items()}
 
 
 def closure(block: str) -> Carried:
-    """Follow the imports of a block's module.
+    """Return the sources and packages that a block's module imports, directly or through others.
 
     Args:
         block: path of the block's class, such as `handover.plants.helix.tendon_arm:TendonArm`.
@@ -74,7 +74,7 @@ def closure(block: str) -> Carried:
         raise UnknownBlock(block, "there is no ':' between module and class")
     if not _is_source(_spec(module)):
         raise UnknownBlock(block, f"module {module!r} cannot be found as Python source")
-    carried_tops = {HOUSE, module.partition(".")[0]}
+    carried_tops = {OWN_PACKAGE, module.partition(".")[0]}
     files: dict[str, Path] = {}
     environment: set[str] = set()
     waiting = [module, *SLAVE_SIDE]
@@ -98,7 +98,7 @@ def closure(block: str) -> Carried:
 
 
 def _with_packages(module: str) -> Iterator[str]:
-    """Yield a, a.b, a.b.c of a.b.c."""
+    """Yield a, a.b, a.b.c for a.b.c."""
     parts = module.split(".")
     for i in range(len(parts)):
         yield ".".join(parts[: i + 1])
@@ -116,7 +116,7 @@ def _is_source(spec: ModuleSpec | None) -> bool:
 
 
 def _is_installed(spec: ModuleSpec) -> bool:
-    """Tell whether a module lies where installers put packages, so that another environment can have it too."""
+    """Return whether a module lies where installers put packages, so that another environment can have it, too."""
     places = [spec.origin or "", *(spec.submodule_search_locations or [])]
     return any({"site-packages", "dist-packages"} & set(Path(place).parts) for place in places)
 
@@ -128,20 +128,20 @@ def _path_in_fmu(module: str, spec: ModuleSpec) -> str:
 
 def _imports(source: Path, package: str) -> list[str]:
     """Return the absolute names that a source may import; of `from a import b` both a and a.b, as b may be a module."""
-    found: list[str] = []
+    names: list[str] = []
     for node in _running(ast.parse(source.read_bytes(), filename=str(source))):
         if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
             if node.level:
                 base = importlib.util.resolve_name("." * node.level + base, package)
-            found += [base] + [f"{base}.{alias.name}" for alias in node.names]
-    return found
+            names += [base] + [f"{base}.{alias.name}" for alias in node.names]
+    return names
 
 
 def _running(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield a tree's nodes but those that only type checkers see."""
+    """Yield a tree's nodes, but not those that only type checkers see."""
     yield node
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):

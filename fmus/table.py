@@ -1,4 +1,4 @@
-"""The table from which the C runtime knows an instance's buffers and value references; it reads no XML.
+"""The table that describes an instance's buffers and value references to the C runtime, which reads no XML.
 
 A header, then the binary buffers, the variables by value reference, and their names: structures of runtime/instance.h.
 """
@@ -20,13 +20,13 @@ HAS_EVENTS, HAS_DERIVATIVES, HAS_CLOCK = 1, 2, 4
 
 
 def table(buffers: Buffers, form: Form) -> bytes:
-    """Return the table; the form decides what a value reference stands for."""
+    """Return the table; the form determines the value references."""
     layout = buffers.layout
     names = bytearray()
     rows: list[bytes] = []
 
-    def add(buffer: Buffer, kind: Type, causality: int, count: int, offset: int, name: str) -> None:
-        rows.append(VARIABLE.pack(buffer, causality, kind, count, offset, len(names)))
+    def add(buffer: Buffer, fmi_type: Type, causality: int, count: int, offset: int, name: str) -> None:
+        rows.append(VARIABLE.pack(buffer, causality, fmi_type, count, offset, len(names)))
         names.extend(name.encode() + b"\0")
 
     if form.fmi == 3:

@@ -1,4 +1,4 @@
-"""Why a hand that holds something still does not."""
+"""Tremor and drift of a hand that holds something out, as random processes."""
 
 import math
 import pickle
@@ -10,13 +10,13 @@ from handover.cosim.blocks.ports import Floats
 
 
 class _Step(NamedTuple):
-    """What an advance by dt takes: the transition F, the root L of the gathered covariance, the drift's share kept."""
+    """An advance by dt: transition F, root L of the noise's covariance, the drift's decay and the noise added to it."""
 
     dt: float
     F: tuple[float, float, float, float]
     L: tuple[float, float, float]
-    kept: float
-    fresh: float
+    decay: float
+    drift_noise: float
 
 
 class HandTremor:
@@ -51,35 +51,35 @@ class HandTremor:
 
     @property
     def displacement(self) -> Floats:
-        """Where the hand is, seen from where it wants to be, (3,), in m."""
+        """Displacement of the hand from where the person holds it, (3,), in m."""
         return np.array([x + d for (x, _), d in zip(self._tremor, self._drift, strict=True)])
 
     def advance(self, dt: float) -> None:
-        """Advance by dt; the noise gathered in it has the covariance P - F P F^T, P the stationary one."""
+        """Advance by dt; the noise added in it has the covariance P - F P F^T, P the stationary one."""
         if dt != self._step.dt:
             self._step = self._step_of(dt)
-        _, (F_xx, F_xv, F_vx, F_vv), (L_xx, L_vx, L_vv), a, fresh = self._step
+        _, (F_xx, F_xv, F_vx, F_vv), (L_xx, L_vx, L_vv), decay, drift_noise = self._step
         n = self._rng.standard_normal(9).tolist()
         self._tremor = [
             (F_xx * x + F_xv * v + L_xx * n_x, F_vx * x + F_vv * v + L_vx * n_x + L_vv * n_v)
             for (x, v), n_x, n_v in zip(self._tremor, n[:3], n[3:6], strict=True)
         ]
-        self._drift = [a * d + fresh * n_d for d, n_d in zip(self._drift, n[6:], strict=True)]
+        self._drift = [decay * d + drift_noise * n_d for d, n_d in zip(self._drift, n[6:], strict=True)]
 
     def get_state(self) -> bytes:
         """Return the complete state."""
         return pickle.dumps((self._tremor, self._drift, self._rng.bit_generator.state))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this process or of one with equal arguments."""
+        """Restore a state of this process or of one with equal arguments."""
         self._tremor, self._drift, self._rng.bit_generator.state = pickle.loads(state)
 
     def _step_of(self, dt: float) -> "_Step":
         F = self._transition(dt)
         L = _root(self._covariance - F @ self._covariance @ np.transpose(F))
-        a = math.exp(-dt / self._drift_time)
-        fresh = self._drift_sigma * math.sqrt(1.0 - a * a)
-        return _Step(dt, tuple(F.reshape(-1).tolist()), tuple(L[np.tril_indices(2)].tolist()), a, fresh)
+        decay = math.exp(-dt / self._drift_time)
+        drift_noise = self._drift_sigma * math.sqrt(1.0 - decay * decay)
+        return _Step(dt, tuple(F.reshape(-1).tolist()), tuple(L[np.tril_indices(2)].tolist()), decay, drift_noise)
 
     def _transition(self, dt: float) -> Floats:
         """Return the matrix that takes displacement and velocity, undisturbed, from t to t + dt."""

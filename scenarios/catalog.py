@@ -1,6 +1,6 @@
-"""The robots whose experiments can be run, and the scenarios by name.
+"""The catalog of robots and of their scenarios by name.
 
-Scenarios are named, not imported: a run loads its own, and no other robot's.
+Scenarios are listed by import path, not imported: a run loads its own, and no other robot's.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ class RobotSystem:
 
     Attributes:
         title: what it is.
-        paths: the scenarios that it is in: paths of their classes by name.
+        paths: import paths of its scenarios' classes by the scenarios' names.
     """
 
     title: str
@@ -25,12 +25,12 @@ class RobotSystem:
 
     @property
     def scenarios(self) -> tuple[type[Experiment[Any]], ...]:
-        """Its scenarios, loaded."""
+        """Its scenarios' classes, imported."""
         return tuple(SCENARIOS[name] for name in self.paths)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Names of the catalogued units that its scenarios are made of, in their order."""
+        """Names of the catalogued units in its scenarios, in order of first use."""
         return tuple(dict.fromkeys(unit for s in self.scenarios for unit in s.units.values()))
 
 
@@ -64,15 +64,15 @@ SYSTEMS = (
 
 
 class _Scenarios(Mapping[str, type[Experiment[Any]]]):
-    """Scenarios by name, each loaded when it is asked for."""
+    """Scenarios by name, each imported on first access."""
 
     def __init__(self, paths: Mapping[str, str]) -> None:
         self._paths = paths
 
     def __getitem__(self, name: str) -> type[Experiment[Any]]:
         module, _, experiment = self._paths[name].partition(":")
-        loaded: type[Experiment[Any]] = getattr(import_module(module), experiment)
-        return loaded
+        scenario: type[Experiment[Any]] = getattr(import_module(module), experiment)
+        return scenario
 
     def __contains__(self, name: object) -> bool:
         return name in self._paths

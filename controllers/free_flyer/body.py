@@ -1,6 +1,7 @@
-"""A free-flyer's own model of its body: one rigid body with a gripper on a fixed arm. [Fernandes2020] sec. 4.1.2.
+"""A free-flyer's model of its own body, and whether a control loop around that body is stable.
 
-Whether a free-flyer's control loop is stable at its rate and delay, and what would make it so.
+The body is one rigid body with a gripper on a fixed arm, [Fernandes2020] sec. 4.1.2. `stability_faults` closes the loop
+at its rate, delay and lag by linear theory (`SampledLoop`), and names the delay or gains with which it would be stable.
 """
 
 import math
@@ -12,6 +13,8 @@ import numpy as np
 from handover.controllers.free_flyer.sampled_loop import LinearController, LinearPlant, SampledLoop, largest_stable
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats
+
+_MAX_DELAY = 0.5  # s; the longest delay that is proposed as a remedy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +29,7 @@ class FlyerBody:
     p_BG: Floats
 
     def faults(self) -> list[str]:
-        """Return what no rigid body can have."""
+        """Return what is impossible for a rigid body."""
         faults: list[str] = []
         if not 0.0 < self.mass < np.inf:
             faults.append(f"mass = {self.mass:g} kg must be positive and finite")
@@ -65,7 +68,7 @@ class FlyerBody:
         wrench on G. Outputs: displacement of G, twist of G. All in the axes of B.
 
         Args:
-            lag: time constant of the propulsion, s; 0 if it follows at once.
+            lag: time constant of the propulsion, s; 0 if thrust follows its command without delay.
         """
         O, I, J = np.zeros((6, 6)), np.eye(6), self.jacobian()
         inverse: Floats = np.linalg.inv(self.mass_matrix()).astype(np.float64)
@@ -83,17 +86,14 @@ class FlyerBody:
 
 
 def positive_definite(M: Floats) -> bool:
-    """Tell whether a matrix is finite, symmetric (to rounding) and positive definite."""
+    """Return whether a matrix is finite, symmetric (to rounding) and positive definite."""
     if not np.all(np.isfinite(M)) or np.max(np.abs(M - np.transpose(M))) > 1e-9 * np.max(np.abs(M)):
         return False
     return bool(np.all(np.linalg.eigvalsh(M) > 0.0))
 
 
-_MAX_DELAY = 0.5  # s, up to which a stable one is looked for
-
-
 class InvalidControllerParameters(InvalidParameters):
-    """A controller that cannot work as its parameters have it; `faults` lists all of them."""
+    """Parameters with which a controller cannot work; `faults` lists what is wrong with them."""
 
     def __init__(self, block: str, faults: list[str]) -> None:
         self.block = block
@@ -117,18 +117,18 @@ def stability_faults(
         return faults
     plant = body.linear_plant(lag)
 
-    def radius(factor: float, later: float) -> float:
-        return SampledLoop(plant, law(factor), period, later).pole_radius
+    def pole_radius(factor: float, delay: float) -> float:
+        return SampledLoop(plant, law(factor), period, delay).pole_radius
 
-    if (found := radius(1.0, delay)) < 1.0:
+    if (radius := pole_radius(1.0, delay)) < 1.0:
         return []
     fault = (
         f"the loop is unstable at {1.0 / period:g} Hz with a delay of {delay:g} s and a propulsion lag of {lag:g} s: "
-        f"its largest pole has |z| = {found:.4f}, which must be less than 1"
+        f"its largest pole has |z| = {radius:.4f}, which must be less than 1"
     )
-    cures: list[str] = []
-    if (limit := largest_stable(lambda later: radius(1.0, later), min(delay, _MAX_DELAY))) > 0.0:
-        cures.append(f"a delay of at most about {limit:.3f} s")
-    if (limit := largest_stable(lambda factor: radius(factor, delay), 1.0)) > 0.0:
-        cures.append(f"at most about {limit:.3g} times these gains")
-    return [fault + ("; it is stable with " + " or with ".join(cures) if cures else "; no cure was found")]
+    remedies: list[str] = []
+    if (limit := largest_stable(lambda shorter: pole_radius(1.0, shorter), min(delay, _MAX_DELAY))) > 0.0:
+        remedies.append(f"a delay of at most about {limit:.3f} s")
+    if (limit := largest_stable(lambda factor: pole_radius(factor, delay), 1.0)) > 0.0:
+        remedies.append(f"at most about {limit:.3g} times these gains")
+    return [fault + ("; it is stable with " + " or with ".join(remedies) if remedies else "; no remedy was found")]

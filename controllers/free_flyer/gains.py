@@ -1,6 +1,6 @@
-"""Stiffness and damping of a free-flyer's gripper. [Fernandes2020] table 4.1.
+"""Control gains of a free-flyer: impedance of its gripper, [Fernandes2020] table 4.1, and PID of its base.
 
-PID laws of a free-flyer's base, for its translation and its attitude.
+Both kinds give their control law near the goal as a `LinearController`, for the analysis of its stability.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class ImpedanceGains:
     damping_rotation: Floats
 
     def faults(self) -> list[str]:
-        """Return which of the four matrices is not symmetric and positive definite, as eq. (3.25) wants them."""
+        """Return which of the four matrices is not symmetric and positive definite, as eq. (3.25) requires."""
         return [
             f"{name} = {np.asarray(M).tolist()} must be symmetric and positive definite"
             for name, M in vars(self).items()
@@ -65,7 +65,7 @@ class PidGains:
     k_D: float
 
     def faults(self, name: str) -> list[str]:
-        """Return what keeps the continuous loop of a free body from being stable: Routh's k_P k_D > k_I >= 0."""
+        """Return what makes the continuous loop of a free body unstable, by Routh: k_P k_D > k_I >= 0 must hold."""
         if not (self.k_P > 0.0 and self.k_D > 0.0):
             return [f"{name}: k_P = {self.k_P:g} and k_D = {self.k_D:g} must be positive"]
         if not 0.0 <= self.k_I < self.k_P * self.k_D:
@@ -85,17 +85,17 @@ def pid_law(body: FlyerBody, position: PidGains, attitude: PidGains, period: flo
     """Return both laws near the goal: commanded wrench on B from displacement and twist of G (6 and 6).
 
     The integral of a sample counts from the next one on. A channel without integral has no state for it: that would
-    be a pole at one which nothing sees.
+    be an unobservable pole at one.
     """
     M, O = body.mass_matrix(), np.zeros((6, 6))
     base: Floats = np.linalg.inv(body.jacobian()).astype(np.float64)
     P, integral, D = (
         np.diag(np.repeat([getattr(position, k), getattr(attitude, k)], 3)) for k in ("k_P", "k_I", "k_D")
     )
-    kept = np.eye(6)[np.diag(integral) > 0.0]
+    integrated = np.eye(6)[np.diag(integral) > 0.0]
     return LinearController(
-        A=np.eye(len(kept)),
-        B=period * kept @ np.hstack([base, O]),
-        C=M @ integral @ np.transpose(kept),
+        A=np.eye(len(integrated)),
+        B=period * integrated @ np.hstack([base, O]),
+        C=M @ integral @ np.transpose(integrated),
         D=M @ np.hstack([P @ base, D @ base]),
     )

@@ -18,7 +18,7 @@ _VELOCITIES = {Behaviour.RIGID: (0.059, 0.021), Behaviour.COMPLIANT: (0.08, 0.03
 
 
 class InvalidHandoverParameters(InvalidParameters):
-    """A handover that cannot be done as its parameters have it; `faults` lists all of them."""
+    """Parameters with which no handover is possible; `faults` lists what is wrong with them."""
 
     block = NAME
 
@@ -41,10 +41,10 @@ class Params:
     )
     behaviour: Behaviour = parameter(Behaviour.RIGID, "behaviour that the velocities below are for")
     release_velocity: MetrePerSecond = parameter(
-        0.0, "speed of the gripper that tells of a pull; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
+        0.0, "speed of the gripper above which it is pulled; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
     )
     receive_velocity: MetrePerSecond = parameter(
-        0.0, "speed that tells of an object put into it; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
+        0.0, "speed above which an object is put into it; 0: as stated for the behaviour", minimum=0.0, maximum=10.0
     )
     angle_threshold: Radian = parameter(
         0.71, "gripper angle above which a closed gripper holds something", minimum=0.0, maximum=6.3
@@ -61,16 +61,16 @@ class Params:
     q_WG_object: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper at the object")
     approach: Metre = parameter(
         0.15,
-        "length of the way on which it comes to the object straight ahead, along -x of G",
+        "length of the straight approach to the object, along -x of G",
         minimum=0.0,
         maximum=5.0,
     )
     p_WG_retreat: Vector3[Metre] = parameter(np.array([0.40, -0.07, 0.0]), "where the gripper retreats to")
     p_BG: Vector3[Metre] = parameter(ARM, "gripper, seen from the centre of mass", minimum=-5.0, maximum=5.0)
     workspace_low: Vector3[Metre] = parameter(
-        np.array([-0.30, -1.5, -1.5]), "least coordinates of gripper and robot: the person is beyond, at -x"
+        np.array([-0.30, -1.5, -1.5]), "smallest coordinates of gripper and robot: the person is beyond, at -x"
     )
-    workspace_high: Vector3[Metre] = parameter(np.array([2.0, 1.5, 1.5]), "greatest coordinates of gripper and robot")
+    workspace_high: Vector3[Metre] = parameter(np.array([2.0, 1.5, 1.5]), "largest coordinates of gripper and robot")
     gate_error: Metre = parameter(
         0.05, "distance from the handover place below which impedance control may begin", minimum=1e-4, maximum=10.0
     )
@@ -99,7 +99,7 @@ class Params:
         return self.p_WO_0 + self.p_OG
 
     def standoff(self) -> Floats:
-        """Return p_WG where the straight way to the object begins."""
+        """Return p_WG where the straight approach to the object begins."""
         R_WG = rotation_matrix(unit_quaternion(self.q_WG_object, NAME, "q_WG_object"))
         return self.object_goal() + np.array(rotate(R_WG, (self.approach, 0.0, 0.0)))
 
@@ -109,7 +109,7 @@ class Params:
         return self.task in (HandoverTask.ROBOT_TO_HUMAN, HandoverTask.COLLABORATIVE)
 
     def check(self) -> None:
-        """Raise InvalidHandoverParameters, with all faults, if this is no handover that can be done."""
+        """Raise InvalidHandoverParameters, with all faults, if the handover is not possible."""
         faults = self._place_faults() + self._velocity_faults() + self._time_faults()
         if faults:
             raise InvalidHandoverParameters(faults)
@@ -130,18 +130,18 @@ class Params:
         places = [("p_WG_handover", self.p_WG_handover, self.q_WG_handover)]
         if self.fetches:
             places.append(("p_WO_0 + p_OG", self.object_goal(), self.q_WG_object))
-            places.append(("the way to the object", self.standoff(), self.q_WG_object))
+            places.append(("the approach to the object", self.standoff(), self.q_WG_object))
         if self.task is not HandoverTask.HOLD:
             places.append(("p_WG_retreat", self.p_WG_retreat, self.q_WG_handover))
         return places
 
     def _outside(self, name: str, p_WG: Floats, q_WG: Floats) -> list[str]:
-        back = rotate(rotation_matrix(unit_quaternion(q_WG, NAME, name)), vector(self.p_BG))
+        arm = rotate(rotation_matrix(unit_quaternion(q_WG, NAME, name)), vector(self.p_BG))
         low, high = self.workspace_low, self.workspace_high
         return [
             f"{name} takes the {what} to {np.round(p, 3).tolist()} m, out of the workspace from {low.tolist()} to "
             f"{high.tolist()} m"
-            for what, p in (("gripper", p_WG), ("robot's centre of mass", p_WG - np.array(back)))
+            for what, p in (("gripper", p_WG), ("robot's centre of mass", p_WG - np.array(arm)))
             if not np.all((low <= p) & (p <= high))
         ]
 
@@ -152,7 +152,7 @@ class Params:
                 faults.append(f"{name} must be given, since none is stated for the behaviour {self.behaviour.name}")
             elif not v > self.gate_speed:
                 faults.append(
-                    f"{name} = {v:g} m/s must exceed gate_speed = {self.gate_speed:g} m/s, or rest itself trips it"
+                    f"{name} = {v:g} m/s must exceed gate_speed = {self.gate_speed:g} m/s, or rest exceeds it too"
                 )
         return faults
 

@@ -15,6 +15,7 @@ from handover.controllers.free_flyer.handover_parameters import (
     InvalidHandoverParameters,
     Params,
 )
+from handover.controllers.free_flyer.ports import PERIOD
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.plain_rotation import (
@@ -81,13 +82,13 @@ class Outputs:
     impedance: bool = output("impedance control is on")
     pose: bool = output("pose control is on")
     closure: Number = output("gripper command: 0 open, 1 closed", minimum=0.0, maximum=1.0)
-    light: bool = output("signal light: its beginning tells the person that the robot is ready")
+    light: bool = output("signal light: it comes on when the robot is ready for the person")
     failed_receptions: int = output("times that the gripper closed on nothing", minimum=0.0)
     speed_G: MetrePerSecond = output("speed of the gripper, low-passed, as it is monitored", minimum=0.0)
 
 
 class HandoverStateMachine:
-    """Leads through a handover by the states of figure 3.1.
+    """Runs a handover through the states of figure 3.1.
 
     - Robot to human, figure 3.2: OPEN_GRIPPER, MOVE_TO_OBJECT (at the end straight ahead, for what is touched floats
       away), GRASP_OBJECT, MOVE_TO_HANDOVER, ACTIVATE_IMPEDANCE, SIGNAL, CHECK_VELOCITY until the gripper is faster than
@@ -96,7 +97,7 @@ class HandoverStateMachine:
       is faster than receive_velocity, CLOSE_GRIPPER, CHECK_ANGLE; above angle_threshold it holds the object and goes on
       as above, else the reception has failed: OPEN_GRIPPER, and from SIGNAL again.
     - Collaborative, sec. 5.5: robot to human up to RELEASE_OBJECT, then, from ACTIVATE_IMPEDANCE, human to robot.
-    - Hold: ACTIVATE_IMPEDANCE for good.
+    - Hold: ACTIVATE_IMPEDANCE, to the end.
 
     Conditions of this implementation besides: impedance control begins only at rest near the handover place
     (gate_error, gate_speed), and the light only once the gripper is at rest again under it and within `tolerance`,
@@ -115,12 +116,12 @@ class HandoverStateMachine:
         ("phase", "p_WG_goal", "q_WG_goal", "impedance", "pose", "closure", "light", "failed_receptions", "speed_G"),
         ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "gripper_angle"),
     )
-    period: ClassVar[Fraction | None] = Fraction(2, 125)
+    period: ClassVar[Fraction | None] = PERIOD
 
     def __init__(self, params: Params) -> None:
         params.check()
         self._params = params
-        self._T = float(Fraction(2, 125))
+        self._T = float(PERIOD)
         self._release, self._receive = params.velocities()
         self._p_BG = vector(params.p_BG)
         q_handover = unit_quaternion(params.q_WG_handover, NAME, "q_WG_handover")
@@ -169,7 +170,7 @@ class HandoverStateMachine:
         here = add(vector(u.p_WB_meas), r), q_WB
         if self._goal is None:
             self._goal = here
-        self._judge_place(here)
+        self._count_settled(here)
         rule = self._rules.get(self._phase)
         following = rule(u.gripper_angle) if rule else None
         if following is None and rule and self._is_late():
@@ -197,14 +198,14 @@ class HandoverStateMachine:
         return pickle.dumps((int(self._phase), self._goal, counters, switches, self._monitor.get_state()))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this machine or of one with equal parameters."""
+        """Restore a state of this machine or of one with equal parameters."""
         phase, self._goal, counters, switches, monitor = pickle.loads(state)
         self._phase = HandoverPhase(phase)
         self._failed, self._steps, self._settled = counters
         self._impedance, self._closure, self._receiving = switches
         self._monitor.set_state(monitor)
 
-    def _judge_place(self, here: tuple[Vector, Quaternion]) -> None:
+    def _count_settled(self, here: tuple[Vector, Quaternion]) -> None:
         """Count the steps for which the gripper has been at rest at its goal."""
         p, (p_WG, q_WG), goal = self._params, here, self._goal
         if goal is None or self._monitor.speed >= p.gate_speed:
@@ -252,7 +253,7 @@ class HandoverStateMachine:
     def _open_gripper(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
         if not self._lasted(self._params.gripper_time):
             return None
-        if self._impedance:  # after a failed reception: signal again, once what was the push is over
+        if self._impedance:  # after a failed reception: signal again, once it has come to rest after the push
             return HandoverPhase.SIGNAL if self._arrived() else None
         return HandoverPhase.MOVE_TO_HANDOVER if self._receiving else HandoverPhase.MOVE_TO_OBJECT
 
@@ -270,7 +271,7 @@ class HandoverStateMachine:
         return HandoverPhase.MOVE_TO_HANDOVER if self._holds_something(angle) else HandoverPhase.GIVEN_UP
 
     def _move_to_handover(self, angle: float) -> HandoverPhase | None:
-        if not self._receiving and not self._holds_something(angle):  # lost on the way
+        if not self._receiving and not self._holds_something(angle):  # lost during the move
             return HandoverPhase.GIVEN_UP
         return HandoverPhase.ACTIVATE_IMPEDANCE if self._arrived() else None
 

@@ -1,4 +1,4 @@
-"""A free-flyer's gripper that yields like a spring and a damper. [Fernandes2020] sec. 3.3.3 and 4.1.2."""
+"""Impedance control of a free-flyer's gripper, as a spring and a damper. [Fernandes2020] sec. 3.3.3 and 4.1.2."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Behaviour, Inputs, Outputs
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Behaviour, Inputs, Outputs
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.plain_rotation import (
@@ -75,7 +75,7 @@ class Params:
         return FlyerBody(mass=self.mass, I_B=self.I_B, p_BG=self.p_BG)
 
     def gains(self) -> ImpedanceGains:
-        """Return the gains that the behaviour means."""
+        """Return the gains of the behaviour."""
         if self.behaviour is not Behaviour.CUSTOM:
             return published_gains(self.behaviour, self.body())
         return ImpedanceGains(
@@ -90,15 +90,15 @@ class ImpedanceController:
     """u = J^T (-k_B x' + k_D x~), eq. (3.25), with x~ = x_d - x and x_d' = 0: no force sensor is needed.
 
     x is the gripper's pose. Its error is p_WG_goal - p_WG and, in place of differences of Euler angles, the rotation
-    vector of R_GD, D being the goal's frame, by the shorter way round; x' is the gripper's velocity and angular
+    vector of R_GD, D being the goal's frame, of at most half a turn; x' is the gripper's velocity and angular
     velocity. All of them and the gains are in the goal's axes, so that spring and damper are fixed to the goal, and the
     linearised loop is the same for any goal. With fixed joints J is eq. (3.11) of the base alone: with f the force in
     the brackets and tau its torque, the command is, in B, F = f and M = tau + p_BG x f. Eq. (4.3) turns generalised
     forces of Euler angles into these; with twists it is a rotation into B.
 
     At construction the loop near the goal (12 states, 18 with a lag) is closed at the period with python-control, with
-    the expected delay and lag but without saturation. Rigid and with the default lag it bears a delay of 16 ms, without
-    lag 26 ms. The period is that of Astrobee's software, 1/62.5 s; sec. 4.1.2 prints 67.5 Hz.
+    the expected delay and lag but without saturation. With the rigid gains it is stable up to a delay of 16 ms with the
+    default lag, and of 26 ms without lag.
 
     Raises:
         InvalidControllerParameters: by the constructor, for an impossible body, gains that are not positive definite,
@@ -112,10 +112,10 @@ class ImpedanceController:
         "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
-    period: ClassVar[Fraction | None] = Fraction(2, 125)
+    period: ClassVar[Fraction | None] = PERIOD
 
     def __init__(self, params: Params) -> None:
-        body, gains, period = params.body(), params.gains(), float(Fraction(2, 125))
+        body, gains, period = params.body(), params.gains(), float(PERIOD)
         faults = body.faults() + (gains.faults() if params.behaviour is Behaviour.CUSTOM else [])
         faults = faults or stability_faults(
             body, lambda factor: gains.scaled(factor).law(body), period, params.delay, params.lag

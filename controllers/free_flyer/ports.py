@@ -1,12 +1,13 @@
-"""Ports that a free-flyer's controllers share: each turns the navigation's estimate and a goal into thrust.
+"""What a free-flyer's two controllers share: ports, behaviours, sampling period and public values of Astrobee.
 
-How a free-flyer's gripper yields. [Fernandes2020] sec. 4.1.2.
-
-Public values of the free-flyer Astrobee, the robot of [Fernandes2020], and where its gripper is assumed to be.
+Each controller turns the navigation's estimate and a goal into thrust. Astrobee is the robot of [Fernandes2020]; only
+where its gripper is, is assumed.
 """
 
 import enum
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,26 @@ from handover.cosim.blocks.units import (
     Radian,
     RadianPerSecond,
 )
+
+PERIOD: Final = Fraction(2, 125)
+"""Time between two samples in s, that of Astrobee's software, 1/62.5 s; sec. 4.1.2 prints 67.5 Hz."""
+
+MASS = 9.584
+"""kg"""
+
+INERTIA = np.diag([0.1534, 0.1427, 0.1623])
+"""About the centre of mass, kg m2."""
+
+ARM = np.array([-0.30, 0.0, 0.0])
+"""Gripper seen from the centre of mass, m; assumed."""
+
+
+class Behaviour(enum.IntEnum):
+    """Gains of the impedance control, and the velocity thresholds that belong to them, sec. 4.1.2, or custom ones."""
+
+    RIGID = 0
+    COMPLIANT = 1
+    CUSTOM = 2
 
 
 @dataclass(kw_only=True)
@@ -37,7 +58,7 @@ class Inputs:
 
 @dataclass(kw_only=True)
 class Outputs:
-    """Command in B at the centre of mass, zero when not active; the gripper's error; what linear theory says."""
+    """Command in B at the centre of mass, zero when not active; the gripper's error; the linearised loop's poles."""
 
     f_cmd: Vector3[Newton] = output("commanded force, in B")
     tau_cmd: Vector3[NewtonMetre] = output("commanded torque about the centre of mass, in B")
@@ -46,21 +67,3 @@ class Outputs:
     pole_radius: Number = output("largest |z| of the linearised loop", minimum=0.0)
     damping_ratio: Number = output("least damping ratio of the linearised loop")
     pole_frequency: RadianPerSecond = output("frequency of the pole with that ratio", minimum=0.0)
-
-
-class Behaviour(enum.IntEnum):
-    """Gains of the impedance control, and with them the velocities that tell of a person: table 4.1 or one's own."""
-
-    RIGID = 0
-    COMPLIANT = 1
-    CUSTOM = 2
-
-
-MASS = 9.584
-"""kg"""
-
-INERTIA = np.diag([0.1534, 0.1427, 0.1623])
-"""About the centre of mass, kg m2."""
-
-ARM = np.array([-0.30, 0.0, 0.0])
-"""Gripper seen from the centre of mass, m; assumed."""

@@ -1,4 +1,4 @@
-"""Flies a free-flyer's gripper to a pose: the PID for getting about. [Fernandes2020] sec. 3.1.1 and 4.1.2."""
+"""Pose control of a free-flyer's gripper, by a PID along a trajectory. [Fernandes2020] sec. 3.1.1 and 4.1.2."""
 
 import pickle
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import PidGains, pid_law
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, Inputs, Outputs
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Inputs, Outputs
 from handover.controllers.free_flyer.profile import Bounds, Profile, Reference, profile_between
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
@@ -59,7 +59,7 @@ _NAME = "PoseController"
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
-    """Gains of Astrobee's public software; bounds of the way that leave half of the weakest thrust for control."""
+    """Gains of Astrobee's public software; the trajectory's bounds leave half of the weakest thrust for control."""
 
     k_P: PerSecond2 = parameter(0.6, "acceleration per position error", minimum=0.0, maximum=1e4)
     k_I: PerSecond3 = parameter(1e-4, "acceleration per integral of the position error", minimum=0.0, maximum=1e4)
@@ -67,13 +67,15 @@ class Params:
     k_P_R: PerSecond2 = parameter(4.0, "angular acceleration per attitude error", minimum=0.0, maximum=1e4)
     k_I_R: PerSecond3 = parameter(0.002, "angular acceleration per integral of that", minimum=0.0, maximum=1e4)
     k_D_R: PerSecond = parameter(3.2, "angular acceleration per rate error", minimum=0.0, maximum=1e4)
-    speed: MetrePerSecond = parameter(0.1, "largest speed on the way (assumed)", minimum=1e-3, maximum=10.0)
+    speed: MetrePerSecond = parameter(0.1, "largest speed of the trajectory (assumed)", minimum=1e-3, maximum=10.0)
     acceleration: MetrePerSecond2 = parameter(
-        0.02, "largest acceleration on the way (assumed)", minimum=1e-4, maximum=100.0
+        0.02, "largest acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0
     )
-    rate: RadianPerSecond = parameter(0.17, "largest angular speed on the way (assumed)", minimum=1e-3, maximum=10.0)
+    rate: RadianPerSecond = parameter(
+        0.17, "largest turning rate of the trajectory (assumed)", minimum=1e-3, maximum=10.0
+    )
     turning: RadianPerSecond2 = parameter(
-        0.1, "largest angular acceleration on the way (assumed)", minimum=1e-4, maximum=100.0
+        0.1, "largest angular acceleration of the trajectory (assumed)", minimum=1e-4, maximum=100.0
     )
     f_max: Vector3[Newton] = parameter(
         np.array([0.55, 0.39, 0.45]), "largest force, along the axes of B", minimum=0.0, maximum=1e4
@@ -102,7 +104,7 @@ class Params:
         return PidGains(k_P=self.k_P_R, k_I=self.k_I_R, k_D=self.k_D_R)
 
     def faults(self) -> list[str]:
-        """Return what of gains, body and bounds cannot be."""
+        """Return what is wrong with gains, body and bounds."""
         faults = self.body().faults()
         faults += self.position_gains().faults("position gains") + self.attitude_gains().faults("attitude gains")
         force, torque = self.mass * self.acceleration, self.turning * float(np.max(np.abs(self.I_B)))
@@ -120,17 +122,17 @@ class Params:
 
 
 class PoseController:
-    """Takes the gripper to a pose by a PID of the base along a way of its own, as Astrobee's mobility does.
+    """Takes the gripper to a pose by a PID of the base along a planned trajectory, as Astrobee's mobility does.
 
-    When it becomes active, and whenever the goal changes, a way (`Profile`) begins where the base is, with the velocity
-    that it has, and ends at rest where the gripper is at its goal. Along it, with e the position error in W, phi the
+    When it becomes active, and whenever the goal changes, a trajectory (`Profile`) begins where the base is, with its
+    velocity, and ends at rest where the gripper is at its goal. Along it, with e the position error in W, phi the
     rotation vector of the attitude error in B, and sums over past samples for the integrals,
 
         F = R_WB^T m (k_P e + k_I sum e T + k_D (v_ref - v) + a_ref)
         M = I_B (k_P_R phi + k_I_R sum phi T + k_D_R (w_ref - w) + dw_ref) + w x I_B w.
 
-    Both are cut at the propulsion's limits, axis by axis, and the sum of what is cut stands still meanwhile. Turned
-    off, the controller forgets sums and way.
+    Both are clipped to the propulsion's limits, axis by axis. While F is clipped, its sum is not updated, and likewise
+    that of M (anti-windup). Deactivation resets sums and trajectory.
 
     At construction the loop near the goal is closed at the period with python-control, with the expected delay and
     lag but without saturation.
@@ -147,10 +149,10 @@ class PoseController:
         "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
-    period: ClassVar[Fraction | None] = Fraction(2, 125)
+    period: ClassVar[Fraction | None] = PERIOD
 
     def __init__(self, params: Params) -> None:
-        body, self._T = params.body(), float(Fraction(2, 125))
+        body, self._T = params.body(), float(PERIOD)
         position, attitude = params.position_gains(), params.attitude_gains()
         faults = params.faults() or stability_faults(
             body,
@@ -172,10 +174,10 @@ class PoseController:
         self._bounds = Bounds(
             speed=params.speed, acceleration=params.acceleration, rate=params.rate, turning=params.turning
         )
-        self._forget()
+        self._reset()
 
     def outputs(self, t: float, u: Inputs) -> Outputs:
-        """Return the command that a step would give; the way does not begin."""
+        """Return the command that a step would give; the trajectory does not begin."""
         before = self.get_state()
         y = self.step(t, self._T, u)
         self.set_state(before)
@@ -190,12 +192,12 @@ class PoseController:
         f, tau = ZERO, ZERO
         if u.active:
             v = vector(u.v_WB_meas)
-            reference = self._way(p, v, q_WB, goal, q_goal).at(self._elapsed * self._T)
+            reference = self._profile_to(p, v, q_WB, goal, q_goal).at(self._elapsed * self._T)
             f = self._force(reference, p, v, R_WB)
             tau = self._torque(reference, q_WB, vector(u.w_WB_meas), R_WB)
             self._elapsed += 1
         elif self._profile is not None:
-            self._forget()
+            self._reset()
         return Outputs(
             f_cmd=np.array(f) if u.active else np.zeros(3),
             tau_cmd=np.array(tau) if u.active else np.zeros(3),
@@ -207,26 +209,26 @@ class PoseController:
         )
 
     def get_state(self) -> bytes:
-        """Return the way, the time on it, its goal and the sums."""
-        way = None if self._profile is None else vars(self._profile)
-        return pickle.dumps((way, self._elapsed, self._goal, self._sum_e, self._sum_phi))
+        """Return the trajectory, the samples since its start, its goal and the sums."""
+        profile = None if self._profile is None else vars(self._profile)
+        return pickle.dumps((profile, self._elapsed, self._goal, self._sum_e, self._sum_phi))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this controller or of one with equal parameters."""
-        way, self._elapsed, self._goal, self._sum_e, self._sum_phi = pickle.loads(state)
-        self._profile = None if way is None else Profile(**way)
+        """Restore a state of this controller or of one with equal parameters."""
+        profile, self._elapsed, self._goal, self._sum_e, self._sum_phi = pickle.loads(state)
+        self._profile = None if profile is None else Profile(**profile)
 
-    def _forget(self) -> None:
+    def _reset(self) -> None:
         self._profile: Profile | None = None
         self._elapsed = 0
         self._goal: tuple[Vector, Quaternion] | None = None
         self._sum_e: Vector = ZERO
         self._sum_phi: Vector = ZERO
 
-    def _way(self, p: Vector, v: Vector, q_WB: Quaternion, goal: Vector, q_goal: Quaternion) -> Profile:
-        """Return the way to the goal: the one under way, or one from here.
+    def _profile_to(self, p: Vector, v: Vector, q_WB: Quaternion, goal: Vector, q_goal: Quaternion) -> Profile:
+        """Return the trajectory to the goal: the current one, or, for another goal, one that starts here.
 
-        The sums are kept when the goal changes, since what they hold against does not change with it.
+        The sums are kept when the goal changes, since the disturbances that they compensate do not change with it.
         """
         if self._profile is not None and self._goal == (goal, q_goal):
             return self._profile
@@ -239,17 +241,17 @@ class PoseController:
         e, e_rate = subtract(reference.p, p), subtract(reference.v, v)
         a = add(self._position.acceleration(e, self._sum_e, e_rate), reference.a)
         f = inverse_rotate(R_WB, scale(self._mass, a))
-        cut = clip(f, self._f_max)
-        if cut == f:
+        clipped = clip(f, self._f_max)
+        if clipped == f:
             self._sum_e = add_scaled(self._sum_e, self._T, e)
-        return cut
+        return clipped
 
     def _torque(self, reference: Reference, q_WB: Quaternion, w_WB: Vector, R_WB: Matrix) -> Vector:
         phi, w = rotation_vector(relative_quaternion(q_WB, reference.q)), inverse_rotate(R_WB, w_WB)
         phi_rate = subtract(inverse_rotate(R_WB, reference.w), w)
         dw = add(self._attitude.acceleration(phi, self._sum_phi, phi_rate), inverse_rotate(R_WB, reference.dw))
         tau = add(multiply(self._I_B, dw), cross(w, multiply(self._I_B, w)))
-        cut = clip(tau, self._tau_max)
-        if cut == tau:
+        clipped = clip(tau, self._tau_max)
+        if clipped == tau:
             self._sum_phi = add_scaled(self._sum_phi, self._T, phi)
-        return cut
+        return clipped

@@ -1,4 +1,4 @@
-"""A free-flyer's way to a pose, within bounds of speed and acceleration."""
+"""A free-flyer's trajectory to a pose, of minimum jerk within bounds of speed and acceleration."""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _PEAK_BRAKING = 3.94  # of h(x) = x - 6 x^3 + 8 x^4 - 3 x^5, which begins with u
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Largest speed and acceleration of the way's translation (m/s, m/s2) and rotation (rad/s, rad/s2)."""
+    """Largest speed and acceleration of the trajectory's translation (m/s, m/s2) and rotation (rad/s, rad/s2)."""
 
     speed: float
     acceleration: float
@@ -87,7 +87,7 @@ class Profile:
 
 
 def profile_between(p_0: Vector, v_0: Vector, q_0: Quaternion, p_1: Vector, q_1: Quaternion, bounds: Bounds) -> Profile:
-    """Return the way from one pose, with a velocity, to rest at another."""
+    """Return the trajectory from one pose, with a velocity, to rest at another."""
     d = subtract(p_1, p_0)
     phi = rotation_vector(relative_quaternion(q_0, q_1))
     length, angle, speed = norm(d), norm(phi), norm(v_0)

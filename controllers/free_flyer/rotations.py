@@ -1,7 +1,7 @@
-"""Orientations of a free-flyer: measured quaternions, and what of rotations its controllers round in their own way.
+"""Orientations of a free-flyer: measured quaternions, and rotations as its controllers round them.
 
-`rotation_matrix` and `from_rotation_vector` give what those of `handover.cosim.blocks.plain_rotation` give but for the
-last bit. The controllers keep theirs, because a loop with noise does not forget a bit, and published runs were made
+`rotation_matrix` and `from_rotation_vector` differ from those of `handover.cosim.blocks.plain_rotation` in the last bit
+only. The controllers keep their own, because a loop with noise never forgets a bit, and the published runs were made
 with them.
 """
 
@@ -14,7 +14,7 @@ from handover.cosim.blocks.ports import Floats
 
 
 class InvalidOrientation(ValueError):
-    """A quaternion that is zero or not finite, so that it tells of no orientation; nothing has changed."""
+    """A quaternion that is zero or not finite, which is no orientation; nothing has changed."""
 
     is_refusal = True
 

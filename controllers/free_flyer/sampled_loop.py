@@ -10,8 +10,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 
-_LASTING = math.exp(-1.0)  # a pole nearer to zero, as those of a delay are, is all but gone within a sample
-_WHOLE = 1e-9  # of a period: what a delay of whole periods may be off by rounding
+_LASTING = math.exp(-1.0)  # a pole nearer to zero, such as a delay's, has decayed within a sample
+_WHOLE = 1e-9  # of a period: what a delay of whole periods may err by rounding
 
 
 @cache
@@ -49,7 +49,7 @@ def without_memory(D: Floats) -> LinearController:
 
 
 class SampledLoop:
-    """Plant, hold, delay and controller, closed: what linear theory says of them at the sampling instants.
+    """Plant, hold, delay and controller, closed: a linear system at the sampling instants.
 
     The controller measures y at multiples of the period. A command reaches the plant after the delay and is held until
     the next one does; d is held over each period.
@@ -86,7 +86,7 @@ class SampledLoop:
 
     @property
     def pole_radius(self) -> float:
-        """Largest |z|; the loop is stable if it is less than one."""
+        """Largest |z|; the loop is stable if it is less than 1."""
         return float(np.max(np.abs(self.poles)))
 
     @property

@@ -1,4 +1,4 @@
-"""Tells from a gripper's velocity that a person pulls or pushes. [Fernandes2020] sec. 3.1.2."""
+"""Detection of a person's pull or push from a gripper's velocity. [Fernandes2020] sec. 3.1.2."""
 
 import math
 
@@ -8,7 +8,7 @@ from handover.cosim.blocks.plain_rotation import Vector, lerp, norm
 class VelocityMonitor:
     """Speed of the low-passed velocity, and a threshold that counts only once the gripper was slower than it.
 
-    The components are filtered, not their norm: that would make a speed of the noise.
+    The components are filtered, not their norm, whose mean grows with the noise.
 
     Args:
         time: time constant of the filter, s; 0 for none.
@@ -29,11 +29,11 @@ class VelocityMonitor:
         self.speed = norm(v)
 
     def disarm(self) -> None:
-        """Do not let a threshold count until the gripper is slow again."""
+        """Ignore thresholds until the gripper is slower than one again."""
         self._armed = False
 
     def exceeds(self, threshold: float) -> bool:
-        """Tell whether the speed has risen above the threshold; to be asked at each measurement since `disarm`."""
+        """Return whether the speed has risen above the threshold; to be called at each measurement after `disarm`."""
         if self.speed <= threshold:
             self._armed = True
             return False
@@ -44,5 +44,5 @@ class VelocityMonitor:
         return self._v, self._armed, self.speed
 
     def set_state(self, state: tuple[Vector | None, bool, float]) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` gave."""
         self._v, self._armed, self.speed = state

@@ -1,6 +1,6 @@
-"""The ball's position from its outlines in the pictures, its radius being known.
+"""The ball's position from its outlines in two pictures, its radius being known, after [Vervloet2025] sec. 3.2.3.
 
-Finds the green ball's outline in one picture, after [Vervloet2025] sec. 3.2.3.
+`BallFinder` finds the outline of the green ball in one picture, `BallFit` the sphere that the outlines' rays touch.
 """
 
 import math
@@ -19,16 +19,16 @@ _GREEN_UNTIL = (85, 255, 255)
 _ZOOM = 2  # enlargement of a region: its outline is finer by that
 _BLUR = 1.4  # px of the enlarged region
 _COARSE = 2  # reduction of a whole picture in a search
-_NEXT = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+_NEIGHBOURHOOD = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
 _INSIDE = 0.5 / _ZOOM  # px; contours run through the middles of the outermost pixels
 _SPECK = 30.0  # px^2; smaller green patches are noise
-_SPREAD = (0.12, 0.2, 0.33)  # how far apart, in shares of the outline, three points lie that try a circle
+_SPREAD = (0.12, 0.2, 0.33)  # spacings, in shares of the outline, of the three points of a candidate circle
 _ON_CIRCLE = 0.45  # px; three standard deviations of a free edge
-_HULL = 48  # points of the hull through which circles are tried
-_TRIED = 120  # points of the outline, about, on which circles are tried
+_HULL_POINTS = 48  # points of the hull through which candidate circles go
+_SCORED_POINTS = 120  # points of the outline, about, by which candidates are scored
 _MIN_ARC = 0.22  # share of a circle that must be seen
 _SECTORS = 36
-_FEW = 12  # points; fewer are no outline
+_MIN_POINTS = 12  # fewer are no outline
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class BallOutline:
 class BallFinder:
     """Takes what is green, its contour's convex hull, and the circle on which most of the hull lies.
 
-    The thesis takes the smallest circle around the contour, which fingers before the ball shift. What hides a part of
-    a disc makes dents or chords; the hull skips the dents, and points on a chord are not on the circle.
+    The thesis takes the smallest circle around the contour, which shifts where fingers cover the ball. What hides a
+    part of a disc makes dents or chords; the hull skips the dents, and points on a chord are not on the circle.
     """
 
     def find(self, picture: Pixels, region: Region) -> BallOutline | None:
@@ -57,15 +57,15 @@ class BallFinder:
         contours = _green_contours(np.asarray(enlarged, dtype=np.uint8), _BLUR, _SPECK * _ZOOM**2)
         if not contours:
             return None
-        edge = (np.concatenate(contours) + 0.5) / _ZOOM - 0.5  # pixels' middles are whole
+        edge = (np.concatenate(contours) + 0.5) / _ZOOM - 0.5  # the centres of pixels have whole coordinates
         h, w = part.shape[:2]
         edge = (
             edge[((edge > 1.0) & (edge < np.array([w, h]) - 2.0)).all(axis=1)] + region.origin
         )  # not the region's edge
-        if len(edge) < _FEW:
+        if len(edge) < _MIN_POINTS:
             return None
         hull = np.asarray(cv2.convexHull(edge.astype(np.float32)), dtype=np.float64).reshape(-1, 2)
-        circle = _circle_of_most(_evenly(hull), edge)
+        circle = _best_circle(_evenly_spaced(hull), edge)
         return None if circle is None else _outline(edge, *circle)
 
     def search(self, picture: Pixels) -> Region:
@@ -80,16 +80,16 @@ class BallFinder:
 
 
 def _green_contours(part: Pixels, blur: float, speck: float) -> list[Floats]:
-    """Return contours, shape (n, 2) each, of the largest green patch and those that may belong to it."""
+    """Return contours, shape (n, 2) each, of the largest green patch and of those near it, parts of the same ball."""
     smooth = cv2.GaussianBlur(part, (0, 0), blur) if blur else part
     mask = cv2.inRange(cv2.cvtColor(smooth, cv2.COLOR_BGR2HSV), _GREEN_FROM, _GREEN_UNTIL)
     if blur:
         mask = cv2.bitwise_and(mask, _half_as_green(np.asarray(smooth, dtype=np.uint8)))
-    found, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    patches = sorted(((cv2.contourArea(c), i) for i, c in enumerate(found)), reverse=True)
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    patches = sorted(((cv2.contourArea(c), i) for i, c in enumerate(outlines)), reverse=True)
     if not patches or patches[0][0] < speck:
         return []
-    contours = [np.asarray(found[i], dtype=np.float64).reshape(-1, 2) for area, i in patches if area >= speck]
+    contours = [np.asarray(outlines[i], dtype=np.float64).reshape(-1, 2) for area, i in patches if area >= speck]
     middle, reach = contours[0].mean(axis=0), 3.0 * np.sqrt(patches[0][0])
     return [c for c in contours if np.linalg.norm(c.mean(axis=0) - middle) < reach]
 
@@ -98,20 +98,20 @@ def _half_as_green(part: Pixels) -> Pixels:
     """Return a mask of what is at least half as green as what is next to it: its edge, in any light, on any ground."""
     blue, green, red = cv2.split(part)
     over = cv2.subtract(green, cv2.max(blue, red))
-    around = cv2.dilate(over, _NEXT)
+    around = cv2.dilate(over, _NEIGHBOURHOOD)
     return np.asarray(cv2.compare(over, cv2.convertScaleAbs(around, alpha=0.5), cv2.CMP_GE), dtype=np.uint8)
 
 
-def _evenly(hull: Floats) -> Floats:
-    """Return points, shape (48, 2), evenly spaced along the hull's sides."""
+def _evenly_spaced(hull: Floats) -> Floats:
+    """Return points, shape (48, 2), at equal distances along the hull's sides."""
     closed = np.concatenate([hull, hull[:1]])
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
-    at = np.arange(_HULL) * float(length[-1]) / _HULL
+    at = np.arange(_HULL_POINTS) * float(length[-1]) / _HULL_POINTS
     x, y = (np.interp(at, length, closed[:, i]) for i in (0, 1))
     return np.column_stack([x, y])
 
 
-def _circle_of_most(hull: Floats, edge: Floats) -> tuple[Floats, float] | None:
+def _best_circle(hull: Floats, edge: Floats) -> tuple[Floats, float] | None:
     """Return centre and radius of the circle through three points of the hull that has most of the edge on it."""
     n = len(hull)
     first = np.arange(n)
@@ -127,7 +127,7 @@ def _circle_of_most(hull: Floats, edge: Floats) -> tuple[Floats, float] | None:
     pp, qq = np.einsum("ij,ij->i", p, p), np.einsum("ij,ij->i", q, q)
     shift = np.column_stack([q[:, 1] * pp - p[:, 1] * qq, p[:, 0] * qq - q[:, 0] * pp]) / (2.0 * cross)[:, None]
     centre, radius = a + shift, np.linalg.norm(shift, axis=1)
-    some = edge[:: 1 + len(edge) // _TRIED]
+    some = edge[:: 1 + len(edge) // _SCORED_POINTS]
     x, y = (some[:, i] - centre[:, i : i + 1] for i in (0, 1))
     distance = np.sqrt(x * x + y * y) - radius[:, None]
     score = (np.abs(distance) < _ON_CIRCLE).sum(axis=1) - 2 * (distance > 3.0 * _ON_CIRCLE).sum(axis=1)
@@ -139,7 +139,7 @@ def _outline(edge: Floats, centre: Floats, radius: float) -> BallOutline | None:
     """Return the points on the circle, after fitting it to them twice; None if too little of the circle is seen."""
     on = _on_circle(edge, centre, radius)
     for _ in range(2):
-        if len(on) < _FEW:
+        if len(on) < _MIN_POINTS:
             return None
         d = on - centre
         A = np.column_stack([2.0 * d, np.ones(len(d))])
@@ -176,8 +176,8 @@ class BallFit:
     """Least squares on the distances between the rays of the outlines and the sphere, which they touch.
 
     A ray from a camera at C in direction d touches the sphere if |(p_WO - p_WC) x d| = r. Blur and thresholds move the
-    whole edge in or out; so its shift, in px, is estimated too. That leaves what two cameras see to the angle between
-    them; what one camera sees has a depth from its size, as uncertain as the shift makes it.
+    whole edge in or out; so its shift, in px, is estimated too. Seen by two cameras, the ball's depth then comes from
+    the angle between them; seen by one, from its size, as uncertain as the shift makes it.
 
     Args:
         rig: the cameras.
@@ -200,18 +200,18 @@ class BallFit:
         Where the pictures contradict each other, the one with more of the outline counts.
         """
         if left and right:
-            start, gap = self._rig.meeting_point(left.centre, right.centre)
+            start, gap = self._rig.triangulate(left.centre, right.centre)
             if gap <= self._gap and min(float(c.depth(start)) for c in self._rig.cameras) > 0.0:
-                return self._settle([left, right], self._rig.cameras, start)
+                return self._solve([left, right], self._rig.cameras, start)
             left, right = (left, None) if left.arc >= right.arc else (None, right)
         for outline, camera in ((left, self._rig.left), (right, self._rig.right)):
             if outline:
                 d = camera.rays(outline.centre[None])[0]
                 f = float(camera.f.mean())
-                return self._settle([outline], [camera], camera.p_WC + d * self._radius * f / outline.radius)
+                return self._solve([outline], [camera], camera.p_WC + d * self._radius * f / outline.radius)
         return None
 
-    def _settle(self, outlines: Sequence[BallOutline], cameras: Sequence[Pinhole], p_WO: Floats) -> BallPosition | None:
+    def _solve(self, outlines: Sequence[BallOutline], cameras: Sequence[Pinhole], p_WO: Floats) -> BallPosition | None:
         rays = [c.rays(o.points) for o, c in zip(outlines, cameras, strict=True)]
         mean, deviation = self._shift
         shift = mean

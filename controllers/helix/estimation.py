@@ -1,6 +1,7 @@
-"""Kalman filter of a position that is expected to stay where it is. [Vervloet2025] eqs. (14)-(15).
+"""The visual servo's estimates: filtered positions, and the state that explains a measured pose.
 
-The state nearest to the commanded one that explains the measured pose. [Vervloet2025] eq. (16).
+`PositionFilter` is a Kalman filter, [Vervloet2025] eqs. (14)-(15), of a position that is expected to stay where it is.
+`optimise_state` finds the state nearest to the commanded one that explains the measured pose, eq. (16).
 """
 
 import math
@@ -13,7 +14,7 @@ from handover.cosim.blocks.ports import Floats
 
 
 class InvalidMeasurement(ValueError):
-    """A measurement that is said to be seen holds numbers that are not finite."""
+    """A measurement that is marked as seen holds numbers that are not finite."""
 
     def __init__(self, X_new: Floats) -> None:
         super().__init__(f"measurement {X_new.tolist()} is not finite; clear its `seen` flag where nothing is seen")
@@ -62,7 +63,7 @@ class PositionFilter:
         return self.position, self.covariance, self.seen
 
     def set_state(self, state: tuple[Floats, Floats, bool]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` gave."""
         self.position, self.covariance, self.seen = state
 
 
@@ -111,6 +112,7 @@ def optimise_state(
 
 
 def _ratio(step: Floats, last: Floats) -> float:
+    """Return the ratio of successive steps, within the bounds for which their series converges."""
     return min(_MAX_RATIO, max(-_MAX_RATIO, float(step @ last) / float(last @ last)))
 
 
@@ -125,10 +127,10 @@ def _nearest_in_ball(B: Floats, r: Floats, bound: float) -> Floats:
         return np.zeros(9)
     lam, V = np.linalg.eigh(B @ np.transpose(B))
     rho = r @ V
-    reach = lam > 1e-9 * lam[-1]
-    lam = np.where(reach, lam, 0.0)
-    if math.sqrt(float(np.sum(rho[~reach] ** 2))) >= 0.99 * bound:
-        return -(V @ (rho * reach / np.where(reach, lam, 1.0))) @ B
+    reachable = lam > 1e-9 * lam[-1]
+    lam = np.where(reachable, lam, 0.0)
+    if math.sqrt(float(np.sum(rho[~reachable] ** 2))) >= 0.99 * bound:
+        return -(V @ (rho * reachable / np.where(reachable, lam, 1.0))) @ B
     nu = 0.0
     for _ in range(_MAX_NEWTON_STEPS):
         shrink = 1.0 / (1.0 + nu * lam)

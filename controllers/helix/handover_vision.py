@@ -100,7 +100,7 @@ class HandoverVision:
     """Measures ball, wrist and gripper: p_WG = p_WR + d_gripper z_R, eqs. (12)-(13).
 
     The ball is what is green and round; the wrist is the pose that best explains all marker corners in both pictures.
-    Either is looked for where it was last, and everywhere if it is not there. One camera is enough for both, at a
+    Either is searched for where it was last, and everywhere if it is not there. One camera is enough for both, at a
     larger covariance.
 
     The state is the last measurement, and whether it is fresh.
@@ -167,12 +167,12 @@ class HandoverVision:
         return pickle.dumps((self._p_WO, self._wrist, self._p_WG, self._fresh_O, self._fresh_R))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` gave."""
         self._p_WO, self._wrist, self._p_WG, self._fresh_O, self._fresh_R = pickle.loads(state)
 
     def _find_ball(self, pictures: tuple[Pixels, Pixels]) -> BallPosition | None:
         if self._fresh_O:
-            found = self._ball_fit.fit(
+            ball = self._ball_fit.fit(
                 *self._outlines(
                     pictures,
                     [
@@ -181,8 +181,8 @@ class HandoverVision:
                     ],
                 )
             )
-            if found:
-                return found
+            if ball:
+                return ball
         return self._ball_fit.fit(*self._outlines(pictures, [self._finder.search(p) for p in pictures]))
 
     def _outlines(
@@ -205,9 +205,9 @@ class HandoverVision:
                 for camera, picture in zip(self._rig.cameras, pictures, strict=True)
             ]
             seen = [self._reader.read(p, r) for p, r in zip(pictures, regions, strict=True)]
-            found = self._ring_fit.fit(seen, self._wrist)
-            if found:
-                return found
+            pose = self._ring_fit.fit(seen, self._wrist)
+            if pose:
+                return pose
         return self._ring_fit.fit([self._reader.read(p, self._reader.search(p)) for p in pictures], None)
 
     def _covariances(self, pose: RingPose) -> tuple[Floats, Floats]:

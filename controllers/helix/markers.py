@@ -1,7 +1,4 @@
-"""Finds fiducial markers in a picture and the pixels of their corners, after [Vervloet2025] sec. 3.2.4.
-
-Where the corners of the wrist's markers are, after [Vervloet2025] sec. 3.2.4.
-"""
+"""The wrist's ring of fiducial markers, and how markers are found in a picture, after [Vervloet2025] sec. 3.2.4."""
 
 from dataclasses import dataclass
 
@@ -13,6 +10,9 @@ from handover.controllers.helix.stereo import Pixels, Region
 from handover.cosim.blocks.ports import Floats
 
 SIDES = 8
+
+_ZOOM = 3  # enlargement of a region; corners of enlarged markers come out twice as exact
+_NEAR = 5.0  # marker sides around the largest marker found; the ring is smaller than that
 
 
 class MarkerRing:
@@ -41,13 +41,9 @@ class MarkerRing:
         self.outline = (apothem * z_RM[:, None] + half * flat[:, [0, 3]]).reshape(-1, 3)
 
 
-_ZOOM = 3  # enlargement of a region; corners of enlarged markers come out twice as exact
-_NEAR = 5.0  # marker sides around the largest marker found; the ring is smaller than that
-
-
 @dataclass(frozen=True)
 class Markers:
-    """Numbers, shape (n,), each once, and corners, shape (n, 4, 2), in px, in the order in which they are printed."""
+    """Numbers, shape (n,), each once, and corners, shape (n, 4, 2), in px, in the order of `MarkerRing.corners`."""
 
     ids: NDArray[np.int64]
     corners: Floats
@@ -75,20 +71,20 @@ class MarkerReader:
             return NO_MARKERS
         gray = cv2.cvtColor(region.of(picture), cv2.COLOR_BGR2GRAY)
         enlarged = np.asarray(cv2.resize(gray, None, fx=_ZOOM, fy=_ZOOM, interpolation=cv2.INTER_CUBIC), np.uint8)
-        found = _read(self._fine, enlarged)
-        corners = (found.corners + 0.5) / _ZOOM - 0.5 + region.origin  # pixels' middles are whole
+        markers = _read(self._fine, enlarged)
+        corners = (markers.corners + 0.5) / _ZOOM - 0.5 + region.origin  # the centres of pixels have whole coordinates
         outwards = corners - corners.mean(axis=1, keepdims=True)
-        return Markers(found.ids, corners + self._shift * outwards / np.linalg.norm(outwards, axis=2, keepdims=True))
+        return Markers(markers.ids, corners + self._shift * outwards / np.linalg.norm(outwards, axis=2, keepdims=True))
 
     def search(self, picture: Pixels) -> Region:
         """Return the region of a picture around the largest marker in it that holds a whole ring; empty if none."""
         gray = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        found = _read(self._coarse, gray)
-        if not len(found.ids):
+        markers = _read(self._coarse, gray)
+        if not len(markers.ids):
             return Region(0, 0, 0, 0)
-        sides = np.linalg.norm(found.corners - np.roll(found.corners, 1, axis=1), axis=2).max(axis=1)
+        sides = np.linalg.norm(markers.corners - np.roll(markers.corners, 1, axis=1), axis=2).max(axis=1)
         largest = int(np.argmax(sides))
-        return Region.around(found.corners[largest], _NEAR * float(sides[largest]), picture)
+        return Region.around(markers.corners[largest], _NEAR * float(sides[largest]), picture)
 
 
 def _read(detector: cv2.aruco.ArucoDetector, gray: Pixels) -> Markers:
@@ -97,7 +93,7 @@ def _read(detector: cv2.aruco.ArucoDetector, gray: Pixels) -> Markers:
         return NO_MARKERS
     ids = np.asarray(numbers, dtype=np.int64).ravel()
     corners = np.asarray(quads, dtype=np.float64).reshape(-1, 4, 2)
-    once = (ids < SIDES) & (np.bincount(ids, minlength=SIDES)[ids] == 1)  # a number seen twice tells nothing
+    once = (ids < SIDES) & (np.bincount(ids, minlength=SIDES)[ids] == 1)  # a number seen twice is ambiguous
     order = np.argsort(ids[once])
     return Markers(ids[once][order], corners[once][order])
 

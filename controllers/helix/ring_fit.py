@@ -34,11 +34,12 @@ class RingPose:
 class RingFit:
     """Gauss-Newton on the distances, in px, between seen corners and where the pose puts them.
 
-    The thesis averages the poses of single markers; one fit to everything is some thirty times as exact.
+    The thesis averages the poses of single markers. We fit one pose to all corners, because that is some thirty times
+    as accurate.
 
     Args:
         ring: the markers.
-        cameras: that look at it.
+        cameras: that see it.
         tolerance: largest RMS distance of a marker's corners, per axis, in px; markers beyond it are left out.
     """
 
@@ -52,11 +53,11 @@ class RingFit:
 
         Args:
             seen: the markers in each camera's picture.
-            near: p_WR and R_WR of a moment ago, or None. Without it one marker alone does not do: its pose is twofold.
+            near: p_WR and R_WR of a moment ago, or None. Without it one marker is not enough: its pose is ambiguous.
         """
         enough = 1 if near else 2
         while sum(len(m.ids) for m in seen) >= enough:
-            pose = self._settle(seen, near or self._guess(seen))
+            pose = self._solve(seen, near or self._guess(seen))
             if pose is None:
                 return None
             worst, camera, marker = self._worst(seen, pose)
@@ -65,7 +66,7 @@ class RingFit:
             seen = [_without(m, marker) if i == camera else m for i, m in enumerate(seen)]
         return None
 
-    def _settle(self, seen: Sequence[Markers], start: tuple[Floats, Floats]) -> RingPose | None:
+    def _solve(self, seen: Sequence[Markers], start: tuple[Floats, Floats]) -> RingPose | None:
         pose = start
         for _ in range(_ITERATIONS):
             e, J = self._misfit(seen, *pose)
@@ -101,7 +102,7 @@ class RingFit:
         return float(by_marker[worst]), *owner[worst]
 
     def _faces(self, seen: Sequence[Markers], pose: RingPose) -> bool:
-        """Say whether every marker shows its face to the camera that sees it."""
+        """Return whether every marker shows its face to the camera that sees it."""
         for camera, markers in zip(self._cameras, seen, strict=True):
             middle = self._ring.corners[markers.ids].mean(axis=1)
             outwards = middle @ np.transpose(pose.R_WR)

@@ -22,15 +22,14 @@ class InvalidServoParameters(InvalidParameters):
 class Params:
     """Values of appendix A and eq. (11); a description that says own choice gives the stated value after it, if any.
 
-    The estimate lies epsilon_pose_bound off the measurement, on the command's side. A Jacobian loop that is made to
-    go on by a smaller epsilon_control takes that back from the command, period by period. So the command does not
-    wind up while slack tendons hide it from the arm, but the loop stalls where the error falls to
-    epsilon_pose_bound / alpha: the stated 0.005 m with alpha = 0.1 stalls at the stated threshold, 0.05 m. As
-    stated, epsilon_control is the same, so that the last digits decide whether the loop goes on, and with alpha =
-    0.1 how many steps it takes. Lengths weigh more than stated in the estimate, since a metre is a lot more than a
-    radian: equal weights explain a sagging arm by segments of half their length. The wrist filter lags by about
-    three control periods, so with alpha = 0.4 the arm still moves when the filtered error first is small: hence
-    settle_steps.
+    The estimate lies epsilon_pose_bound off the measurement, on the command's side. A Jacobian loop that a smaller
+    epsilon_control keeps iterating takes that offset back from the command, period by period. So the command does not
+    wind up while slack tendons keep it from the arm, but the loop stalls where the error falls to epsilon_pose_bound /
+    alpha: the stated 0.005 m with alpha = 0.1 stalls at the stated threshold, 0.05 m. As stated, epsilon_control is the
+    same, so that the last digits decide whether the loop continues, and with alpha = 0.1 how many steps it takes.
+    Lengths weigh more than stated in the estimate, since a metre is a lot more than a radian: equal weights explain a
+    sagging arm by segments of half their length. The wrist filter lags by about three control periods, so with alpha =
+    0.4 the arm still moves when the filtered error first is small: hence settle_steps.
     """
 
     control_period: Second = parameter(
@@ -72,7 +71,7 @@ class Params:
         4, "control steps in a row below threshold_grasp before the gripper closes (own choice; 1)", minimum=1
     )
     threshold_retreat: Metre = parameter(
-        0.16, "error at which the arm, coming down, goes back above the ball (own choice)", minimum=0.0
+        0.16, "error at which the arm, coming down, returns above the ball (own choice)", minimum=0.0
     )
     d_grasp_offset: Metre = parameter(0.05, "height of the first goal above the ball", minimum=0.0)
     closing_time: Second = parameter(10.0, "time that the gripper is given to close", minimum=0.0)
@@ -138,7 +137,7 @@ class Params:
         if self.threshold_retreat <= after_switch:
             faults.append(
                 f"threshold_retreat = {self.threshold_retreat} must exceed threshold + sqrt(2) d_grasp_offset = "
-                f"{after_switch:.4g}, the largest error when the goal changes to the ball, or the arm goes up at once"
+                f"{after_switch:.4g}, the largest error when the goal changes to the ball, or the arm rises at once"
             )
         if self.threshold_retreat <= self.threshold_grasp:
             faults.append(

@@ -1,9 +1,4 @@
-"""Two calibrated cameras, and where what both see lies in space, after [Vervloet2025] sec. 3.2.2.
-
-A rectangle of a picture in which something is looked for.
-
-One step of linear least squares on few unknowns.
-"""
+"""Two calibrated cameras, regions of their pictures, and least squares, after [Vervloet2025] sec. 3.2.2."""
 
 from dataclasses import dataclass
 
@@ -12,6 +7,9 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
+
+Pixels = NDArray[np.uint8]
+"""A picture, shape (h, w, 3), blue, green, red, or one channel, shape (h, w)."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +24,8 @@ class StereoRig:
         """Both cameras, the left one first."""
         return self.left, self.right
 
-    def meeting_point(self, pixel_left: Floats, pixel_right: Floats) -> tuple[Floats, float]:
-        """Return the point p_WP, shape (3,), closest to the rays of two pixels, shape (2,), and the rays' distance.
+    def triangulate(self, pixel_left: Floats, pixel_right: Floats) -> tuple[Floats, float]:
+        """Return the point p_WP, shape (3,), nearest to the rays of two pixels, shape (2,), and the rays' distance.
 
         It is the middle of the shortest line between the rays. NaN if the rays are parallel.
         """
@@ -41,10 +39,6 @@ class StereoRig:
         t = np.cross(b - a, d) @ normal / squared
         on_left, on_right = a + s * d, b + t * e
         return 0.5 * (on_left + on_right), float(np.linalg.norm(on_left - on_right))
-
-
-Pixels = NDArray[np.uint8]
-"""A picture, shape (h, w, 3), blue, green, red, or one channel, shape (h, w)."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +67,7 @@ class Region:
 
     @property
     def empty(self) -> bool:
-        """Whether there is nothing worth looking at."""
+        """Whether it is too small to find anything in it."""
         return self.x1 - self.x0 < 8 or self.y1 - self.y0 < 8
 
     @property
@@ -89,7 +83,7 @@ class Region:
 def least_squares(J: Floats, e: Floats) -> tuple[Floats, Floats]:
     """Return x, shape (n,), that minimises |e - J x|, and J^T J, shape (n, n), of J, shape (m, n), and e, shape (m,).
 
-    The sums go without BLAS: its threads cost more than they save on a few hundred rows, and their number would show in
+    The sums avoid BLAS: its threads cost more than they save on a few hundred rows, and their number would show in
     the last digits.
 
     Raises:

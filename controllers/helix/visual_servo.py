@@ -21,7 +21,7 @@ __all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "Vi
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1), for both points of a pose
 _UP = np.array([0.0, 0.0, 1.0])
-_SAME_TIME = 1e-9  # s, what a host may lose by adding up steps
+_SAME_TIME = 1e-9  # s; rounding of a time that a host adds up from steps
 
 
 class Phase(enum.IntEnum):
@@ -37,7 +37,7 @@ class Phase(enum.IntEnum):
 
 @dataclass(kw_only=True)
 class Inputs:
-    """Measurements, in W; one that is not seen is not looked at."""
+    """Measurements, in W; one that is not seen is ignored."""
 
     p_WO_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the ball")
     p_WR_meas: Vector3[Metre] = port(np.zeros(3), "measured position of the wrist")
@@ -67,19 +67,19 @@ class Outputs:
 class VisualServo:
     """Algorithm 3: filter, estimate the state (eq. 16), step towards the goal (algorithm 1), close when it is reached.
 
-    Inputs are looked at, and the command is updated, once in each control_period, at the beginning of a step; between,
+    Inputs are read, and the command is updated, once in each control_period, at the beginning of a step; between,
     the outputs are held. A longer step is one control period. The goal pose has the gripper pointing down, at the ball
     or (APPROACH) d_grasp_offset above it: X_goal = [p_WG_goal + d_gripper z, p_WG_goal]. The error is the norm |X_goal
     - X_meas| over all six coordinates, in m, where the source prints its square and compares it with metres.
 
-    Own additions: the command is held while the ring is not seen, since there is nothing to close the loop with; an
+    Own additions: the command is held while the ring is not seen, since there is no feedback; an
     error above threshold_retreat in DESCEND (the ball was moved) leads back to APPROACH; an error that makes no
     progress leads to GIVEN_UP, which does not close. GRASP, HOLD and GIVEN_UP hold the command, and have the ball as
     goal. The mount, B, is at the origin of W.
 
     Raises:
         InvalidServoParameters: values that contradict each other or are out of range; all faults are named.
-        InvalidMeasurement: a measurement that is said to be seen is not finite.
+        InvalidMeasurement: a measurement that is marked as seen is not finite.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -136,6 +136,22 @@ class VisualServo:
             self._move()
         return self.outputs(t + dt, u)
 
+    def get_state(self) -> bytes:
+        """Return filters, states, phase and counters."""
+        filters = [f.get_state() for f in (self._ball, self._wrist, self._direction)]
+        counters = (self._t_next, self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best)
+        return pickle.dumps((filters, self._q_sys, self._q_est, int(self._phase), counters))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state that `get_state` gave."""
+        saved: Any = pickle.loads(state)
+        filters, self._q_sys, self._q_est, phase, counters = saved
+        for f, s in zip((self._ball, self._wrist, self._direction), filters, strict=True):
+            f.set_state(s)
+        self._phase = Phase(phase)
+        self._t_next, *counters = counters
+        self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best = counters
+
     def _filter(self, u: Inputs) -> None:
         p = self.params
         for f in (self._ball, self._wrist, self._direction):
@@ -172,7 +188,7 @@ class VisualServo:
         if self._settled >= p.settle_steps:
             self._t_close = t
             self._enter(Phase.GRASP)
-        elif self._phase in (Phase.APPROACH, Phase.DESCEND) and not self._worth_trying(error):
+        elif self._phase in (Phase.APPROACH, Phase.DESCEND) and not self._makes_progress(error):
             self._enter(Phase.GIVEN_UP)
 
     def _move(self) -> None:
@@ -206,34 +222,18 @@ class VisualServo:
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
-        self._forget_progress()
+        self._reset_progress()
 
-    def _forget_progress(self) -> None:
+    def _reset_progress(self) -> None:
         self._stalled, self._best, self._p_WO_best = 0, math.inf, self._ball.position
 
-    def _worth_trying(self, error: float) -> bool:
-        """Count steps, and steps without progress towards the ball where it is."""
+    def _makes_progress(self, error: float) -> bool:
+        """Count the step and what it gained; return whether to go on. A ball that has moved restarts the count."""
         p, moved = self.params, self._ball.position - self._p_WO_best
         if math.sqrt(moved @ moved) > p.threshold:
-            self._forget_progress()
+            self._reset_progress()
         self._steps += 1
         self._stalled += 1
         if error < self._best - p.progress:
             self._stalled, self._best, self._p_WO_best = 0, error, self._ball.position
         return self._stalled < p.patience and self._steps <= p.max_steps
-
-    def get_state(self) -> bytes:
-        """Return filters, states, phase and counters."""
-        filters = [f.get_state() for f in (self._ball, self._wrist, self._direction)]
-        counters = (self._t_next, self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best)
-        return pickle.dumps((filters, self._q_sys, self._q_est, int(self._phase), counters))
-
-    def set_state(self, state: bytes) -> None:
-        """Go back to a state that `get_state` gave."""
-        saved: Any = pickle.loads(state)
-        filters, self._q_sys, self._q_est, phase, counters = saved
-        for f, s in zip((self._ball, self._wrist, self._direction), filters, strict=True):
-            f.set_state(s)
-        self._phase = Phase(phase)
-        self._t_next, *counters = counters
-        self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best = counters

@@ -1,6 +1,4 @@
-"""The descent of the cost step by step: Jacobian, steps, best pose, progress. [Luberto] algorithm 1, steps 7 to 10.
-
-Gauss-Newton on residuals that only moves can tell. [Luberto] eqs. (4) to (10).
+"""Gauss-Newton descent of the grasp's cost on residuals that only moves can measure. [Luberto] eqs. (4) to (10).
 
 The control inputs are x = [p_x, p_y, yaw, sigma] (m, m, rad, 1), of different units, and there are fewer residuals r
 (m) than inputs. So the step depends on what a unit of each input is worth: x = S z with S = diag(scale) is declared,
@@ -99,7 +97,7 @@ def bounded_step(
 
 
 class Verdict(enum.Enum):
-    """What follows a step: closing, for three reasons; going back to the best pose; probing anew; the next step."""
+    """What follows a step: closing, for three reasons; return to the best pose; new probing; the next step."""
 
     REACHED = 0
     STALLED = 1
@@ -110,10 +108,10 @@ class Verdict(enum.Enum):
 
 
 class Descent:
-    """Follows residuals r(x), measured at rest, down to the threshold of the cost f = 1/2 r^T r.
+    """Reduces the cost f = 1/2 r^T r of residuals r(x), measured at rest, to the threshold: algorithm 1, steps 7 to 10.
 
-    A step that does not take off the part `progress` of the least cost so far is counted, and `stalled_steps` of them
-    in a row end the descent. One that raises the cost is taken back, and alpha halved until a step lowers it.
+    A step that does not reduce the least cost so far by the share `progress` is counted, and `stalled_steps` of them
+    in a row end the descent. One that raises the cost is undone, and alpha halved until a step lowers it.
 
     Attributes:
         steps: Gauss-Newton steps made.
@@ -127,7 +125,7 @@ class Descent:
         self._high = np.array([*(pregrasp[:3] + p.reach), p.sigma_limit])
         self.steps = 0
         self.best: X = ()
-        self._least = math.inf
+        self._min_cost = math.inf
         self._jacobian: Floats = np.zeros((0, 4))
         self._x: Floats = np.zeros(4)
         self._r: Floats = np.zeros(0)
@@ -146,8 +144,8 @@ class Descent:
     def measure(self, x: X, r: Floats, command: X) -> None:
         """Take residuals r measured at inputs x under a command."""
         self._x, self._r = np.array(x), r
-        if cost(r) < self._least:
-            self._least, self.best = cost(r), command
+        if cost(r) < self._min_cost:
+            self._min_cost, self.best = cost(r), command
 
     def probed(self, jacobian: Floats) -> None:
         """Take a Jacobian that was probed where the last measurement is."""
@@ -169,8 +167,8 @@ class Descent:
         return tuple(goal.tolist())
 
     def judge(self, x: X, r: Floats, command: X) -> Verdict:
-        """Count a step that led to residuals r at inputs x, update the Jacobian by it, and say what follows."""
-        p, f, before = self._params, cost(r), self._least
+        """Count a step that led to residuals r at inputs x, update the Jacobian by it, and return what follows."""
+        p, f, before = self._params, cost(r), self._min_cost
         if not p.literal:
             self._jacobian = broyden_update(self._jacobian, np.array(x) - self._x, r - self._r, p.scale)
         self.measure(x, r, command)
@@ -191,11 +189,11 @@ class Descent:
     def get_state(self) -> tuple[tuple[int, int, int], tuple[float, float, X], tuple[Floats, Floats, Floats]]:
         """Return counters, alpha's factor, the best pose, and the linear approximation."""
         counters = (self.steps, self._stalled, self._since_probing)
-        return counters, (self._trust, self._least, self.best), (self._jacobian, self._x, self._r)
+        return counters, (self._trust, self._min_cost, self.best), (self._jacobian, self._x, self._r)
 
     def set_state(
         self, state: tuple[tuple[int, int, int], tuple[float, float, X], tuple[Floats, Floats, Floats]]
     ) -> None:
-        """Go back to a state that `get_state` gave."""
-        counters, (self._trust, self._least, self.best), (self._jacobian, self._x, self._r) = state
+        """Restore a state that `get_state` gave."""
+        counters, (self._trust, self._min_cost, self.best), (self._jacobian, self._x, self._r) = state
         self.steps, self._stalled, self._since_probing = counters

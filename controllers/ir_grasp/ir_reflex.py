@@ -58,8 +58,8 @@ class Phase(enum.IntEnum):
 class Stop(enum.IntEnum):
     """Why the refinement ended.
 
-    The cost is small, steps or recoveries are used up, there is no progress, no finger sees the object, or none of it
-    was wanted.
+    The cost is small, steps or recoveries are used up, there is no progress, no finger sees the object, or the strategy
+    has no refinement.
     """
 
     RUNNING = 0
@@ -76,7 +76,7 @@ _STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdic
 
 @dataclass(kw_only=True)
 class Inputs:
-    """What the hand's sensors and the encoders of arm and motor say."""
+    """What the hand's sensors and the encoders of arm and motor measure."""
 
     ticks: Vector3[Tick] = port(np.zeros(3), "reading of the thumb's, index's and ring's sensor")
     p_WH: Vector2[Metre] = port(np.zeros(2), "wrist, in the world")
@@ -86,7 +86,7 @@ class Inputs:
 
 @dataclass(kw_only=True)
 class Outputs:
-    """Commands, and what the controller makes of its sensors at this instant."""
+    """Commands, and what the controller concludes from its sensors at this instant."""
 
     p_WH_cmd: Vector2[Metre] = output("commanded wrist, in the world")
     yaw_cmd: Radian = output("commanded heading of the hand")
@@ -100,17 +100,17 @@ class Outputs:
 
 
 class IrReflex:
-    """Algorithm 1 as a machine of phases: probe the Jacobian (eq. 7), step by Gauss-Newton (eqs. 9, 10), close.
+    """Algorithm 1 as a state machine: probe the Jacobian (eq. 7), step by Gauss-Newton (eqs. 9, 10), close.
 
     Control inputs are x = [p_x, p_y, yaw, sigma], the planar part of the source's seven. A phase ends when the encoders
     have come to the command (or time is up); it is judged by the mean of some scans at rest.
 
-    - REACH: to the pre-grasp pose. Then BLIND closes at once and FORWARD after going forward_distance ahead.
+    - REACH: to the pre-grasp pose. Then BLIND closes immediately and FORWARD after going forward_distance ahead.
     - CHECK: all fingers see the object: PROBE. None does: APPROACH. Some do: RECOVER (see `Recovery`). A finger that is
       not in the cost is given two closing motions to see, and no more: it may lag behind however long.
     - PROBE: each input in turn, and back, by its probing move, be it beyond the reach. Every probe_every steps;
       between, Broyden's update of J.
-    - STEP: x + alpha dx within max_step and the reach. A step that raises f is taken back and alpha halved.
+    - STEP: x + alpha dx within max_step and the reach. A step that raises f is undone and alpha halved.
     - CLOSE: when f is at most the threshold, or at the best pose if steps, recoveries or progress end (`Stop`). A
       hand whose recoveries end with the object out of sight closes where it is: it may have pushed the object along.
     - PULL, SHAKE, DONE: pull_distance back, then a sine across.
@@ -144,7 +144,7 @@ class IrReflex:
         self._stop = Stop.RUNNING
         self._recoveries, self._closings, self._shaken = 0, 0, 0
         pregrasp = (*p.p_WH_pregrasp.tolist(), p.yaw_pregrasp, p.sigma_pregrasp)
-        self._go(Phase.REACH, pregrasp, 0, p.travel_time)
+        self._start(Phase.REACH, pregrasp, 0, p.travel_time)
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command in force and what the sensors say; no time passes."""
@@ -164,7 +164,7 @@ class IrReflex:
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        """Go on with the move under way; when it is over, decide on the next one by its reading."""
+        """Continue the current move; when it is over, decide on the next one by its reading."""
         _check_inputs(u)
         if self._phase is Phase.SHAKE:
             self._shake()
@@ -174,16 +174,29 @@ class IrReflex:
                 self._decide(reading)
         return self.outputs(t + dt, u)
 
+    def get_state(self) -> bytes:
+        """Return phase, move, recovery, probing, descent and counters."""
+        parts = [part.get_state() for part in (self._move, self._recovery, self._probing, self._descent)]
+        counters = (self._recoveries, self._closings, self._shaken)
+        return pickle.dumps((int(self._phase), int(self._stop), parts, counters))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state that `get_state` gave."""
+        phase, stop, parts, (self._recoveries, self._closings, self._shaken) = pickle.loads(state)
+        self._phase, self._stop = Phase(phase), Stop(stop)
+        for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
+            part.set_state(saved)
+
     def _decide(self, reading: Reading) -> None:
         p = self.params
         if self._phase is Phase.REACH and p.strategy is Strategy.FORWARD:
-            self._go(Phase.APPROACH, self._ahead(p.forward_distance), 0, p.travel_time)
+            self._start(Phase.APPROACH, self._ahead(p.forward_distance), 0, p.travel_time)
         elif self._phase is Phase.REACH and p.strategy is Strategy.BLIND:
             self._close(Stop.BLIND)
         elif self._phase is Phase.APPROACH and p.strategy is Strategy.FORWARD:
             self._close(Stop.FORWARD)
         elif self._phase in (Phase.REACH, Phase.APPROACH, Phase.RECOVER):
-            self._go(Phase.CHECK, self._move.goal, p.scans)
+            self._start(Phase.CHECK, self._move.goal, p.scans)
         elif self._phase is Phase.CHECK:
             self._check(reading)
         elif self._phase is Phase.PROBE:
@@ -191,7 +204,7 @@ class IrReflex:
         elif self._phase is Phase.STEP:
             self._judge(reading)
         elif self._phase is Phase.CLOSE:
-            self._go(Phase.PULL, self._ahead(-p.pull_distance), 0, p.travel_time)
+            self._start(Phase.PULL, self._ahead(-p.pull_distance), 0, p.travel_time)
         elif self._phase is Phase.PULL:
             self._phase = Phase.SHAKE if p.shake_cycles else Phase.DONE
 
@@ -219,20 +232,20 @@ class IrReflex:
         if self._recoveries > p.max_recoveries or (goal == x and not only_lags):
             self._close(Stop.OUT_OF_SIGHT if case is Visibility.NONE else Stop.PATIENCE)
         else:
-            self._go(Phase.APPROACH if case is Visibility.NONE else Phase.RECOVER, goal, 0)
+            self._start(Phase.APPROACH if case is Visibility.NONE else Phase.RECOVER, goal, 0)
 
     def _begin_probing(self, x: X, r: Floats) -> None:
         self._probing.begin(self._move.goal, x, r)
-        self._go(Phase.PROBE, self._probing.command, self.params.scans)
+        self._start(Phase.PROBE, self._probing.command, self.params.scans)
 
     def _probe(self, reading: Reading) -> None:
         """Steps 6 and 7: take a column's measurement, or, back at the beginning, step."""
         r, known = self._residuals(self._distances(reading.ticks)), self._in_cost(reading.ticks, self._ticks_lost)
         if not self._probing.done:
             self._probing.take(reading.x, r, known)
-            self._go(Phase.PROBE, self._probing.command, self.params.scans)
+            self._start(Phase.PROBE, self._probing.command, self.params.scans)
         elif not all(known):
-            self._lose()
+            self._recheck()
         else:
             self._descent.measure(reading.x, r, self._move.goal)
             self._descent.probed(self._probing.jacobian)
@@ -240,37 +253,37 @@ class IrReflex:
 
     def _step(self) -> None:
         """Steps 8 and 9."""
-        self._go(Phase.STEP, self._descent.next_command(self._move.goal), self.params.scans)
+        self._start(Phase.STEP, self._descent.next_command(self._move.goal), self.params.scans)
 
     def _judge(self, reading: Reading) -> None:
         """Step 10; a finger of the cost that lost the object leads back to step 3."""
         if not all(self._in_cost(reading.ticks, self._ticks_lost)):
-            self._lose()
+            self._recheck()
             return
         r = self._residuals(self._distances(reading.ticks))
         verdict = self._descent.judge(reading.x, r, self._move.goal)
         if verdict in _STOPS:
             self._close(_STOPS[verdict])
         elif verdict is Verdict.BACK:
-            self._go(Phase.CHECK, self._descent.best, self.params.scans)
+            self._start(Phase.CHECK, self._descent.best, self.params.scans)
         elif verdict is Verdict.PROBE:
             self._begin_probing(reading.x, r)
         else:
             self._step()
 
-    def _lose(self) -> None:
-        """Go back to step 3; counted, since readings at the edge of sight could lead there for ever."""
+    def _recheck(self) -> None:
+        """Return to step 3; counted, since readings at the edge of sight could lead there for ever."""
         self._recoveries += 1
         if self._recoveries > self.params.max_recoveries:
             self._close(Stop.PATIENCE)
             return
-        self._go(Phase.CHECK, self._move.goal, self.params.scans)
+        self._start(Phase.CHECK, self._move.goal, self.params.scans)
 
     def _close(self, stop: Stop) -> None:
         """Grasp the object: here, or, if the cost is not small but fingers still see, from the best pose known."""
         self._stop = stop
         x = self._descent.best if stop in (Stop.STALLED, Stop.PATIENCE) and self._descent.best else self._move.goal
-        self._go(Phase.CLOSE, (*x[:3], 1.0), 0, self.params.closing_time)
+        self._start(Phase.CLOSE, (*x[:3], 1.0), 0, self.params.closing_time)
 
     def _shake(self) -> None:
         self._shaken += 1
@@ -286,7 +299,7 @@ class IrReflex:
         across = p.shake_amplitude * math.sin(2.0 * math.pi * p.shake_frequency * self._shaken * float(_PERIOD))
         return (x[0] - across * math.sin(x[2]), x[1] + across * math.cos(x[2]), x[2], x[3])
 
-    def _go(self, phase: Phase, goal: X, scans: int, time: float | None = None) -> None:
+    def _start(self, phase: Phase, goal: X, scans: int, time: float | None = None) -> None:
         self._phase = phase
         self._move.start(goal, scans, _periods(self.params.move_time if time is None else time))
 
@@ -300,33 +313,20 @@ class IrReflex:
     def _residuals(self, distances: Sequence[float]) -> Floats:
         return np.array([w * (d - self._target) for w, d in zip(self._weight, distances, strict=True) if w > 0.0])
 
-    def _in_cost(self, ticks: Sequence[float], least: float) -> list[bool]:
-        """Return which fingers of the cost read so many ticks."""
-        return [x >= least for w, x in zip(self._weight, ticks, strict=True) if w > 0.0]
+    def _in_cost(self, ticks: Sequence[float], min_ticks: float) -> list[bool]:
+        """Return which fingers of the cost read at least so many ticks."""
+        return [x >= min_ticks for w, x in zip(self._weight, ticks, strict=True) if w > 0.0]
 
     def _case(self, ticks: Sequence[float]) -> Visibility:
         return Visibility(sum(1 << i for i, x in enumerate(ticks) if x >= self._ticks_seen))
 
-    def get_state(self) -> bytes:
-        """Return phase, move, recovery, probing, descent and counters."""
-        parts = [part.get_state() for part in (self._move, self._recovery, self._probing, self._descent)]
-        counters = (self._recoveries, self._closings, self._shaken)
-        return pickle.dumps((int(self._phase), int(self._stop), parts, counters))
-
-    def set_state(self, state: bytes) -> None:
-        """Go back to a state that `get_state` gave."""
-        phase, stop, parts, (self._recoveries, self._closings, self._shaken) = pickle.loads(state)
-        self._phase, self._stop = Phase(phase), Stop(stop)
-        for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
-            part.set_state(saved)
-
 
 def _check_inputs(u: Inputs) -> None:
     """Raise InvalidReading for what is no number: no move would ever arrive, and no finger would ever see."""
-    facts = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
-    wrong = [name for name, values in facts.items() if not all(map(math.isfinite, values))]
+    inputs = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
+    wrong = [name for name, values in inputs.items() if not all(map(math.isfinite, values))]
     if wrong:
-        raise InvalidReading([f"{name} must be finite, not {facts[name]}" for name in wrong])
+        raise InvalidReading([f"{name} must be finite, not {inputs[name]}" for name in wrong])
 
 
 def _periods(time: float) -> int:

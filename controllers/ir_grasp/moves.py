@@ -1,7 +1,4 @@
-"""One commanded move of wrist and closure, and the reading of the sensors at its end.
-
-Probing moves: each control input is changed in turn, and what that does is measured. [Luberto] eq. (7).
-"""
+"""Commanded moves of wrist and closure with a reading at their end, and probing of the Jacobian. [Luberto] eq. (7)."""
 
 from typing import NamedTuple
 
@@ -26,7 +23,7 @@ class Move:
     Args:
         tolerance: distance of encoders and goal at which the move is done, by input.
         calm: control periods between arrival and the first scan that counts. At least 1: what is read at the instant
-            of arrival was scanned on the way.
+            of arrival was scanned during the move.
     """
 
     def __init__(self, tolerance: X, calm: int) -> None:
@@ -36,7 +33,7 @@ class Move:
         self._sum: list[float] = []
 
     def start(self, goal: X, scans: int, periods: int) -> None:
-        """Begin a move that ends with the mean of so many scans, with 0 on arrival.
+        """Begin a move that ends with the mean of so many scans, or, if 0, on arrival.
 
         After so many control periods it counts as arrived in any case: what the fingers push against may keep the
         closure from its goal.
@@ -46,7 +43,7 @@ class Move:
         self._sum = [0.0] * 7
 
     def advance(self, x: X, ticks: X) -> Reading | None:
-        """Look at encoders and sensors once; return the reading when the move is over, else None."""
+        """Read encoders and sensors once; return the reading when the move is over, else None."""
         if self._rested < 0 and (self._elapsed >= self._periods or self._arrived(x)):
             self._rested = 0
             if not self._scans:
@@ -69,7 +66,7 @@ class Move:
         return self.goal, (self._scans, self._periods, self._elapsed, self._rested), list(self._sum)
 
     def set_state(self, state: tuple[X, tuple[int, int, int, int], list[float]]) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` gave."""
         self.goal, (self._scans, self._periods, self._elapsed, self._rested), total = state
         self._sum = list(total)
 
@@ -77,7 +74,7 @@ class Move:
 class Probing:
     """Gathers the Jacobian of the residuals column by column, J(:, j) = dr / dx_j, eq. (7), by measured moves.
 
-    A residual whose finger loses the object on a move is asked for once more by the opposite move. What stays unseen
+    A residual whose finger loses the object on a move is measured once more by the opposite move. What stays unseen
     both ways is taken not to depend on that input.
 
     Args:
@@ -90,7 +87,7 @@ class Probing:
         self._x: X = ()
         self._r: Floats = np.zeros(0)
         self.jacobian: Floats = np.zeros((0, 4))
-        self._open: list[bool] = []  # residuals whose entry in the column under way is not known
+        self._open: list[bool] = []  # residuals whose entry in the current column is not known
         self._input, self._sign = 0, 1.0
 
     def begin(self, start: X, x: X, r: Floats) -> None:
@@ -134,6 +131,6 @@ class Probing:
         return self._start, self._x, self._r, np.array(self.jacobian), list(self._open), self._input, self._sign
 
     def set_state(self, state: tuple[X, X, Floats, Floats, list[bool], int, float]) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` gave."""
         self._start, self._x, self._r, jacobian, is_open, self._input, self._sign = state
         self.jacobian, self._open = np.array(jacobian), list(is_open)

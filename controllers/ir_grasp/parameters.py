@@ -1,7 +1,4 @@
-"""Parameters of the infrared reflex, and what is wrong with them. [Luberto] sec. IV and V.
-
-From ticks to distance by the constant characteristic of the infrared sensors. [Luberto] eq. (11).
-"""
+"""Parameters of the infrared reflex, and the calibration of its sensors. [Luberto] sec. IV and V, eq. (11)."""
 
 import enum
 import math
@@ -14,8 +11,10 @@ from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
 
+_INPUTS = ("p_x", "p_y", "yaw", "sigma")
+
 _FULL_SCALE = 4095.0
-_ENOUGH = 60  # halvings of 4095 ticks: beyond the last bit of a float
+_HALVINGS = 60  # halvings of 4095 ticks: beyond the last bit of a float
 
 
 @dataclass(frozen=True)
@@ -34,24 +33,19 @@ class Calibration:
     def ticks(self, distance: float) -> float:
         """Return the ADC output x, in ticks, that stands for a distance in m, by halving; 0 or 4095 beyond the curve.
 
-        Compared with it, a reading is judged without working out its distance.
+        A threshold in ticks is compared with readings directly, without the distance of each reading.
         """
         low, high = 0.0, _FULL_SCALE
-        for _ in range(_ENOUGH):
+        for _ in range(_HALVINGS):
             middle = (low + high) / 2.0
             low, high = (middle, high) if self.distance(middle) > distance else (low, middle)
         return (low + high) / 2.0
 
     def faults(self) -> list[str]:
-        """Return what keeps the curve from falling, so that a reading would have no one distance."""
-        faults = [
-            f"{name} = {value:g} m must be above 0" for name, value in (("a", self.a), ("c", self.c)) if value <= 0.0
-        ]
+        """Return what keeps the curve from falling, so that a reading would have no unique distance."""
+        faults = [f"{name} = {x:g} m must be above 0" for name, x in (("a", self.a), ("c", self.c)) if x <= 0.0]
         falling = (("b", self.b), ("d", self.d))
-        return faults + [f"{name} = {value:g} 1/tick must be below 0" for name, value in falling if value >= 0.0]
-
-
-_INPUTS = ("p_x", "p_y", "yaw", "sigma")
+        return faults + [f"{name} = {x:g} 1/tick must be below 0" for name, x in falling if x >= 0.0]
 
 
 class InvalidReflexParameters(InvalidParameters):
@@ -61,7 +55,7 @@ class InvalidReflexParameters(InvalidParameters):
 
 
 class Strategy(enum.IntEnum):
-    """What is done between the pre-grasp pose and closing: algorithm 1, nothing, or going a stated way forward."""
+    """What is done between the pre-grasp pose and closing: algorithm 1, nothing, or a given way forward."""
 
     REFLEX = 0
     BLIND = 1
@@ -73,7 +67,7 @@ class Params:
     """Vectors of four are in the order of the control inputs p_x (m), p_y (m), yaw (rad), sigma (1).
 
     All values but the sensors' range and the fingers in the cost are own choices: the source does not give them.
-    `literal` takes eqs. (4) and (9) as printed: the residual is the distance itself, every step is probed anew,
+    `literal` takes eqs. (4) and (9) as printed: the residual is the distance itself, every step follows a probing,
     and threshold_literal ends it.
     """
 
@@ -129,7 +123,9 @@ class Params:
         np.array([5e-4, 5e-4, 5e-3, 5e-3]), "distance of encoders and command that ends a move", minimum=0.0
     )
     move_time: Second = parameter(1.5, "time after which a correcting move counts as done", minimum=0.0, maximum=60.0)
-    travel_time: Second = parameter(10.0, "the same, of the way to the pre-grasp pose and of the pull", minimum=0.0)
+    travel_time: Second = parameter(
+        10.0, "the same, for the travel to the pre-grasp pose and for the pull", minimum=0.0
+    )
     closing_time: Second = parameter(2.0, "time that the hand is given to close", minimum=0.0, maximum=60.0)
     pull_distance: Metre = parameter(0.15, "how far the closed hand is pulled back", minimum=0.0, maximum=1.0)
     shake_amplitude: Metre = parameter(0.015, "amplitude of the shake, across the hand", minimum=0.0, maximum=0.2)
@@ -173,7 +169,7 @@ class Params:
             faults.append(f"epsilon {self.epsilon:g} m must be less than distance_max {self.distance_max:g} m")
         nearest, farthest = (self.calibration.distance(x) for x in (4095.0, 0.0))
         if not nearest < self.target:
-            faults.append(f"target {self.target:g} m must exceed {nearest:.4g} m, the least that eq. (11) can tell")
+            faults.append(f"target {self.target:g} m must exceed {nearest:.4g} m, the smallest distance of eq. (11)")
         if not farthest >= self.distance_max:
             faults.append(f"distance_max {self.distance_max:g} m must not exceed {farthest:.4g} m, eq. (11) at 0 ticks")
         if not self.sigma_pregrasp <= self.sigma_limit:

@@ -37,8 +37,8 @@ RECOVERY = {
     Visibility.THUMB_INDEX: Action.FORWARD,
     Visibility.THUMB_RING: Action.CLOSE,
 }
-"""The action of each of the seven cases. What the figure's arrows show is not told in words; these follow from the
-planar hand (assumed). If one side alone sees the object, it is on that side, and the hand moves there. The index
+"""The action of each of the seven cases. The text does not describe the figure's arrows; these actions follow from
+the planar hand (assumed). If one side alone sees the object, it is on that side, and the hand moves there. The index
 reaches farthest ahead: what it sees and the ring does not is too far, what the ring alone sees is too near. What only
 the index misses, it will see as the hand closes."""
 
@@ -51,7 +51,7 @@ SECOND = {
     Visibility.THUMB_INDEX: Action.CLOSE,
     Visibility.THUMB_RING: Action.FORWARD,
 }
-"""The action that takes the place of the first where that would undo the last motion, or the hand may not close more
+"""The action that replaces the first where that would undo the last motion, or the hand may not close more
 (assumed). Sides that see in turn have the object between them, but too far; a finger that sees too much and too little
 in turn has it on its side."""
 
@@ -78,11 +78,11 @@ class Motion(NamedTuple):
 
 
 class Recovery:
-    """Chooses recovering motions and breaks alternation, which the cases alone run into (left, left, right, right).
+    """Chooses recovering motions and breaks cycles, which the cases alone run into (left, left, right, right).
 
     A motion opposite to the last one along its axis is not made: the step along that axis is halved, down to a least
-    one, for both directions, and the case's second action is taken. So the hand does not swing about in lasting
-    strides: it closes, or goes forward as far as its reach.
+    one, for both directions, and the case's second action is taken. So the hand does not oscillate
+    for ever: it closes, or goes forward as far as its reach.
 
     Args:
         step: first step of the linear motions, m.
@@ -110,7 +110,7 @@ class Recovery:
         self._last[_AXIS[action]] = int(action)
         if action is Action.CLOSE:
             return Motion(action, self._closing)
-        # Small strides are for what is in sight; going nearer to what is not wants whole ones.
+        # Halved steps are for an object in sight; the approach to one that is not takes whole steps.
         nearing = action is Action.FORWARD and (case is Visibility.NONE or RECOVERY[case] is not action)
         return Motion(action, self._step if nearing else self._sizes[_AXIS[action]])
 
@@ -119,7 +119,7 @@ class Recovery:
         return dict(self._sizes), dict(self._last), self.reversals
 
     def set_state(self, state: tuple[dict[str, float], dict[str, int], int]) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` gave."""
         sizes, last, self.reversals = state
         self._sizes, self._last = dict(sizes), dict(last)
 

@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "4d97e660bc2bfefef47cc515334da5e9e1ab5476467f50bc3b3867ffe2788bf3",
+   "key": "399a8d9ce067ac1b7ec31de6dbbda14ca6241e53177152431a10d9751caa54b5",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

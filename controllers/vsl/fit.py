@@ -39,16 +39,16 @@ def fit_cubic(x: Floats, y: Floats, x_validation: Floats, y_validation: Floats) 
     features = monomials(z, factors_of(powers))[:, 1:]
     feature_mean, y_mean = np.mean(features, axis=0), np.mean(y, axis=0)
     left, singular, right = np.linalg.svd(features - feature_mean, full_matrices=False)
-    seen: Floats = np.transpose(left) @ (y - y_mean)
-    hull = rounded(np.max(z @ np.transpose(hull_directions(n)), axis=0)) + 1e-9  # over what rounding may have cut off
-    tried: list[Fit] = []
+    projected: Floats = np.transpose(left) @ (y - y_mean)
+    hull = rounded(np.max(z @ np.transpose(hull_directions(n)), axis=0)) + 1e-9  # beyond what rounding may cut off
+    fits: list[Fit] = []
     for penalty in PENALTIES:
-        weights: Floats = np.transpose(right) @ (seen * (singular / (singular**2 + penalty * len(x)))[:, None])
+        weights: Floats = np.transpose(right) @ (projected * (singular / (singular**2 + penalty * len(x)))[:, None])
         coefficients = rounded(np.vstack([y_mean - feature_mean @ weights, weights]))
         cubic = Cubic(mean, scale, powers, coefficients, rounded(hull))
         error = cubic.predict(x_validation) - y_validation
-        tried.append(Fit(cubic, penalty, float(np.sqrt(np.mean(error**2)))))
-    return min(tried, key=lambda f: f.validation_rms)
+        fits.append(Fit(cubic, penalty, float(np.sqrt(np.mean(error**2)))))
+    return min(fits, key=lambda f: f.validation_rms)
 
 
 def rounded(values: Floats) -> Floats:

@@ -22,7 +22,7 @@ __all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Method", "Out
 
 
 class Method(enum.IntEnum):
-    """How joint angles are commanded and the tip's place is told."""
+    """How joint angles are commanded and the tip's position is estimated."""
 
     MODEL_BASED = 0
     HYBRID = 1
@@ -48,7 +48,7 @@ class Params:
 
 @dataclass(kw_only=True)
 class Inputs:
-    """What is wanted, and what the arm's own sensors say."""
+    """References, and what the arm's own sensors measure."""
 
     q_ref: Vector3[Radian] = port(np.zeros(3), "wanted joint angles, by rigid kinematics")
     qd_ref: Vector3[RadianPerSecond] = port(np.zeros(3), "wanted joint velocities")
@@ -77,12 +77,13 @@ class HybridKinematics:
     is made; the current of joint 1 is left out. Since a correction moves joints of its own accord, qd_cmd grants
     qd_correction besides |qd_ref|, with the sign of qd_ref; 0, no limit, stays 0.
 
-    Currents lead back to themselves through the command: an arm that swings feels its own inertia, and takes it for a
-    load. Two lags of i_lag in a row keep that down. With an arm that swings at 4 Hz, 0.1 s and less build the swing up,
-    and 0.15 s and more do not; at 0.5 s the tip errs half as much again on a path at 0.05 m/s. The gears' friction goes
-    the same way: told to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down in 3 s.
+    The command feeds the currents back to themselves: an arm that swings feels its own inertia, and takes it for a
+    load. Two lags of i_lag in series attenuate that. With an arm that swings at 4 Hz, 0.1 s and less amplify the swing,
+    and 0.15 s and more do not; at 0.5 s the tip's error is half as large again on a path at 0.05 m/s. The gears'
+    friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
+    in 3 s.
 
-    `outside` says that the input of g or h has left the polytope of its training; see `Cubic` for what happens there.
+    `outside` reports that the input of g or h is outside the polytope of its training; see `Cubic` for what follows.
 
     Raises:
         InvalidModel: by the constructor, if HYBRID and the model cannot be read, or was trained for other links.
@@ -118,7 +119,7 @@ class HybridKinematics:
         return pickle.dumps(self._i)
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this unit or of one with equal parameters."""
+        """Restore a state of this unit or of one with equal parameters."""
         self._i = pickle.loads(state)
 
     def _smoothed(self, i_meas: Floats, dt: float) -> tuple[Floats, Floats]:

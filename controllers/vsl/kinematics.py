@@ -111,7 +111,7 @@ class VslKinematics:
         return np.asarray(np.linalg.solve(self.jacobian(q), v_WG), dtype=np.float64)
 
     def singularity(self, p_WG: Floats, margin: float) -> str | None:
-        """Say by which singularity of J, where det J = -L2 L3 s3 (L2 c2 + L3 c23) is 0, a point is nearer than margin.
+        """Return which singularity of J, where det J = -L2 L3 s3 (L2 c2 + L3 c23) is 0, is nearer than margin, or None.
 
         Args:
             p_WG: a point, shape (3,), m.
@@ -131,10 +131,10 @@ class VslKinematics:
 
 
 def _cosine(x: float) -> float:
-    """Take off what rounding adds at the limits of reach."""
+    """Clip what rounding adds at the limits of reach."""
     return min(1.0, max(-1.0, x))
 
 
 def place(p_WG: Floats) -> str:
-    """Return a point, shape (3,), m, as a message tells it."""
+    """Return a point, shape (3,), m, as text for a message."""
     return "(" + ", ".join(f"{x:.4g}" for x in p_WG.tolist()) + ") m"

@@ -1,6 +1,6 @@
-"""The learned part of the hybrid kinematics of the VSL arm. [Gandarias2020] eqs. (10), (11).
+"""The learned part of the VSL arm's hybrid kinematics: residuals as cubic polynomials. [Gandarias2020] eqs. (10), (11).
 
-A cubic polynomial of several inputs, and the range of inputs that it was fitted on.
+`Cubic` is a polynomial of several inputs with the range of inputs that it was fitted on; `VslModel` has two of them.
 """
 
 import itertools
@@ -16,6 +16,13 @@ from numpy.typing import NDArray
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 
+FORWARD_INPUTS = ("q_meas[1]", "q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
+INVERSE_INPUTS = ("q_ref[1]", "q_ref[2]", "q_ref[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
+"""Inputs in rad, Pa and A; the current of joint 1, which carries no weight, is left out."""
+
+VALUES = 3
+"""What each residual has: an angle a joint, or a coordinate an axis."""
+
 DEGREE = 3
 
 Integers = NDArray[np.int64]
@@ -24,7 +31,7 @@ Integers = NDArray[np.int64]
 def all_powers(inputs: int) -> Integers:
     """Return the exponents of all monomials of at most third degree, shape (monomials, inputs), the constant first."""
     factors = itertools.combinations_with_replacement(range(inputs + 1), DEGREE)
-    return np.array([[chosen.count(i + 1) for i in range(inputs)] for chosen in factors], dtype=np.int64)
+    return np.array([[monomial.count(i + 1) for i in range(inputs)] for monomial in factors], dtype=np.int64)
 
 
 def hull_directions(inputs: int) -> Floats:
@@ -67,7 +74,7 @@ class Cubic:
         return monomials(z, self._factors) @ self.coefficients
 
     def outside(self, x: Floats) -> bool:
-        """Tell whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training."""
+        """Return whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training."""
         return bool(np.any(self._directions @ ((x - self.mean) / self.scale) > self.hull))
 
     @cached_property
@@ -89,8 +96,8 @@ class Cubic:
 
 def factors_of(powers: Integers) -> Integers:
     """Return what to multiply for each monomial, shape (3, monomials): 0 for 1, i + 1 for input i."""
-    chosen = [[i + 1 for i, power in enumerate(row) for _ in range(power)] for row in powers.tolist()]
-    padded = np.array([row + [0] * (DEGREE - len(row)) for row in chosen], dtype=np.int64)
+    factors = [[i + 1 for i, power in enumerate(row) for _ in range(power)] for row in powers.tolist()]
+    padded = np.array([row + [0] * (DEGREE - len(row)) for row in factors], dtype=np.int64)
     return np.ascontiguousarray(np.transpose(padded))
 
 
@@ -98,14 +105,6 @@ def monomials(z: Floats, factors: Integers) -> Floats:
     """Return the monomials of inputs z, shape (..., inputs), as shape (..., monomials)."""
     padded = np.concatenate([np.ones((*z.shape[:-1], 1)), z], axis=-1)
     return padded[..., factors[0]] * padded[..., factors[1]] * padded[..., factors[2]]
-
-
-FORWARD_INPUTS = ("q_meas[1]", "q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
-INVERSE_INPUTS = ("q_ref[1]", "q_ref[2]", "q_ref[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
-"""Inputs in rad, Pa and A; the current of joint 1, which carries no weight, is left out."""
-
-VALUES = 3
-"""What each residual has: an angle a joint, or a coordinate an axis."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +134,7 @@ class VslModel:
         return self.kinematics.forward(q_meas) + rotate_about_z(residual, float(q_meas[0]))
 
     def outside(self, q_ref: Floats, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> bool:
-        """Tell whether either residual is asked about what it was not trained on."""
+        """Return whether either residual is evaluated outside the polytope of its training."""
         return self.inverse.outside(inputs_of(q_ref, p_meas, i_meas)) or self.forward.outside(
             inputs_of(q_meas, p_meas, i_meas)
         )

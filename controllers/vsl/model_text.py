@@ -28,11 +28,11 @@ ANY = -1
 _WIDTH = 115
 
 _MAX_DEPTH = 3
-"""Lists within lists that are looked into; a matrix has two."""
+"""Depth to which nested lists are checked; a matrix has two levels."""
 
 
 class InvalidModel(ValueError):
-    """Text that is no model of this version; `source` says where it came from, `fault` why it cannot be used."""
+    """Text that is no model of this version; `source` says where it came from, `fault` what is wrong."""
 
     is_refusal = True
 
@@ -100,7 +100,7 @@ def parse_model(text: str, source: str) -> VslModel:
 
 
 class _Reader:
-    """Takes a model's parts out of what JSON gave, and says what is wrong with one."""
+    """Takes a model's parts out of parsed JSON, and raises InvalidModel where one is wrong."""
 
     def __init__(self, source: str) -> None:
         self._source = source
@@ -132,8 +132,8 @@ class _Reader:
     def cubic(self, whole: dict[str, Any], name: str, inputs: tuple[str, ...]) -> Cubic:
         """Return one of the two learned residuals."""
         table = self.table(self.entry(whole, name), name)
-        if (found := self.entry(table, "inputs", name)) != list(inputs):
-            raise InvalidModel(self._source, f"{name}.inputs are {found}, not {list(inputs)}")
+        if (stated := self.entry(table, "inputs", name)) != list(inputs):
+            raise InvalidModel(self._source, f"{name}.inputs are {stated}, not {list(inputs)}")
         n = len(inputs)
         powers = np.transpose(self.numbers(table, name, "powers", (n, ANY)))
         if np.any(powers != np.floor(powers)) or np.any(powers < 0.0) or np.any(np.sum(powers, axis=1) > DEGREE):
@@ -187,13 +187,13 @@ def _json(value: object, indent: str, taken: int = 0) -> str:
         return flat
     inner = indent + " "
     if isinstance(value, dict):
-        entries = cast("dict[str, object]", value)
-        keys = [f"{inner}{json.dumps(k)}: " for k in entries]
-        parts = [key + _json(v, inner, len(key)) for key, v in zip(keys, entries.values(), strict=True)]
+        members = cast("dict[str, object]", value)
+        keys = [f"{inner}{json.dumps(k)}: " for k in members]
+        parts = [key + _json(v, inner, len(key)) for key, v in zip(keys, members.values(), strict=True)]
         return "{\n" + ",\n".join(parts) + f"\n{indent}}}"
-    items = cast("list[object]", value)
-    if all(isinstance(v, (int, float)) for v in items):
+    elements = cast("list[object]", value)
+    if all(isinstance(v, (int, float)) for v in elements):
         return textwrap.fill(
             flat, _WIDTH, initial_indent=" " * taken, subsequent_indent=inner, break_long_words=False
         ).lstrip()
-    return "[\n" + ",\n".join(inner + _json(v, inner, len(inner)) for v in items) + f"\n{indent}]"
+    return "[\n" + ",\n".join(inner + _json(v, inner, len(inner)) for v in elements) + f"\n{indent}]"

@@ -11,7 +11,7 @@ from handover.cosim.blocks.ports import Floats
 
 
 class Path(enum.IntEnum):
-    """Paths of [Gandarias2020] sec. V-A, and a line of one's own."""
+    """Paths of [Gandarias2020] sec. V-A, and a custom line."""
 
     LINEAR = 0
     CURVE = 1
@@ -36,10 +36,10 @@ class Line:
 
         x_{k+1} = x_k + (x_g - x_k) / (N - (k - 1)) comes out as N equal steps.
         """
-        way = self.x_g - self.x_0
-        points = self.x_0 + np.arange(N + 1)[:, None] / N * way
+        displacement = self.x_g - self.x_0
+        points = self.x_0 + np.arange(N + 1)[:, None] / N * displacement
         points[N] = self.x_g
-        return points, np.tile(V / self.length * way, (N + 1, 1))
+        return points, np.tile(V / self.length * displacement, (N + 1, 1))
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ class QuarterArc:
     def sampled(self, N: int, V: float) -> tuple[Floats, Floats]:
         """Return N + 1 points, m, and the velocity at each, m/s, both of shape (N + 1, 3)."""
         alpha = np.arange(N + 1) * (math.pi / 2.0 / N)
-        none = np.zeros(N + 1)
-        points = self.x_c + self._sign * self._radius * np.column_stack([np.sin(alpha), none, -np.cos(alpha)])
-        velocities = self._sign * V * np.column_stack([np.cos(alpha), none, np.sin(alpha)])
+        zero = np.zeros(N + 1)
+        points = self.x_c + self._sign * self._radius * np.column_stack([np.sin(alpha), zero, -np.cos(alpha)])
+        velocities = self._sign * V * np.column_stack([np.cos(alpha), zero, np.sin(alpha)])
         return points, velocities
 
 

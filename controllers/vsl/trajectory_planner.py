@@ -23,7 +23,7 @@ _MARGIN = 0.001
 """How near to a singularity a path may come, m (assumed): there a joint turns about seven times faster than usual."""
 
 _PERIOD = Fraction(1, 50)  # s
-_SAME_TIME = 1e-9  # s, what sums of intervals lose
+_SAME_TIME = 1e-9  # s; rounding of sums of intervals
 
 
 class InvalidPath(InvalidParameters):
@@ -60,7 +60,7 @@ class Params:
 class Inputs:
     """When to go."""
 
-    go: bool = port(True, "the path begins, once settled, when this is true; later it is not looked at")
+    go: bool = port(True, "the path begins, once settled, when this is true; ignored afterwards")
 
 
 @dataclass(kw_only=True)
@@ -70,16 +70,16 @@ class Outputs:
     p_WG_goal: Vector3[Metre] = output("point of the path to move to, in the world")
     q_ref: Vector3[Radian] = output("joint angles that put the tip of a rigid arm there, [Gandarias2020] eqs. (2)-(4)")
     qd_ref: Vector3[RadianPerSecond] = output(
-        "joint velocities on the way there, by the inverse Jacobian, [Gandarias2020] eq. (8)"
+        "joint velocities that lead there, by the inverse Jacobian, [Gandarias2020] eq. (8)"
     )
     p_cmd: Vector2[Pascal] = output("pressure commands of links 2 and 3")
     segment: int = output("segment of the path, from 1; 0 before it begins")
-    moving: bool = output("the tip is on its way along the path")
+    moving: bool = output("the tip moves along the path")
     done: bool = output("the path has ended")
 
 
 class TrajectoryPlanner:
-    """Goes along lines and arcs point by point at constant speed. [Gandarias2020] algorithms 1 and 2, corrected.
+    """Follows lines and arcs point by point at constant speed. [Gandarias2020] algorithms 1 and 2, corrected.
 
     The first point x_0 is held for the settling time, then until `go`. Each segment has N steps of equal length and
     time T = length / (N V): during the k-th, the goal is x_{k+1} with q_{k+1} from the inverse kinematics, and the
@@ -112,42 +112,42 @@ class TrajectoryPlanner:
         for segment in segments:
             self._add(segment)
         self._waited = 0
-        self._gone: int | None = None
+        self._periods: int | None = None
         """Periods since the path began."""
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that a step from here would begin with."""
-        return self._command(self._begins(u))
+        return self._command(self._periods_on_path(u))
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that holds until t + dt."""
-        gone = self._begins(u)
-        y = self._command(gone)
-        if gone is None:
+        periods = self._periods_on_path(u)
+        y = self._command(periods)
+        if periods is None:
             self._waited += 1
         else:
-            self._gone = gone + 1
+            self._periods = periods + 1
         return y
 
     def get_state(self) -> bytes:
         """Return the periods waited, and those since the path began."""
-        return pickle.dumps((self._waited, self._gone))
+        return pickle.dumps((self._waited, self._periods))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this planner or of one with equal parameters."""
-        self._waited, self._gone = pickle.loads(state)
+        """Restore a state of this planner or of one with equal parameters."""
+        self._waited, self._periods = pickle.loads(state)
 
-    def _begins(self, u: Inputs) -> int | None:
+    def _periods_on_path(self, u: Inputs) -> int | None:
         """Return the periods since the path began, 0 if it begins here, None if it does not yet."""
-        if self._gone is not None:
-            return self._gone
+        if self._periods is not None:
+            return self._periods
         settled = self._waited * float(_PERIOD) >= self._params.settle - _SAME_TIME
         return 0 if settled and u.go else None
 
-    def _command(self, gone: int | None) -> Outputs:
+    def _command(self, periods: int | None) -> Outputs:
         p = self._params
         last = len(self._ends) - 1
-        k = -1 if gone is None else bisect.bisect_right(self._ends, gone * float(_PERIOD) + _SAME_TIME)
+        k = -1 if periods is None else bisect.bisect_right(self._ends, periods * float(_PERIOD) + _SAME_TIME)
         moving = 0 <= k <= last
         i = min(k, last)
         return Outputs(
@@ -192,7 +192,7 @@ def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -
 
 
 def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
-    """Say which of a segment's points is the first bad one, and why."""
+    """Return which of a segment's points is the first bad one, and why; None if all are good."""
     bad = [(k, x, f) for k, x in enumerate(segment.sampled(p.N, p.V)[0]) if (f := _fault(x, kinematics))]
     if not bad:
         return None
@@ -202,7 +202,7 @@ def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> 
 
 
 def _fault_between(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
-    """Say where a segment whose points are good runs through a singularity between them, and through which."""
+    """Return where a segment whose points are good runs through a singularity between them, and which; or None."""
     for x in segment.sampled(math.ceil(segment.length / _MARGIN), p.V)[0]:
         if fault := _fault(x, kinematics):
             return f"between its points, at {place(x)}: {fault}"

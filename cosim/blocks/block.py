@@ -1,13 +1,9 @@
-"""What a plant or a controller is.
+"""The protocols of a block, which is a plant or a controller: stepped, differentiable, with events.
 
 A block is a plain class with three dataclasses of declared fields (`Params`, `Inputs`, `Outputs`); they are found by
-the annotations of `__init__` and `step`, and read by `handover.cosim.blocks.description.describe`.
-
-What a block offers that knows the derivatives of its outputs by its inputs.
-
-What a block offers whose course has events: instants at which something changes at once.
-
-What a block does not take.
+the annotations of `__init__` and `step`, and read by `handover.cosim.blocks.description.describe`. Every block
+implements `Block`. `DifferentiableBlock` adds directional derivatives of outputs by inputs, `EventfulBlock` adds
+events: instants at which state or outputs jump. A block rejects parameters and inputs by raising `InvalidParameters`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,8 +17,7 @@ from numpy.typing import NDArray
 class Block(Protocol):
     """A plant or a controller with declared ports, advanced in steps.
 
-    What a block may offer besides: `handover.cosim.blocks.block.EventfulBlock`,
-    `handover.cosim.blocks.block.DifferentiableBlock`.
+    A block may offer more, see `EventfulBlock` and `DifferentiableBlock`.
 
     Class attributes: `feedthrough` names, by output, the inputs with direct feedthrough to it (within the same
     communication point); `period` is the sampling period of a block that is sampled, in seconds, else None.
@@ -40,24 +35,24 @@ class Block(Protocol):
         """Advance from t by dt with u held and return the outputs at t + dt.
 
         A sampled block is stepped by its period only, once at each tick, with the inputs of that instant; a host sees
-        the outputs at once, and they hold until the next tick.
+        the outputs at that instant, and they hold until the next tick.
         """
         ...
 
     def get_state(self) -> bytes:
-        """Return the complete state: what follows `set_state` is the same, bit for bit."""
+        """Return the complete state: after `set_state` with it, the block continues in the same way, bit for bit."""
         ...
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` returned."""
         ...
 
 
 class DifferentiableBlock(Block, Protocol):
     """A block with exact derivatives of its real outputs by its real inputs.
 
-    They are of `outputs` as a function of u, with the block's state as it is; at a kink either side's will do. A block
-    is taken for one by having the method.
+    They are the derivatives of `outputs` as a function of u, with the state held; at a kink, of either side. A block
+    that has the method counts as differentiable.
     """
 
     def directional_derivative(
@@ -78,11 +73,11 @@ class DifferentiableBlock(Block, Protocol):
 
 
 MAX_EVENTS = 1000
-"""Most events in a row at one instant."""
+"""How many events may follow each other at one instant."""
 
 
 class InvalidAdvance(ValueError):
-    """A block's `advance` went backwards, or farther than it was to."""
+    """A block's `advance` went backwards, or beyond dt."""
 
     def __init__(self, block: str, reached: float, dt: float) -> None:
         super().__init__(f"{block}.advance came {reached!r} s far; it was to advance by at most {dt!r} s")
@@ -90,10 +85,10 @@ class InvalidAdvance(ValueError):
 
 
 class TooManyEvents(RuntimeError):
-    """A block has one event after the other without time passing."""
+    """A block has one event after another and time does not advance (Zeno behaviour)."""
 
     def __init__(self, block: str, t: float) -> None:
-        super().__init__(f"{block} has had {MAX_EVENTS} events at t = {t!r} s; it must come to rest, or get on")
+        super().__init__(f"{block} has had {MAX_EVENTS} events at t = {t!r} s; it must come to rest or advance")
         self.t = t
 
 
@@ -101,29 +96,29 @@ class EventfulBlock(Block, Protocol):
     """A block with events of its own, such as an impact. It has all three methods and no period.
 
     `step` handles the events within [t, t + dt) by itself, as `step_through_events` does; one at t + dt is left to what
-    follows, be it the next step or `handle_event`. With `advance` and `handle_event` a host sees each event.
+    follows, the next step or `handle_event`. With `advance` and `handle_event` a host sees each event.
     """
 
     def advance(self, t: float, dt: float, u: Any) -> tuple[float, Any]:
         """Advance from t with u held, by dt or to the first event.
 
         Returns:
-            How far it came, s: dt, or less where an event is; 0 if one is due at t. And the outputs there, as they are
-            before the event changes anything.
+            The time by which it advanced, s: dt, or less where an event is; 0 if one is due at t. And the outputs
+            there, before the event changes anything.
         """
         ...
 
     def handle_event(self, t: float, u: Any) -> Any:
-        """Change what the event changes that is due at t, and return the outputs after it; no time passes.
+        """Apply the event that is due at t and return the outputs after it; no time passes.
 
-        The instant of an event known beforehand may have been missed by what a host's sum of steps is off, 1e-9 s.
+        t may differ from the time of an event known beforehand by a host's rounding errors in its sum of steps, 1e-9 s.
         """
         ...
 
     def next_event(self, t: float) -> float | None:
         """Return the time of the next event that is known beforehand, or None.
 
-        A host with event mode lets a step end there. Events that depend on inputs need not be told.
+        A host with event mode lets a step end there. Events that depend on inputs need not be announced.
         """
         ...
 
@@ -132,10 +127,10 @@ def step_through_events(block: EventfulBlock, t: float, dt: float, u: Any) -> An
     """Advance from t by dt with u held, handle the events on the way, and return the outputs at t + dt.
 
     Raises:
-        InvalidAdvance: the block went backwards, or farther than it was to.
-        TooManyEvents: there are more than MOST_EVENTS events in a row and no time passes.
+        InvalidAdvance: the block went backwards, or beyond dt.
+        TooManyEvents: there are more than MAX_EVENTS events in a row and no time passes.
     """
-    passed, idle = 0.0, 0
+    passed, idle = 0.0, 0  # seconds, and events in a row without any
     while True:
         left = dt - passed
         reached, y = block.advance(t + passed, left, u)
@@ -153,12 +148,12 @@ def step_through_events(block: EventfulBlock, t: float, dt: float, u: Any) -> An
 
 
 class InvalidParameters(ValueError):
-    """Parameters of which a block cannot be made, or inputs that it cannot take; nothing has changed.
+    """Parameters or inputs that a block rejects; its state has not changed. Subclasses name their block.
 
-    An FMU's log tells a refusal in one line, with no traceback. Subclasses name their block.
+    An FMU logs the message in one line, without a traceback: the runtime looks for a true `is_refusal`.
 
     Attributes:
-        faults: all that is wrong, each with what would be right.
+        faults: everything that is wrong, each with the values that would be valid.
     """
 
     block: str

@@ -1,6 +1,7 @@
-"""What a block class declares: everything that is told of its variables elsewhere comes from here.
+"""Reads what a block class declares: ports, parameters, direct feedthrough, period, events, derivatives.
 
-Whether a class has what a block has, looked at before its ports are.
+`describe` is the one source of this for model descriptions, the FMU's runtime and documentation. It first checks the
+class's form, that is its attributes and methods, then reads the dataclasses of its ports.
 """
 
 import dataclasses
@@ -17,50 +18,6 @@ from handover.cosim.blocks.variable import Causality, Variable
 
 _ATTRIBUTES = ("feedthrough", "period")
 _METHODS = ("outputs", "step", "get_state", "set_state")
-
-
-def check_form(block: type[Any]) -> None:
-    """Check a block class's attributes and methods.
-
-    Raises:
-        DeclarationError: some are missing, all of which are told, or an attribute is of a type that it cannot be of.
-    """
-    missing = [name for name in _ATTRIBUTES if not hasattr(block, name)]
-    missing += [name for name in _METHODS if not callable(getattr(block, name, None))]
-    if missing:
-        what = "a block has these" if len(missing) > 1 else "a block has this"
-        raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see handover.cosim.blocks.block.Block")
-    for name, fault in (("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))):
-        if fault:
-            raise DeclarationError(block.__name__, name, fault)
-
-
-def _period_fault(period: object) -> str:
-    if period is None:
-        return ""
-    if isinstance(period, Fraction):
-        return "" if period > 0 else f"{period} s is not positive"
-    try:
-        exact = Fraction(str(period))
-    except (ValueError, ZeroDivisionError):
-        exact = Fraction(0)
-    cure = repr(exact if exact > 0 else Fraction(1, 100))
-    return f"{period!r} is not a fraction of seconds; {cure} is right, or None for a block that is not sampled"
-
-
-def _feedthrough_fault(block: type[Any]) -> str:
-    given: object = block.feedthrough
-    example = 'such as {"y": ("u",)}, or {} where no input has direct feedthrough to an output'
-    if not isinstance(given, Mapping):
-        return f"{given!r} is not a mapping of outputs' names to tuples of inputs' names, {example}"
-    for y, us in cast("Mapping[object, object]", given).items():
-        if isinstance(us, str):
-            return f"{y!r}: {us!r} is a text, not a tuple of inputs' names; ({us!r},) is right"
-        if not isinstance(us, (tuple, list)):
-            return f"{y!r}: {us!r} is not a tuple of inputs' names, {example}"
-    return ""
-
-
 _EVENT_METHODS = ("advance", "handle_event", "next_event")
 
 
@@ -104,9 +61,9 @@ def describe(block: type[Any]) -> Description:
     """Read a block class's declarations.
 
     Raises:
-        DeclarationError: something that a block has is missing; a field has no `parameter`, `port` or `output`
-            declaration, or a type that is no port's, or a start value or bound that its type cannot hold; period or
-            feedthrough are not what they are to be.
+        DeclarationError: an attribute or method of a block is missing; a field has no `parameter`, `port` or `output`
+            declaration, or a type that no port has, or a start value or bound that its type cannot hold; period or
+            feedthrough are invalid.
     """
     check_form(block)
     params_type = _annotation(block, "__init__", "params")
@@ -136,6 +93,48 @@ def describe(block: type[Any]) -> Description:
     )
 
 
+def check_form(block: type[Any]) -> None:
+    """Check a block class's attributes and methods.
+
+    Raises:
+        DeclarationError: some are missing (the message lists all of them), or an attribute's value is invalid.
+    """
+    missing = [name for name in _ATTRIBUTES if not hasattr(block, name)]
+    missing += [name for name in _METHODS if not callable(getattr(block, name, None))]
+    if missing:
+        what = "a block has these" if len(missing) > 1 else "a block has this"
+        raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see handover.cosim.blocks.block.Block")
+    for name, fault in (("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))):
+        if fault:
+            raise DeclarationError(block.__name__, name, fault)
+
+
+def _period_fault(period: object) -> str:
+    if period is None:
+        return ""
+    if isinstance(period, Fraction):
+        return "" if period > 0 else f"{period} s is not positive"
+    try:
+        exact = Fraction(str(period))
+    except (ValueError, ZeroDivisionError):
+        exact = Fraction(0)
+    valid = repr(exact if exact > 0 else Fraction(1, 100))
+    return f"{period!r} is not a fraction of seconds; use {valid}, or None for a block that is not sampled"
+
+
+def _feedthrough_fault(block: type[Any]) -> str:
+    feedthrough: object = block.feedthrough
+    example = 'such as {"y": ("u",)}, or {} where no input has direct feedthrough to an output'
+    if not isinstance(feedthrough, Mapping):
+        return f"{feedthrough!r} is not a mapping of outputs' names to tuples of inputs' names, {example}"
+    for y, us in cast("Mapping[object, object]", feedthrough).items():
+        if isinstance(us, str):
+            return f"{y!r}: {us!r} is a string, not a tuple of inputs' names; use ({us!r},)"
+        if not isinstance(us, (tuple, list)):
+            return f"{y!r}: {us!r} is not a tuple of inputs' names, {example}"
+    return ""
+
+
 def _module_doc(block: type[Any]) -> str:
     module = sys.modules.get(block.__module__)
     return inspect.cleandoc(module.__doc__ or "") if module else ""
@@ -145,7 +144,7 @@ def _has_events(block: type[Any]) -> bool:
     present = [name for name in _EVENT_METHODS if hasattr(block, name)]
     for name in _EVENT_METHODS:
         if present and name not in present:
-            fault = f"a block that has {present[0]} has this method too; see handover.cosim.blocks.block.EventfulBlock"
+            fault = f"a block with {present[0]} needs this method too; see handover.cosim.blocks.block.EventfulBlock"
             raise DeclarationError(block.__name__, name, fault)
     if present and block.period is not None:
         raise DeclarationError(block.__name__, "period", "a block with events is not sampled: its period is None")
@@ -154,9 +153,9 @@ def _has_events(block: type[Any]) -> bool:
 
 def _annotation(block: type[Any], method: str, name: str) -> type[Any]:
     hints = typing.get_type_hints(getattr(block, method))
-    found = hints.get(name)
-    if found is None or not dataclasses.is_dataclass(found):
+    annotation = hints.get(name)
+    if annotation is None or not dataclasses.is_dataclass(annotation):
         raise DeclarationError(
             block.__name__, method, f"{name!r} must be annotated with a dataclass of declared fields"
         )
-    return typing.cast("type[Any]", found)
+    return typing.cast("type[Any]", annotation)

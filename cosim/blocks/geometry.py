@@ -1,12 +1,11 @@
-"""Frames, rotations and quaternions, in monogram notation.
+"""Frames, rotations, quaternions and the pinhole camera, in monogram notation.
 
 `p_WG` is the position of G seen from W, `R_WC` turns coordinates in C into coordinates in W, `q_WB` is the quaternion
 of `R_WB` with its scalar part first. A frame is a single capital letter; FRAMES lists them all.
 
-Single rotations are computed here: SciPy's `Rotation`, made for many at once, takes ten times as long for one, and
-loading it longer than all else that a camera or a hand needs.
-
-A calibrated camera: pinhole projection with the radial and tangential distortion of its lens (Brown and Conrady).
+Rotations are computed here and not by SciPy's `Rotation`: that is made for many rotations at once and takes ten times
+as long for one, and importing it takes longer than all other imports of a camera or a hand together. `Pinhole` is a
+calibrated camera with the radial and tangential distortion of its lens (Brown and Conrady).
 """
 
 import math
@@ -16,7 +15,9 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 
-_SMALL_TURN = 1e-3  # rad
+_SMALL_ANGLE = 1e-3  # rad
+_UNIT_TOLERANCE = 1e-6  # of a quaternion's length
+_MIN_DEPTH = 0.02  # m; points nearer to the lens, or behind it, are not projected
 
 FRAMES: Final = {
     "W": "world: right-handed, z up; origin at the middle of the Helix's mount, at the foot of the VSL arm, near the "
@@ -45,24 +46,24 @@ def rotation_of(q_AB: Floats) -> Floats:
 def rotation_by(r_AB: Floats) -> Floats:
     """Return R_AB, shape (3, 3), of the rotation vector r_AB, shape (3,): its direction is the axis, its length in rad.
 
-    The quaternion is (cos(a/2), sin(a/2)/a r_AB) for a turn by a = |r_AB|, by its series where a is small.
+    The quaternion is (cos(a/2), sin(a/2)/a r_AB) for a rotation by a = |r_AB|, by its series where a is small.
     """
     x, y, z = np.asarray(r_AB, dtype=np.float64).tolist()
     a = math.sqrt(x * x + y * y + z * z)
     a2 = a * a
-    scale = math.sin(a / 2) / a if a > _SMALL_TURN else 0.5 - a2 / 48 + a2 * a2 / 3840
+    scale = math.sin(a / 2) / a if a > _SMALL_ANGLE else 0.5 - a2 / 48 + a2 * a2 / 3840
     return _matrix(scale * x, scale * y, scale * z, math.cos(a / 2))
 
 
 def quaternion_of(R_AB: Floats) -> Floats:
     """Return q_AB, shape (4,), scalar first and not negative, of the rotation matrix R_AB, shape (3, 3).
 
-    The greatest of the four entries is taken from the diagonal, the others from sums and differences beside it.
+    The largest entry is computed from the diagonal, the others from sums and differences of off-diagonal entries.
     """
     R: list[list[float]] = np.asarray(R_AB, dtype=np.float64).tolist()
     trace = R[0][0] + R[1][1] + R[2][2]
-    greatest = [R[0][0], R[1][1], R[2][2], trace]
-    i = greatest.index(max(greatest))
+    candidates = [R[0][0], R[1][1], R[2][2], trace]
+    i = candidates.index(max(candidates))
     if i == 3:
         q = [R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1], 1.0 + trace]
     else:
@@ -90,7 +91,7 @@ def _normed(x: float, y: float, z: float, w: float) -> tuple[float, float, float
 
 
 def _matrix(x: float, y: float, z: float, w: float) -> Floats:
-    """Return the rotation matrix of a quaternion, whose sums are in SciPy's order: results are the same to the bit."""
+    """Return the rotation matrix of a unit quaternion, summed in SciPy's order: results agree bit by bit."""
     xx, yy, zz, ww = x * x, y * y, z * z, w * w
     xy, xz, yz, xw, yw, zw = x * y, x * z, y * z, x * w, y * w, z * w
     return np.array(
@@ -102,12 +103,8 @@ def _matrix(x: float, y: float, z: float, w: float) -> Floats:
     )
 
 
-_UNIT_TOLERANCE = 1e-6
-_NEAR = 0.02  # m; what is nearer to the lens, or behind it, has no picture
-
-
 class InvalidCalibration(ValueError):
-    """A camera's calibration has no meaning: quaternion not of unit length, or focal length not positive."""
+    """A camera's calibration is invalid: quaternion not of unit length, or focal length not positive."""
 
     def __init__(self, camera: str, quantity: str, value: Floats, wanted: str) -> None:
         super().__init__(f"camera {camera!r}: {quantity} = {np.asarray(value).tolist()}; it must be {wanted}")
@@ -121,7 +118,7 @@ class Pinhole:
     x_d = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y_d likewise with p1 and p2 exchanged.
 
     Args:
-        name: what messages call the camera.
+        name: the camera's name in messages.
         p_WC: position in the world, shape (3,), in m.
         q_WC: orientation, shape (4,), scalar first.
         intrinsics: fx, fy, cx, cy, in px.
@@ -154,13 +151,13 @@ class Pinhole:
     def project(self, p_WP: Floats) -> Floats:
         """Return pixels, shape (..., 2), of points of shape (..., 3); NaN for what is behind the camera."""
         p_CP = (p_WP - self.p_WC) @ self.R_WC
-        Z = np.where(p_CP[..., 2:] > _NEAR, p_CP[..., 2:], np.nan)
+        Z = np.where(p_CP[..., 2:] > _MIN_DEPTH, p_CP[..., 2:], np.nan)
         return self.f * self._distorted(p_CP[..., :2] / Z) + self.c
 
     def project_with_slope(self, p_WP: Floats) -> tuple[Floats, Floats]:
         """Return pixels, shape (n, 2), of points of shape (n, 3), and d pixel / d p_WP, shape (n, 2, 3), in px/m."""
         p_CP = (p_WP - self.p_WC) @ self.R_WC
-        Z = np.where(p_CP[:, 2:] > _NEAR, p_CP[:, 2:], np.nan)
+        Z = np.where(p_CP[:, 2:] > _MIN_DEPTH, p_CP[:, 2:], np.nan)
         xy = p_CP[:, :2] / Z
         slope = self.f[:, None] * self._slope(xy)  # d pixel / d (x, y)
         by_point = np.concatenate([slope, -slope @ xy[:, :, None]], axis=2) / Z[:, :, None]
@@ -168,15 +165,15 @@ class Pinhole:
 
     def undistorted(self, pixels: Floats) -> Floats:
         """Return (x, y) = (X, Y) / Z, shape (n, 2), of pixels of shape (n, 2), by Newton's method."""
-        wanted = (pixels - self.c) / self.f
-        xy = wanted
+        target = (pixels - self.c) / self.f
+        xy = target
         for _ in range(4):
-            slope, missing = self._slope(xy), wanted - self._distorted(xy)
-            xy = xy + np.linalg.solve(slope, missing[:, :, None])[:, :, 0]
+            slope, residual = self._slope(xy), target - self._distorted(xy)
+            xy = xy + np.linalg.solve(slope, residual[:, :, None])[:, :, 0]
         return xy
 
     def rays(self, pixels: Floats) -> Floats:
-        """Return unit directions in W, shape (n, 3), of the light that meets the pixels, shape (n, 2)."""
+        """Return unit directions in W, shape (n, 3), from the camera through pixels, shape (n, 2)."""
         xy = self.undistorted(pixels)
         d = np.column_stack([xy, np.ones(len(xy))]) @ self.R_CW
         return d / np.linalg.norm(d, axis=1, keepdims=True)

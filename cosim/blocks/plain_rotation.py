@@ -1,9 +1,8 @@
-"""Vectors, rotations and quaternions as plain floats: for three numbers numpy costs ten times the arithmetic.
+"""Vectors, rotations and quaternions as tuples of floats: for three numbers numpy costs ten times the arithmetic.
 
-What has to be spelled out coordinate by coordinate is spelled out here, so that the formulas that call these functions
-read as they do on paper. Functions instead of a class with operators, because such an operator costs three to five
-times the call. Each sums from left to right as its formula reads: add_cross(a, b, c) and add(a, cross(b, c)) differ in
-the last bit.
+Coordinates are spelled out here, so that the formulas that call these functions read as they do on paper. They are
+functions and not a class with operators, because such an operator costs three to five times a call.
+Each sums from left to right as its formula reads: add_cross(a, b, c) and add(a, cross(b, c)) differ in the last bit.
 
 Quaternions have their scalar part first; a matrix is its nine entries, row by row.
 """
@@ -74,7 +73,7 @@ def add_scaled(a: Vector, s: float, b: Vector) -> Vector:
 
 
 def lerp(a: Vector, b: Vector, s: float) -> Vector:
-    """Return a + s (b - a), a share s of the way from a to b."""
+    """Return a + s (b - a), linear interpolation from a (s = 0) to b (s = 1)."""
     a_x, a_y, a_z = a
     b_x, b_y, b_z = b
     return a_x + s * (b_x - a_x), a_y + s * (b_y - a_y), a_z + s * (b_z - a_z)
@@ -124,10 +123,10 @@ def distance(a: Vector, b: Vector) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
-def clip(v: Vector, largest: Vector) -> Vector:
-    """Return v with each component brought between minus and plus that of `largest`."""
+def clip(v: Vector, limit: Vector) -> Vector:
+    """Return v with each component limited in magnitude to that of `limit`."""
     x, y, z = v
-    a, b, c = largest
+    a, b, c = limit
     return min(max(x, -a), a), min(max(y, -b), b), min(max(z, -c), c)
 
 
@@ -216,14 +215,14 @@ def quaternion_add_scaled(p: Quaternion, s: float, q: Quaternion) -> Quaternion:
 
 
 def normalize(q: Quaternion) -> Quaternion:
-    """Return the quaternion with its norm brought to 1."""
+    """Return q / |q|."""
     w, x, y, z = q
     n = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
     return w * n, x * n, y * n, z * n
 
 
 def nlerp(p: Quaternion, q: Quaternion, s: float) -> Quaternion:
-    """Return normalised linear interpolation: the unit quaternion a share s of the shorter way from p to q."""
+    """Return normalised linear interpolation from p (s = 0) to q (s = 1) by the shorter way, a unit quaternion."""
     a, b, c, d = p
     w, x, y, z = q
     if a * w + b * x + c * y + d * z < 0.0:
@@ -233,7 +232,7 @@ def nlerp(p: Quaternion, q: Quaternion, s: float) -> Quaternion:
 
 
 def perturb(q: Quaternion, h: Vector) -> Quaternion:
-    """Return q (1, h) with norm 1: q turned in its own frame by the small rotation vector 2 h, in rad."""
+    """Return q (1, h) / |(1, h)|: q rotated in its own frame by the small rotation vector 2 h, in rad."""
     a, i, j, k = q
     x, y, z = h
     n = 1.0 / math.sqrt(1.0 + x * x + y * y + z * z)

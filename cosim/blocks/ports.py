@@ -1,14 +1,12 @@
-"""Kinds of port and parameter, as types and dataclass fields.
+"""Types and dataclass fields by which a block declares its ports and parameters.
 
 A scalar port is a float with a unit (`handover.cosim.blocks.units`), an int, a bool, a str or an `enum.IntEnum`. An
 array is one of the shapes below with the unit of its entries, as in `Vector3[Metre]`; `Polyline25[Metre]` holds 25
 points in space. A camera picture is `Picture1280x720`.
 
-Outside, reals have 64 bits and integers too. A block that wants others says so by type: `Single[Metre]` and
-`Single[Vector3[Metre]]` are reals of 32 bits, `Int8` ... `UInt64` integers. For the block they are float, array and int
-all the same.
-
-Types of numbers at an FMU's boundary.
+At an FMU's boundary reals and integers have 64 bits, unless the type says otherwise: `Single[Metre]` and
+`Single[Vector3[Metre]]` are reals of 32 bits, `Int8` ... `UInt64` integers of other widths. Within the block they are
+float, array and int all the same.
 """
 
 import enum
@@ -23,8 +21,8 @@ from typing_extensions import TypeAliasType
 class Width(enum.Enum):
     """How many bits a real or integer variable has at an FMU's boundary; the values are FMI 3's names.
 
-    A block itself counts with Python's numbers, whatever the width. FMI 2 has two types of number: reals are 64 bits
-    wide, integers 32.
+    A block itself computes with Python's numbers, whatever the width. FMI 2 has two numeric types: reals of 64 bits and
+    integers of 32.
     """
 
     FLOAT32 = "Float32"
@@ -45,14 +43,14 @@ class Width(enum.Enum):
 
     @property
     def lowest(self) -> float:
-        """The least number; of the integer widths an int."""
+        """The smallest number that fits; an int for integer widths."""
         if self.is_real:
             return float(np.finfo(self.value.lower()).min)
         return int(np.iinfo(self.value.lower()).min)
 
     @property
     def highest(self) -> float:
-        """The greatest number; of the integer widths an int."""
+        """The largest number that fits; an int for integer widths."""
         if self.is_real:
             return float(np.finfo(self.value.lower()).max)
         return int(np.iinfo(self.value.lower()).max)
@@ -63,11 +61,11 @@ class Width(enum.Enum):
         return f"{self.value} (from {self.lowest!r} to {self.highest!r})"
 
     def holds(self, number: float) -> bool:
-        """Tell whether a number has a place, be it rounded."""
+        """Return whether a number fits, rounded if need be."""
         return self.lowest <= number <= self.highest
 
     def rounded(self, number: float) -> float:
-        """Return the nearest number of this width to one that has a place in it."""
+        """Return the nearest number of this width to one that fits."""
         return float(np.float32(number)) if self is Width.FLOAT32 else number
 
 
@@ -126,7 +124,7 @@ UInt32 = Annotated[int, Width.UINT32]
 UInt64 = Annotated[int, Width.UINT64]
 
 Picture1280x720 = Annotated[NDArray[np.uint8], Raster(1280, 720)]
-"""Array of shape (720, 1280, 3)."""
+"""Colour picture: array of shape (720, 1280, 3), see `Raster`."""
 
 BLACK_1280X720 = np.zeros((720, 1280, 3), dtype=np.uint8)
 """Start value of a picture."""
@@ -134,7 +132,7 @@ BLACK_1280X720 = np.zeros((720, 1280, 3), dtype=np.uint8)
 
 @dataclass(frozen=True, kw_only=True)
 class Declaration:
-    """What a field says of its port beyond its type."""
+    """What a field declares of its port beyond its type."""
 
     description: str
     start: Any
@@ -145,14 +143,14 @@ class Declaration:
 def parameter(default: T, description: str, *, minimum: float | None = None, maximum: float | None = None) -> T:
     """Declare a parameter, as the default of a dataclass field: its value is fixed during a run.
 
-    Bounds hold for every entry of an array and are themselves allowed.
+    Bounds are inclusive and hold for every entry of an array.
     """
     d = Declaration(description=description, start=default, minimum=minimum, maximum=maximum)
     return _field_with_default(default, d)
 
 
 def port(start: T, description: str, *, minimum: float | None = None, maximum: float | None = None) -> T:
-    """Declare an input, as the default of a dataclass field; `start` is its value before anything is connected."""
+    """Declare an input, as the default of a dataclass field; `start` is its value while nothing is connected."""
     d = Declaration(description=description, start=start, minimum=minimum, maximum=maximum)
     return _field_with_default(start, d)
 
@@ -169,9 +167,9 @@ def _field_with_default(default: T, declaration: Declaration) -> T:
         dtype = np.uint8 if default.dtype == np.uint8 else np.float64
         array = np.asarray(default, dtype=dtype)
 
-        def copy() -> Any:
+        def copy() -> Any:  # dataclasses would share one array between instances
             return np.array(array)
 
         return field(default_factory=copy, metadata=metadata)
-    made: T = field(default=default, metadata=metadata)
-    return made
+    declared: T = field(default=default, metadata=metadata)
+    return declared

@@ -1,4 +1,4 @@
-"""Checks values of parameters and inputs against what is declared of them, and flattens them."""
+"""Checks values for parameters and inputs against their declarations, and flattens them to arrays of numbers."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from handover.cosim.blocks.variable import Causality, Declared, Kind
 
 
 def fault_of(port: Declared, value: Any) -> str | None:
-    """Return what is wrong with a value for a port, saying what would be right, or None."""
+    """Return what is wrong with a value for a port, with the valid values, or None."""
     if port.kind in (Kind.STRING, Kind.BINARY):
         wanted = str if port.kind is Kind.STRING else (bytes, bytearray, memoryview)
         return None if isinstance(value, wanted) else f"{_text(value)} is not a {port.kind.value}"
@@ -34,7 +34,7 @@ def fault_of(port: Declared, value: Any) -> str | None:
 
 
 def parameter_faults(params: Any) -> list[str]:
-    """Return what is wrong with a block's parameters, an instance of its dataclass, by their declarations."""
+    """Return everything that is wrong with a block's parameters, an instance of its `Params` dataclass."""
     owner: Any = params.__class__
     variables = declared_variables(owner, Causality.PARAMETER)
     faults = [(v.name, fault_of(v, getattr(params, v.name))) for v in variables]
@@ -45,20 +45,21 @@ def numbers_of(port: Declared, value: Any) -> NDArray[Any]:
     """Return a value as numbers in row-major order; enumerations may be given by name.
 
     Raises:
-        ValueError: not as many numbers as the port has, or not numbers.
+        ValueError: the shape is not the port's, or the entries are not numbers.
     """
     if port.kind is Kind.ENUMERATION and isinstance(value, str):
         value = {name.upper(): v for name, v in port.items}[value.upper()]
-    given = np.asarray(value)
-    whole = port.kind in (Kind.INTEGER, Kind.ENUMERATION) and given.dtype.kind in "iu"
-    array = given if whole else np.asarray(given, dtype=np.float64)  # floats would lose digits of large integers
+    array = np.asarray(value)
+    is_integer = port.kind in (Kind.INTEGER, Kind.ENUMERATION) and array.dtype.kind in "iu"
+    if not is_integer:  # large integers would lose digits as floats
+        array = np.asarray(array, dtype=np.float64)
     if array.shape != port.shape:
         raise ValueError(f"shape {array.shape} where {port.shape} is wanted")
     return array.reshape(-1)
 
 
 def range_of(port: Declared) -> str:
-    """Return the range that a value must lie in, in words, with the unit; empty where there is none."""
+    """Return a port's range in words, with the unit; empty where it has none."""
     low, high = port.minimum, port.maximum
     unit = "" if port.unit.symbol == "1" else f" {port.unit.symbol}"
     if low is not None and high is not None:
@@ -90,5 +91,5 @@ def _width_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | Non
 
 
 def _text(value: Any) -> str:
-    text = repr(value.tolist() if isinstance(value, np.ndarray) else value)
-    return text if len(text) < 80 else text[:77] + "..."
+    shown = repr(value.tolist() if isinstance(value, np.ndarray) else value)
+    return shown if len(shown) < 80 else shown[:77] + "..."

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Annotated
 
-_SMALLEST, _LARGEST = 1e-100, 1e100
+_SMALLEST, _LARGEST = 1e-100, 1e100  # beyond these, conversions would overflow or lose all digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +28,7 @@ class BaseExponents:
 class Unit:
     """A unit: value in SI = factor * value + offset, of the dimension `base`.
 
-    A foreign FMU may name a unit that it does not define, or name none: then `defined` is False.
+    A foreign FMU may name a unit without defining it, or name none: then `defined` is False.
     """
 
     symbol: str
@@ -39,7 +39,7 @@ class Unit:
 
     @property
     def is_usable(self) -> bool:
-        """Whether values can be converted from and to it: its factor is no zero, and no number is absurdly large."""
+        """Whether values can be converted from and to it: factor and offset are of reasonable magnitude."""
         return _SMALLEST < abs(self.factor) < _LARGEST and abs(self.offset) < _LARGEST
 
     def __str__(self) -> str:
@@ -48,7 +48,7 @@ class Unit:
 
 ONE = Unit("1")
 UNKNOWN = Unit("", defined=False)
-"""The unit of a variable that names none."""
+"""The unit of a variable that declares none."""
 
 Number = Annotated[float, ONE]
 Metre = Annotated[float, Unit("m", BaseExponents(m=1))]

@@ -1,4 +1,4 @@
-"""What is told of a parameter, input or output: name, kind, unit, shape, width, start, range."""
+"""Description of a parameter, input or output: name, kind, causality, unit, shape, width, start value, range."""
 
 import dataclasses
 import enum
@@ -30,9 +30,9 @@ class Causality(enum.Enum):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Declared:
-    """What is known of a parameter, input or output, be it a block's or an FMU's.
+    """What a block and an FMU alike declare of a parameter, input or output.
 
-    `items` are an enumeration's; reals and integers have a `width`.
+    `items` are the names and values of an enumeration; reals and integers have a `width`.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Declared:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Variable(Declared):
-    """All that a block says of one of its parameters, inputs or outputs."""
+    """All that a block declares of a parameter, input or output."""
 
     start: Any
     enumeration: type[enum.IntEnum] | None = None

@@ -1,1 +1,1 @@
-"""Tells of an FMU, foreign or broken, what is wrong with it: where, and what would be right."""
+"""Checks FMUs, also foreign or broken ones: reports what is wrong, where, and the remedy."""

@@ -1,8 +1,9 @@
-"""Checks one file: archive, description, interface, binaries, loading, and a short run.
+"""Checks one FMU file: archive, description, interface, binaries, loading, and a short run.
 
-The standard's own validation: FMPy's, by the standard's schema and rules, in this project's words.
-
-Which machines an FMU has libraries for, and whether they are what their folders say, before one is loaded.
+`check_fmu` runs the parts in this order, each only if the ones before it allow. The description is checked by FMPy's
+validation with the standard's schema and rules (`standard_findings`) and by `description_checks`; the libraries'
+formats and platforms are checked before one is loaded (`binary_findings`); loading and running happen in isolated
+processes.
 """
 
 import math
@@ -48,17 +49,17 @@ _CURES = {
     "Exactly one independent variable must be defined.": 'one Float64 with causality="independent" is wanted, the time'
 }
 _MAX_NAMES = 20
-_OUTPUTS = "ModelStructure/Outputs must have exactly one entry"  # said by structure_checks, which names them
+_OUTPUTS = "ModelStructure/Outputs must have exactly one entry"  # reported by description_checks, which names them
 
 
 def standard_findings(path: Path, own: Sequence[Finding]) -> list[Finding]:
-    """Return what FMPy's validation finds in an FMU that may be read; `own` is what has been found without it."""
+    """Return what FMPy's validation finds in an FMU that is safe to read; `own` are the findings of other checks."""
     problems, stopped = problems_of(path)
-    sentence = " ".join(f.line for f in own)
+    own_lines = " ".join(f.line for f in own)
     findings = [
         _finding(p)
         for p in dict.fromkeys(problems)
-        if not (p.startswith(_OUTPUTS) and "ModelStructure does not list" in sentence)
+        if not (p.startswith(_OUTPUTS) and "ModelStructure does not list" in own_lines)
     ]
     if stopped and not findings and not own:
         findings.append(fault(f"the description cannot be understood: {stopped}", where=DESCRIPTION))
@@ -86,7 +87,7 @@ def _names(text: str) -> set[str]:
 
 
 def _listed(names: set[str]) -> str:
-    """Return names in the order in which people count, y2 before y10."""
+    """Return names in natural order, y2 before y10."""
     ordered = sorted(names, key=lambda name: [part.zfill(9) for part in re.split(r"(\d+)", name)])
     more = f" and {len(ordered) - _MAX_NAMES} more" if len(ordered) > _MAX_NAMES else ""
     return ", ".join(ordered[:_MAX_NAMES]) + more
@@ -120,8 +121,8 @@ def binary_findings(archive: FmuArchive, fmi: int, identifier: str) -> Iterator[
         if library.stem == identifier:
             yield from _format_findings(archive, library, fmi, here=str(library) == wanted)
         if short := shortage(archive.head(str(library), HEAD), archive.size(str(library))):
-            tell = fault if library.parts[1] == platform_folder(fmi) else warning
-            yield tell(short, where=str(library))
+            level = fault if library.parts[1] == platform_folder(fmi) else warning
+            yield level(short, where=str(library))
 
 
 def _libraries(archive: FmuArchive) -> list[PurePosixPath]:
@@ -130,7 +131,7 @@ def _libraries(archive: FmuArchive) -> list[PurePosixPath]:
 
 
 def _missing(archive: FmuArchive, fmi: int, identifier: str) -> Finding:
-    """Tell why there is no library for this machine: of another name, in another standard's folder, or not at all."""
+    """Return why there is no library for this machine: another name, another standard's folder, or none at all."""
     folder, has = platform_folder(fmi), platforms_in(archive)
     wanted = library_path(fmi, identifier)
     here = [p.name for p in _libraries(archive) if p.parts[1] == folder]
@@ -155,15 +156,15 @@ def _format_findings(archive: FmuArchive, library: PurePosixPath, fmi: int, *, h
     if here and not made_for:
         yield fault("not a shared library", where=str(library))
     elif meant and not set(made_for) & set(meant):
-        tell = fault if here else warning
-        yield tell(f"made for {' and '.join(made_for) or 'no known platform'}, not for {folder}", where=str(library))
+        level = fault if here else warning
+        yield level(f"made for {' and '.join(made_for) or 'no known platform'}, not for {folder}", where=str(library))
 
 
 _STEP = 0.01  # seconds, where the FMU asks for none
 
 
 class _Skipped(Exception):
-    """A part of a check has nothing to go by; the message says where the reason is told."""
+    """A part of a check cannot run; the message says where the reason is reported."""
 
 
 def check_fmu(path: Path, timeout: float) -> CheckReport:
@@ -194,7 +195,7 @@ def _section(name: str, run_part: Callable[[], tuple[str, list[Finding]]]) -> Se
 
 
 class _Check:
-    """One file's check; each part leaves what the next ones need, and says in `goes_on` whether they can follow."""
+    """One file's check; each part stores what the next ones need, and in `goes_on` whether they can follow."""
 
     def __init__(self, path: Path, timeout: float, scratch: Path) -> None:
         self.path, self.timeout, self.scratch = path, timeout, scratch
@@ -259,7 +260,7 @@ class _Check:
             read_description(self.path)
         except InvalidFmu as e:
             if not self.is_described:
-                raise _Skipped("not tried: its description cannot be used, see there") from e
+                raise _Skipped("not tried: its description is invalid, see there") from e
             return "", [fault(e.fault)]
         step = default_step(self.root) or _STEP
         capabilities = dict(_capabilities(self.interface, self.fmi))

@@ -1,4 +1,4 @@
-"""A variable as a model description has it, of either standard, before anything in it is believed."""
+"""A variable of a model description of either standard, as it is written: nothing in it has been validated."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
-"""What an FMU says of itself as a whole: its kind, its names, what it can do and what it needs.
+"""Checks of a model description, as far as they matter in a run and FMPy's validation does not make them.
 
-Whether what a model description refers to is there: indices and value references of its variables.
-
-What a model description says of its variables, as far as it matters in a run and FMPy does not look at it.
+`interface_findings` checks the co-simulation interface and the default experiment, `structure_findings` whether indices
+and value references lead to variables, `variable_findings` start values, ranges, types, units and dimensions.
 """
 
 import math
@@ -63,7 +62,7 @@ def default_start(root: XmlElement) -> float:
 
 
 def says(element: XmlElement, flag: str) -> bool:
-    """Tell whether a capability flag is set."""
+    """Return whether a capability flag is set."""
     return element.get(flag) in ("true", "1")
 
 
@@ -165,7 +164,7 @@ def _declared_types(root: XmlElement, fmi: int) -> dict[str, XmlElement]:
 
 
 def _range(v: DescribedVariable, declared: XmlElement | None) -> tuple[float, float]:
-    """Return the bounds of a variable's values; those that cannot be read are told elsewhere."""
+    """Return the bounds of a variable's values; those that cannot be read are reported by `_range_findings`."""
     bounds: list[float] = []
     for name, none in (("min", -math.inf), ("max", math.inf)):
         text = v.values.attributes.get(name) or (declared.attributes.get(name) if declared else None)

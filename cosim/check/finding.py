@@ -1,7 +1,4 @@
-"""One thing that a check has found.
-
-What a check of one file came to.
-"""
+"""Findings of a check, and the report of one file's check: sections with findings."""
 
 import enum
 from collections.abc import Sequence
@@ -30,7 +27,7 @@ class Finding:
         level: how much it matters; never OK.
         where: file, line, variable or call that it is about; empty if it is about the FMU as a whole.
         what: what is wrong.
-        cure: what would be right; empty where `what` says so.
+        cure: the remedy, or valid values; empty where `what` implies it.
         log: lines that the unit or the system wrote about it.
     """
 
@@ -67,9 +64,9 @@ class Section:
 
     Attributes:
         name: its name.
-        told: what was looked at, in a few words; of a group that was not reached, why.
+        summary: what was checked, in a few words; of a group that was not reached, why.
         findings: what was found.
-        reached: whether it was carried out.
+        reached: whether it was run.
     """
 
     name: str
@@ -85,7 +82,7 @@ class Section:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """The sections of one file's check, in the order in which they were carried out."""
+    """The sections of one file's check, in the order in which they were run."""
 
     path: Path
     sections: Sequence[Section]
@@ -105,7 +102,7 @@ class CheckReport:
         return sum(f.level is level for s in self.sections for f in s.findings)
 
     def as_json(self) -> dict[str, Any]:
-        """Return the report as JSON's kinds of values."""
+        """Return the report as a JSON object."""
         return {
             "file": str(self.path),
             "passed": self.passed,

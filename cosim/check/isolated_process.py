@@ -1,6 +1,7 @@
-"""Runs a part of a check in a process of its own, which may crash or hang, and reads what it told.
+"""Runs a part of a check in an isolated process, which may crash or hang, and reads its journal.
 
-What a process that is watched tells of itself: a line of JSON for each call that begins and each finding.
+The process writes a line of JSON for each call that begins and for each finding (`Journal`); from that and from how the
+process ended, its parent makes a `ProcessReport`.
 """
 
 import contextlib
@@ -36,12 +37,12 @@ _WINDOWS = {0xC0000005: "SIGSEGV", 0xC000001D: "SIGILL", 0xC0000094: "SIGFPE", 0
 
 @dataclass
 class ProcessReport:
-    """What a process told, and how it ended.
+    """What an isolated process reported, and how it ended.
 
     Attributes:
-        findings: what it found, and how it ended if not as it should.
-        facts: what else it told.
-        ended: whether it carried out everything.
+        findings: what it found, and how it ended if it crashed, hung or failed.
+        facts: other results, by name.
+        finished: whether it ran to its end.
     """
 
     findings: list[Finding] = field(default_factory=list[Finding])
@@ -82,7 +83,7 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _report(journal: Path, output: Path, code: int | None, timeout: float) -> ProcessReport:
-    watched = ProcessReport()
+    report = ProcessReport()
     call, t = "the process's start", None
     logged: list[str] = []
     for line in journal.read_text(encoding="utf-8").splitlines():
@@ -95,22 +96,22 @@ def _report(journal: Path, output: Path, code: int | None, timeout: float) -> Pr
         elif "log of the unit" in data:
             logged = [*logged, *str(data["log of the unit"]).splitlines()][-_MAX_LINES:]
         elif "facts" in data:
-            watched.facts.update(data["facts"])
+            report.facts.update(data["facts"])
         elif "end" in data:
-            watched.finished = True
+            report.finished = True
         else:
-            watched.findings.append(_finding(data))
+            report.findings.append(_finding(data))
     at = call if t is None else f"{call} at t = {t:.6g} s"
     if code is None:
         cure = "if it only needs longer: --timeout"
-        watched.findings.append(
+        report.findings.append(
             fault(f"{at} was not done after {timeout:g} s", cure=cure, log=(*logged, *_last_lines(output)))
         )
-    elif not watched.finished:
-        watched.findings.append(_end_of_process(at, code, (*logged, *_last_lines(output))))
+    elif not report.finished:
+        report.findings.append(_end_of_process(at, code, (*logged, *_last_lines(output))))
     elif code != 0:
-        watched.findings.append(warning(f"{_how(code)} at the end of its process", cure="after everything was freed"))
-    return watched
+        report.findings.append(warning(f"{_how(code)} at the end of its process", cure="after everything was freed"))
+    return report
 
 
 def _finding(data: Mapping[str, Any]) -> Finding:
@@ -150,7 +151,7 @@ _MAX_MESSAGE_LENGTH = 2000
 
 
 class Journal:
-    """Writes lines that are on disk before what they announce begins: a crash loses none."""
+    """Writes a line before each call begins and flushes it, so that a crash loses none."""
 
     def __init__(self, file: Path) -> None:
         self._room = 1_000_000  # characters
@@ -176,7 +177,7 @@ class Journal:
         self._write({"facts": facts})
 
     def ends(self) -> None:
-        """Note that all was carried out."""
+        """Note that everything was run."""
         self._write({"end": True})
 
     def _write(self, line: dict[str, Any]) -> None:

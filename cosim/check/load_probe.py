@@ -1,4 +1,4 @@
-"""Loads an FMU's library and looks up every function; runs in a process of its own, see `watched_process`."""
+"""Loads an FMU's library and looks up every function; runs in an isolated process, see `isolated_process`."""
 
 import ctypes
 import os
@@ -12,12 +12,11 @@ from handover.cosim.check.isolated_process import Journal
 
 _MISSING_LIBRARY = re.compile(r"(?:^|: |Library not loaded: )([^:\s]*?([^/:\s]+)): cannot open shared object file")
 _MISSING_ON_DARWIN = re.compile(r"Library not loaded: (\S+)")
-_SYMBOL = re.compile(r"undefined symbol: (\w+)|symbol not found in flat namespace '?_?(\w+)|\(([\w]+)\)")
 _GLIBC = re.compile(r"version [`'](\w+_[\d.]+)' not found")
 
 
 def main(task: Mapping[str, Any]) -> None:
-    """Load `task["library"]` and look up `task["functions"]`; tell what fails and what is missing."""
+    """Load `task["library"]` and look up `task["functions"]`; report what fails and what is missing."""
     journal = Journal(Path(task["journal"]))
     library = Path(task["library"])
     os.chdir(library.parent)  # as FMPy does: some libraries look there for others
@@ -65,5 +64,5 @@ def _missing_findings(missing: list[str], wanted: int) -> Iterator[Finding]:
         yield fault(what, cure='they must be exported under their plain names (extern "C", dllexport, no prefix)')
     elif missing:
         what = f"it lacks {len(missing)} of {wanted} functions: {', '.join(missing)}"
-        cure = "hosts that look them up refuse it or crash: the standard wants all, also those of what it cannot do"
+        cure = "hosts that look them up reject it or crash: the standard requires all, used or not"
         yield fault(what, cure=cure)

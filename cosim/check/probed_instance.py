@@ -71,7 +71,7 @@ class ProbedInstance(Instance):
         return state
 
     def restore(self, state: Any, t: float) -> None:
-        """Go back to a state that was kept at time t; the outputs are read."""
+        """Restore a state that was kept at time t, and read the outputs."""
         self._call(self._state("SetFMU"), state)
         self.time = t
         self.get_outputs()

@@ -1,6 +1,6 @@
-"""A short run of one unit through the calls that a master makes.
+"""A short run of one unit through the calls that a master makes, in an isolated process (`isolated_process`).
 
-The smoke run's process, see `watched_process`.
+The run covers instantiation, steps, state, a second instance, reset and termination; `main` is the process's entry.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ class SmokeRun:
     Attributes:
         description: what the FMU says of itself.
         folder: where it is unpacked.
-        journal: where calls and findings are told.
+        journal: where calls and findings are noted.
         start: time of the start, in seconds.
         step: communication step, in seconds.
         keeps_state: whether it says that its state can be kept and restored.
@@ -48,11 +48,11 @@ class SmokeRun:
     _reported: set[str] = field(default_factory=set[str])
 
     def run_all(self) -> None:
-        """Do it all, until a call fails; tell the journal what is found."""
+        """Run everything until a call fails; findings go to the journal."""
         try:
             unit = self._instance("unit")
         except InvalidFmu as e:
-            self.journal.found(fault(e.fault, where="instantiation", log=_reported(e.log)))
+            self.journal.found(fault(e.fault, where="instantiation", log=_log_tail(e.log)))
             return
         try:
             self._run(unit)
@@ -60,7 +60,7 @@ class SmokeRun:
             self.journal.found(failure(e))
         except InvalidFmu as e:
             what = f"a second instance beside the first: {e.fault}"
-            self.journal.found(fault(what, where="instantiation", log=_reported(e.log)))
+            self.journal.found(fault(what, where="instantiation", log=_log_tail(e.log)))
         finally:
             unit.free()
 
@@ -99,7 +99,7 @@ class SmokeRun:
         return seen
 
     def _steps_from_a_state(self, unit: ProbedInstance) -> list[dict[str, bytes]]:
-        """Do steps, go back and do them again, with the state as it was kept and as bytes."""
+        """Take steps, roll back and repeat them, with the state as it was kept and as bytes."""
         t, before = unit.time, unit.seen()
         state = unit.keep_state()
         seen = self._steps(unit)
@@ -114,12 +114,12 @@ class SmokeRun:
         return seen
 
     def _again(self, unit: ProbedInstance, state: Any, t: float, expected: list[dict[str, bytes]], call: str) -> bool:
-        """Go back, do the steps again, and tell whether the outputs are the same."""
+        """Roll back, repeat the steps, and return whether the outputs are the same."""
         unit.restore(state, t)
         after = unit.seen()
         for first, second in zip(expected, [after, *self._steps(unit)], strict=True):
             what = f"steps from a restored state (t = {t:.6g} s) give other outputs than the first time"
-            if self._compare(first, second, call, what, tell=fault, cure="the state must hold all that changes"):
+            if self._compare(first, second, call, what, level=fault, cure="the state must hold all that changes"):
                 return False
         return True
 
@@ -135,7 +135,7 @@ class SmokeRun:
                     second.advance(self.step)
                 self._compare(steps[-1], self._steps(second)[-1], text, "its outputs differ from the first's")
             unit.get_outputs()
-            self._compare(before, unit.seen(), text, "its steps changed the first one's outputs", tell=fault)
+            self._compare(before, unit.seen(), text, "its steps changed the first one's outputs", level=fault)
             second.end()
         finally:
             second.free()
@@ -147,18 +147,18 @@ class SmokeRun:
         where: str,
         what: str,
         *,
-        tell: Any = warning,
+        level: Any = warning,
         cure: str = "",
     ) -> bool:
-        """Tell, and return, whether outputs differ."""
+        """Return whether outputs differ, and report those that do."""
         different = [name for name, content in a.items() if b[name] != content]
         if different:
             names = ", ".join(different[:5]) + (f" and {len(different) - 5} more" if len(different) > 5 else "")
-            self.journal.found(tell(f"{what}: {names}", where=where, cure=cure))
+            self.journal.found(level(f"{what}: {names}", where=where, cure=cure))
         return bool(different)
 
     def _check_values(self, unit: ProbedInstance) -> None:
-        """Tell of outputs with values that cannot be, of each the first time."""
+        """Report outputs with invalid values, each of them once."""
         for name, views in unit.y.items():
             for finding in (
                 () if name in self._reported else _value_findings(self.description.outputs[name], views[0], unit.time)
@@ -168,12 +168,12 @@ class SmokeRun:
 
 
 def failure(e: UnitFailure) -> Finding:
-    """Return a failed call as a finding, with the unit's log."""
-    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=_reported(e.log))
+    """Return a failed call as a finding, with the end of the unit's log."""
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=_log_tail(e.log))
 
 
-def _reported(log: Sequence[str]) -> tuple[str, ...]:
-    """Return the end of a unit's log: of a traceback, where it ended and what was raised."""
+def _log_tail(log: Sequence[str]) -> tuple[str, ...]:
+    """Return the end of a unit's log, which holds the cause: of a traceback, what was raised and where."""
     return tuple(log_lines(log)[-_MAX_LINES:])
 
 

@@ -1,8 +1,7 @@
-"""An FMU's zip archive, looked through before anything is taken out of it.
+"""Reads and writes the zip archives of FMUs and SSPs.
 
-Why a zip archive is not to be unpacked: its members would lead out of a folder, fill the disk, or not be read.
-
-Writes the zip files of FMUs and SSPs.
+An archive from elsewhere is checked before anything is unpacked: no member may lead out of the folder, fill the disk,
+or be unreadable (`archive_faults`). Archives that are written have the same bytes for the same files (`write_archive`).
 """
 
 import io
@@ -20,7 +19,7 @@ from typing import ClassVar
 from handover.cosim.exceptions import InvalidFmu, one_line
 
 STANDARD_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Compressions that the standards know."""
+"""The compressions that the standards allow."""
 
 _METHODS = (*STANDARD_METHODS, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
 _MIB = 1 << 20
@@ -31,7 +30,7 @@ _MAX_REPORTED = 5
 
 
 def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
-    """Return why members of an archive of `size` bytes are not to be unpacked, a line for each kind of fault."""
+    """Return why an archive of `size` bytes must not be unpacked, a line for each kind of fault."""
     names = [m.orig_filename for m in members]
     plain = {n for n in names if not n.endswith("/")}
     kinds: tuple[tuple[str, Iterable[str]], ...] = (
@@ -45,9 +44,9 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
         ),
         ("files that are folders of other files", (n for n in plain if plain & _parents(n))),
     )
-    found = ((what, sorted(set(paths))) for what, paths in kinds)
+    faults = ((what, sorted(set(paths))) for what, paths in kinds)
     return [
-        *(f"the archive holds {what}: {listed(paths)}" for what, paths in found if paths),
+        *(f"the archive holds {what}: {listed(paths)}" for what, paths in faults if paths),
         *_size_faults(members, size),
     ]
 
@@ -59,13 +58,13 @@ def _size_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
     if total > _MAX_BYTES:
         return [f"the archive would unpack to {total / 2**30:.0f} GiB; at most {_MAX_BYTES >> 30} GiB are unpacked"]
     if total > _SUSPECT_BYTES and total > _SUSPECT_RATIO * size:
-        text = f"{size / _MIB:.1f} MiB would unpack to {total / _MIB:.0f} MiB"
-        return [f"the archive looks like a zip bomb: {text}; at most {_SUSPECT_RATIO} times as much is believed"]
+        ratio = f"{size / _MIB:.1f} MiB would unpack to {total / _MIB:.0f} MiB"
+        return [f"the archive looks like a zip bomb: {ratio}; at most {_SUSPECT_RATIO} times as much is accepted"]
     return []
 
 
 def _escapes_root(name: str) -> bool:
-    windows = "\\" in name or ":" in name  # other systems take these for letters; Windows goes elsewhere
+    windows = "\\" in name or ":" in name  # ordinary characters elsewhere; on Windows they lead to other folders
     return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or not name.strip("./")
 
 
@@ -79,7 +78,7 @@ def _parents(name: str) -> set[str]:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Return the first of some paths, shortened and without what would steer a terminal."""
+    """Return the first of some paths, shortened, with control characters escaped."""
     shown = [_shown(n) for n in names]
     more = f", and {len(shown) - _MAX_REPORTED} more" if len(shown) > _MAX_REPORTED else ""
     return ", ".join(shown[:_MAX_REPORTED]) + more
@@ -105,12 +104,12 @@ class FmuArchive:
         names: paths of all members, folders with a slash at the end.
 
     Raises:
-        InvalidFmu: no such file, not a zip archive, or with members that are not to be unpacked; all of them are told.
+        InvalidFmu: no such file, not a zip archive, or with members that must not be unpacked; the message lists them.
     """
 
     kind: ClassVar[str] = "FMU"
     description_name: ClassVar[str] = DESCRIPTION
-    """Where at the top of the archive it is told what it holds."""
+    """Name of the description, which is at the top of the archive."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -122,45 +121,45 @@ class FmuArchive:
 
     @property
     def outdated_methods(self) -> tuple[str, ...]:
-        """Members in a compression that the standards do not know: they want stored or deflated ones."""
+        """Members in a compression that the standards do not allow: they must be stored or deflated."""
         return tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
 
     def description(self) -> bytes:
-        """Return modelDescription.xml, or what stands in its place in another kind of archive.
+        """Return the content of modelDescription.xml, or of another kind of archive's description.
 
         Raises:
             InvalidFmu: it is missing, perhaps one folder too deep, or damaged.
         """
-        wanted = self.description_name
-        if wanted in self.names:
-            return self.read(wanted)
-        deeper = [n for n in self.names if n.endswith(f"/{wanted}")]
-        like = [n for n in self.names if n.lower() == wanted.lower()]
+        expected = self.description_name
+        if expected in self.names:
+            return self.read(expected)
+        deeper = [n for n in self.names if n.endswith(f"/{expected}")]
+        other_case = [n for n in self.names if n.lower() == expected.lower()]
         if deeper:
-            why = f"it is at {deeper[0]}; zip what is in that folder, not the folder"
-        elif like:
-            why = f"there is {like[0]}; upper and lower case count"
+            reason = f"it is at {deeper[0]}; zip what is in that folder, not the folder"
+        elif other_case:
+            reason = f"there is {other_case[0]}; upper and lower case count"
         else:
-            why = f"the archive holds {listed(self.names) or 'nothing'}"
-        raise InvalidFmu(self.path, f"no {wanted} at the top of the archive: {why}")
+            reason = f"the archive holds {listed(self.names) or 'nothing'}"
+        raise InvalidFmu(self.path, f"no {expected} at the top of the archive: {reason}")
 
     def read(self, name: str) -> bytes:
         """Return a text member's content.
 
         Raises:
-            InvalidFmu: it is damaged, or longer than any description.
+            InvalidFmu: it is damaged, or longer than 512 MiB.
         """
         try:
             with zipfile.ZipFile(self.path) as z:
                 size = z.getinfo(name).file_size
                 if size > _MAX_TEXT:
-                    raise InvalidFmu(self.path, f"{name} is of {size / _MIB:.0f} MiB; at most 512 MiB are read")
+                    raise InvalidFmu(self.path, f"{name} has {size / _MIB:.0f} MiB; at most 512 MiB are read")
                 return z.read(name)
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"the archive is damaged: {name}: {one_line(e)}") from e
 
     def size(self, name: str) -> int:
-        """Return the number of bytes of a member, unpacked."""
+        """Return a member's unpacked size in bytes."""
         return next(m.file_size for m in self._members if m.orig_filename == name)
 
     def head(self, name: str, size: int) -> bytes:
@@ -207,21 +206,21 @@ class FmuArchive:
             raise InvalidFmu(self.path, f"cannot be unpacked: {one_line(e)}") from e
 
 
-def folder_fault(wanted: str = DESCRIPTION) -> str:
-    """Return what is wrong with a folder in the place of an archive that has a file `wanted` at its top."""
-    return f"a folder, not a file; zip what is in it, with {wanted} at the top"
+def folder_fault(description_name: str = DESCRIPTION) -> str:
+    """Return the fault of a path that is a folder instead of an archive with a file `description_name` at its top."""
+    return f"a folder, not a file; zip what is in it, with {description_name} at the top"
 
 
-def _members(path: Path, kind: str, wanted: str) -> list[zipfile.ZipInfo]:
+def _members(path: Path, kind: str, description_name: str) -> list[zipfile.ZipInfo]:
     if path.is_dir():
-        raise InvalidFmu(path, folder_fault(wanted))
+        raise InvalidFmu(path, folder_fault(description_name))
     if not path.is_file():
         raise InvalidFmu(path, NO_FILE_FAULT if path.exists() else "there is no such file")
     try:
         with path.open("rb") as file:
-            begin = file.read(4)
+            first_bytes = file.read(4)
         if not zipfile.is_zipfile(path):
-            raise InvalidFmu(path, _no_zip(begin, kind))
+            raise InvalidFmu(path, _no_zip(first_bytes, kind))
         with zipfile.ZipFile(path) as z:
             return z.infolist()
     except PermissionError as e:
@@ -230,23 +229,23 @@ def _members(path: Path, kind: str, wanted: str) -> list[zipfile.ZipInfo]:
         raise InvalidFmu(path, f"the archive is damaged: {one_line(e)}") from e
 
 
-def _no_zip(begin: bytes, kind: str) -> str:
-    if not begin:
+def _no_zip(first_bytes: bytes, kind: str) -> str:
+    if not first_bytes:
         return f"not an {kind}: the file is empty"
-    if begin.startswith(b"PK\x03\x04"):
+    if first_bytes.startswith(b"PK\x03\x04"):
         return "the archive is damaged: it begins as a zip archive, but its end is missing; copy or fetch it again"
     return f"not an {kind}: an {kind} is a zip archive, and this file is not one"
 
 
 DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
-"""Who made the members, so that their permissions count."""
+"""The system that created the members, so that their permissions count."""
 
 
 def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
     """Write a zip file whose bytes depend on the files' names and contents alone.
 
-    It appears complete or not at all, so two processes may write the same one at once.
+    It appears complete or not at all, so two processes may write the same file at the same time.
     """
     content = _packed(files)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -275,7 +274,7 @@ def _packed(files: Mapping[str, bytes]) -> bytes:
 
 
 class _Archive(zipfile.ZipFile):
-    """Dropped as it is where an exception, such as Ctrl-C, leaves it: to close it then fails amid a member."""
+    """A zip file that is not closed when an exception, such as Ctrl-C, drops it: within a member, closing fails."""
 
     def __del__(self) -> None:
         pass

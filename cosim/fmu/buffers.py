@@ -1,8 +1,8 @@
-"""Preallocated buffers through which an FMU's variables of one type are set or read in one call.
+"""Preallocated buffers through which all variables of one FMI type of an instance are set or read in one call.
 
-What a port's buffer holds, as bytes: to see whether it has changed.
-
-First time derivatives of inputs, for FMI 2 units that interpolate.
+`SignalBuffer` sets and reads; `OutputBuffer` also copies strings and binaries, whose memory belongs to the unit;
+`InputDerivatives` sets the first time derivatives of inputs, for FMI 2 units that interpolate. Each port has views into
+its buffer's memory, so a connection is a copy between views, and `joined` merges copies that are adjacent in memory.
 """
 
 import ctypes
@@ -19,10 +19,10 @@ from handover.cosim.fmu.description import FmuPort
 _POINTER: Callable[[Any], Any] = ctypes.POINTER
 
 Views = tuple[NDArray[Any], ...]
-"""Where a port's value lives. Plain values: one array. Binary: addresses and sizes. Strings: addresses."""
+"""The memory of a port's value. Numbers: one array. Binaries: addresses and sizes. Strings: addresses."""
 
 Copy = tuple[NDArray[Any], NDArray[Any]]
-"""Where values go, and where they come from."""
+"""Target and source of a copy."""
 
 _VALUES: dict[str, Any] = {
     "Real": ctypes.c_double,
@@ -36,13 +36,14 @@ _VALUES: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class NativeCall:
-    """What a program in C needs to make a buffer's call itself.
+    """What C code needs to make a buffer's FMI call itself.
 
     Attributes:
-        function: the function's address.
-        component: the instance's.
+        fmi: version of the standard, 2 or 3.
+        function: address of the FMI function.
+        component: address of the instance.
         references: the value references.
-        arrays: the memory: values; of binaries addresses and sizes.
+        arrays: the memory: values; addresses and sizes for binaries.
     """
 
     fmi: int
@@ -55,26 +56,26 @@ class NativeCall:
 class SignalBuffer:
     """The variables of one FMI type of one instance, in the order given, in one block of memory.
 
-    Calling it carries out the FMI call `name` with arguments made once. `views[port]` is the part that belongs to a
+    Calling the buffer makes the FMI call `name`, with arguments that are prepared once. `views[port]` is the part of a
     port, in row-major order; a connection copies one port's views into another's.
     """
 
     def __init__(self, name: str, function: Any, component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
         self.name = name
-        first = ports[0].fmi_type
+        fmi_type = ports[0].fmi_type
         references = [r for p in ports for r in p.references]
         n = sum(p.size for p in ports)
         self._function = function
         vrs = (ctypes.c_uint * len(references))(*references)
-        self._arrays, arguments = _arrays(first, fmi, n)
+        self._arrays, arguments = _arrays(fmi_type, fmi, n)
         count = () if fmi == 2 else (n,)
         self._arguments: tuple[Any, ...] = (component, vrs, len(references), *arguments, *count)
         self._fmi = fmi
         self.views: dict[str, Views] = {}
-        at = 0
+        begin = 0
         for p in ports:
-            self.views[p.name] = tuple(a[at : at + p.size] for a in self._arrays)
-            at += p.size
+            self.views[p.name] = tuple(a[begin : begin + p.size] for a in self._arrays)
+            begin += p.size
 
     def __call__(self) -> int:
         """Set or get all values; return the FMI status."""
@@ -82,7 +83,7 @@ class SignalBuffer:
 
     @property
     def native(self) -> NativeCall:
-        """The same call for a program in C."""
+        """The same call for C code."""
         component, references, *_ = self._arguments
         function = ctypes.cast(self._function, ctypes.c_void_p).value or 0
         return NativeCall(self._fmi, function, component, references, self._arrays)
@@ -101,7 +102,7 @@ class OutputBuffer(SignalBuffer):
     """A buffer for reading binaries or strings. They are copied: the unit may reuse its memory at the next call.
 
     Attributes:
-        kept_elsewhere: what keeps the memory alive that others than this buffer copy them to.
+        kept_elsewhere: keeps memory alive to which C code copies them instead of this buffer.
     """
 
     kept_elsewhere: object = None
@@ -147,15 +148,16 @@ class OutputBuffer(SignalBuffer):
 
 
 def joined(copies: Iterable[Copy]) -> list[Copy]:
-    """Return copies that do the same, with those joined whose targets and whose sources follow each other in memory."""
-    done: list[Copy] = []
+    """Return equivalent copies, joining those whose targets and sources both follow each other in memory."""
+    merged: list[Copy] = []
     for target, source in sorted(copies, key=lambda copy: copy[0].ctypes.data):
-        to, of = (_joined(*pair) for pair in zip(done[-1], (target, source), strict=True)) if done else (None, None)
-        if to is not None and of is not None:
-            done[-1] = (to, of)
+        whole_target = _joined(merged[-1][0], target) if merged else None
+        whole_source = _joined(merged[-1][1], source) if merged else None
+        if whole_target is not None and whole_source is not None:
+            merged[-1] = (whole_target, whole_source)
         else:
-            done.append((target, source))
-    return done
+            merged.append((target, source))
+    return merged
 
 
 def _joined(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any] | None:
@@ -194,18 +196,18 @@ def _pointer(array: NDArray[Any], c_type: Any) -> Any:
 
 
 def content_of(port: FmuPort, views: Views) -> bytes:
-    """Return what a port holds; of strings and binaries the text and the bytes, not where they lie."""
+    """Return a port's value as bytes, to compare it; of strings and binaries the contents, not their addresses."""
     if port.kind is Kind.STRING:
         texts = (ctypes.string_at(int(a)) if a else b"" for a in views[0])
         return b"\0".join(texts)
     if port.kind is Kind.BINARY:
-        pairs = zip(views[0], views[1], strict=True)
+        pairs = zip(views[0], views[1], strict=True)  # with sizes before them, since binaries may hold any byte
         return b"".join(int(n).to_bytes(8, "little") + ctypes.string_at(int(a), int(n)) for a, n in pairs)
     return views[0].tobytes()
 
 
 class InputDerivatives(SignalBuffer):
-    """A buffer for the derivatives of real inputs, per second; calling it sets them all."""
+    """A buffer for the first time derivatives of real inputs (FMI 2); calling it sets them all."""
 
     def __init__(self, function: Callable[..., int], component: Any, ports: Sequence[FmuPort]) -> None:
         super().__init__("fmi2SetRealInputDerivatives", function, component, 2, ports)

@@ -1,12 +1,8 @@
-"""The standards' calls for the state of one instance: saved, restored, freed, and as bytes.
+"""The FMI calls that `Instance` makes besides setting and getting: states, directional derivatives, steps.
 
-The standards' call for directional derivatives of one instance.
-
-The call that lets a unit step, for programs in C.
-
-What a unit tells of a step that it discarded.
-
-How a step of a unit ended.
+States are saved, restored, freed and turned into bytes by `StateCalls`, derivatives come from `derivatives_along`. Of
+steps: what C code needs to make the call (`NativeStep`), how a step ended (`StepEnd`), and how far a discarded one got
+(`discarded_step`). The two standards differ in names and arguments, which only this file and `buffers` need to know.
 """
 
 import ctypes
@@ -20,14 +16,14 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.fmu.description import FmuDescription, FmuPort
 
 State = ctypes.c_void_p
-"""A saved state of one instance, which alone knows what it points to."""
+"""A saved state of one instance: a pointer whose meaning only the unit knows."""
 
 Call = Callable[..., None]
-"""Calls a function of the standard by its name without `fmi2` or `fmi3`, and raises where it does not answer OK."""
+"""Calls an FMI function by its name without `fmi2` or `fmi3`; raises `UnitFailure` above status Warning."""
 
 
 class StateCalls:
-    """Saves and restores an instance's state; each raises `UnitFailure` where the unit cannot."""
+    """Saves and restores an instance's state; all methods raise `UnitFailure` where the unit fails."""
 
     def __init__(self, call: Call, fmi: int) -> None:
         self._call = call
@@ -42,7 +38,7 @@ class StateCalls:
         return state
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state, which may be used again."""
+        """Restore a saved state, which may be used again."""
         self._call(f"Set{self._name}", state)
 
     def free(self, state: State) -> None:
@@ -50,7 +46,7 @@ class StateCalls:
         self._call(f"Free{self._name}", ctypes.byref(state))
 
     def serialise(self, state: State) -> bytes:
-        """Return a saved state as bytes that mean the same in another process."""
+        """Return a saved state as bytes that are valid in another process too."""
         size = ctypes.c_size_t()
         self._call(f"Serialized{self._name}Size", state, ctypes.byref(size))
         data = (self._byte * size.value)()
@@ -58,26 +54,26 @@ class StateCalls:
         return bytes(data)
 
     def deserialise(self, data: bytes) -> State:
-        """Return the state that `serialise` gave these bytes of; it is freed by `free`."""
+        """Return the state that was serialised to these bytes; it is freed by `free`."""
         state = State()
-        held = (self._byte * len(data)).from_buffer_copy(data)
-        self._call(self._deserialise, held, ctypes.c_size_t(len(data)), ctypes.byref(state))
+        buffer = (self._byte * len(data)).from_buffer_copy(data)
+        self._call(self._deserialise, buffer, ctypes.c_size_t(len(data)), ctypes.byref(state))
         return state
 
 
 def derivatives_along(
     call: Call, fmi: int, description: FmuDescription, outputs: Sequence[str], inputs: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """Return how outputs change with inputs; see `Instance.directional_derivative`."""
+    """Return directional derivatives of outputs; see `Instance.directional_derivative`."""
     unknowns, knowns = [description.outputs[y] for y in outputs], [description.inputs[u] for u in inputs]
     seed = np.concatenate([np.asarray(inputs[p.name], dtype=np.float64) for p in knowns])
-    found = np.zeros(sum(p.size for p in unknowns))
+    sensitivity = np.zeros(sum(p.size for p in unknowns))
     references = (_references(unknowns), _references(knowns))
-    lengths = ((), ()) if fmi == 2 else ((len(seed),), (len(found),))
-    vectors = (_doubles(seed), *lengths[0], _doubles(found), *lengths[1])
+    lengths = ((), ()) if fmi == 2 else ((len(seed),), (len(sensitivity),))
+    vectors = (_doubles(seed), *lengths[0], _doubles(sensitivity), *lengths[1])
     call("GetDirectionalDerivative", *(a for r in references for a in (r, len(r))), *vectors)
     ends = np.cumsum([p.size for p in unknowns])[:-1]
-    return dict(zip(outputs, np.split(found, ends), strict=True))
+    return dict(zip(outputs, np.split(sensitivity, ends), strict=True))
 
 
 def _references(ports: Sequence[FmuPort]) -> Any:
@@ -91,7 +87,7 @@ def _doubles(values: Floats) -> Any:
 
 @dataclass(frozen=True)
 class NativeStep:
-    """What a program in C needs to let a unit step: addresses; `flags` are what FMI 3 tells of a step."""
+    """Addresses that C code needs to call DoStep; `flags` are those of FMI 3's output arguments."""
 
     fmi: int
     function: int
@@ -103,35 +99,35 @@ _LAST_SUCCESSFUL_TIME, _TERMINATED = ctypes.c_int(2), ctypes.c_int(3)  # of fmi2
 
 
 def discarded_step(function: Callable[[str], Any], component: Any, t: float, fmi: int) -> tuple[float, bool]:
-    """Ask a unit how far its step came, and whether it wants to end the simulation. FMI 2.0.4, sec. 4.2.3.
+    """Ask a unit how far a discarded step got, and whether it wants to end the simulation. FMI 2.0.4, sec. 4.2.3.
 
-    In FMI 3 it stands where it stood, and there is nothing to ask (FMI 3.0, sec. 2.2.4).
+    In FMI 3 it has not advanced, and there is nothing to ask (FMI 3.0, sec. 2.2.4).
 
     Args:
-        function: gives the unit's functions by their names without `fmi2`.
+        function: returns the unit's functions by their names without `fmi2`.
         component: the instance.
-        t: the step's begin in seconds, which stands where the unit does not tell.
+        t: the step's begin in seconds, which is returned where the unit gives no other time.
         fmi: version of its standard.
     """
     if fmi == 3:
         return t, False
-    reached, ended = ctypes.c_double(t), ctypes.c_int()
+    reached, terminated = ctypes.c_double(t), ctypes.c_int()
     if function("GetRealStatus")(component, _LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) > 1:
         reached.value = t
-    value = function("GetBooleanStatus")(component, _TERMINATED, ctypes.byref(ended))
-    return reached.value, value <= 1 and bool(ended.value)
+    status = function("GetBooleanStatus")(component, _TERMINATED, ctypes.byref(terminated))
+    return reached.value, status <= 1 and bool(terminated.value)
 
 
 @dataclass(frozen=True)
 class StepEnd:
-    """What a unit answered to a step.
+    """How a unit's step ended.
 
     Attributes:
-        reached: the time where it stands, s.
+        reached: the time that the unit has reached, s.
         early: whether that is before the step's end.
-        event: whether it has an event there, which event mode is to handle.
-        discarded: whether it did not carry the step out; a unit of FMI 2 tells by `reached` how far it came, one of
-            FMI 3 stands where it stood.
+        event: whether it has an event there, which is to be handled in event mode.
+        discarded: whether it discarded the step; `reached` is then how far it got in FMI 2, and the step's begin in
+            FMI 3.
     """
 
     reached: float

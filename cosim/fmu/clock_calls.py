@@ -1,22 +1,20 @@
-"""FMI 3's calls for clocks, for one instance.
+"""FMI 3's calls for the clocks of one instance, and the times at which its time-based clocks tick.
 
-When a time-based clock ticks next: counted in exact fractions, so without drift. FMI 3.0, sec. 2.2.9.2.
+Tick times are exact fractions, so they do not drift. FMI 3.0, sec. 2.2.9.
 """
 
 import ctypes
 import enum
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
+from handover.cosim.fmu.calls import Call
 from handover.cosim.fmu.clocks import FmuClock
-
-Call = Callable[..., None]
-"""Calls a function of the standard by its name without `fmi3`, and raises `UnitFailure` where it does not answer OK."""
 
 
 class Qualifier(enum.IntEnum):
-    """What an interval is that a unit told: fmi3IntervalQualifier."""
+    """The meaning of an interval that a unit returned: fmi3IntervalQualifier."""
 
     NOT_YET_KNOWN = 0
     UNCHANGED = 1
@@ -24,7 +22,7 @@ class Qualifier(enum.IntEnum):
 
 
 class ClockCalls:
-    """Lets an instance's input clocks tick, and asks for its output clocks and for intervals."""
+    """Activates an instance's input clocks, and reads its output clocks, intervals and shifts."""
 
     def __init__(self, call: Call, clocks: Mapping[str, FmuClock]) -> None:
         self._call = call
@@ -48,48 +46,48 @@ class ClockCalls:
         return {name for name, active in zip(self._outputs, self._active, strict=True) if active}
 
     def interval(self, name: str) -> tuple[Fraction, Qualifier]:
-        """Return a clock's interval in seconds, and what it is."""
+        """Return a clock's interval in seconds, and its qualifier."""
         clock, qualifier = self._clocks[name], ctypes.c_int()
         if clock.supports_fraction:
             counter, resolution = ctypes.c_uint64(), ctypes.c_uint64(1)
-            self._ask("GetIntervalFraction", clock, counter, resolution, qualifier)
+            self._get("GetIntervalFraction", clock, counter, resolution, qualifier)
             seconds = Fraction(counter.value, resolution.value or 1)
         else:
             decimal = ctypes.c_double()
-            self._ask("GetIntervalDecimal", clock, decimal, qualifier)
-            known = qualifier.value != Qualifier.NOT_YET_KNOWN
-            seconds = Fraction(repr(decimal.value)) if known else Fraction(0)
+            self._get("GetIntervalDecimal", clock, decimal, qualifier)
+            is_known = qualifier.value != Qualifier.NOT_YET_KNOWN  # else the decimal may be anything, also NaN
+            seconds = Fraction(repr(decimal.value)) if is_known else Fraction(0)
         return seconds, Qualifier(qualifier.value)
 
     def shift(self, name: str) -> Fraction:
-        """Return when a clock ticks first, in seconds after the start."""
+        """Return the time of a clock's first tick, in seconds after the start."""
         clock = self._clocks[name]
         if clock.supports_fraction:
             counter, resolution = ctypes.c_uint64(), ctypes.c_uint64(1)
-            self._ask("GetShiftFraction", clock, counter, resolution)
+            self._get("GetShiftFraction", clock, counter, resolution)
             return Fraction(counter.value, resolution.value or 1)
         decimal = ctypes.c_double()
-        self._ask("GetShiftDecimal", clock, decimal)
+        self._get("GetShiftDecimal", clock, decimal)
         return Fraction(repr(decimal.value))
 
-    def _ask(self, function: str, clock: FmuClock, *answers: Any) -> None:
+    def _get(self, function: str, clock: FmuClock, *results: Any) -> None:
         reference = ctypes.c_uint32(clock.reference)
-        self._call(function, ctypes.byref(reference), 1, *(ctypes.byref(a) for a in answers))
+        self._call(function, ctypes.byref(reference), 1, *(ctypes.byref(r) for r in results))
 
 
 class ClockTimer:
     """The times of a time-based input clock.
 
     Periodic clocks (constant, fixed, tunable) tick at shift + k * interval; the interval is the description's, or else
-    what the unit tells while it is initialised (the parameters that it may depend on do not change in a run). A
-    changing clock tells the interval to its next tick whenever it has ticked, a countdown clock in any event mode.
+    the one that the unit returns while it is initialised (the parameters that it may depend on do not change in a run).
+    A changing clock gives the interval to its next tick whenever it has ticked, a countdown clock in any event mode.
 
     Attributes:
         next: the time of the next tick, s; None while a countdown has not begun.
     """
 
     def __init__(self, clock: FmuClock, calls: ClockCalls) -> None:
-        """Ask for what the description leaves open, in initialisation mode."""
+        """Read from the unit, in initialisation mode, what the description leaves open."""
         self.clock = clock
         self._calls = calls
         self.next: Fraction | None = None
@@ -108,7 +106,7 @@ class ClockTimer:
         return self.next is not None and float(self.next) <= t
 
     def tick(self) -> None:
-        """Take note of a tick, after the unit has updated its discrete states in event mode."""
+        """Set the time of the next tick, after the unit has updated its discrete states in event mode."""
         if self.clock.variability == "countdown" or self.next is None:
             self.next = None
         elif self.clock.variability == "changing":
@@ -118,7 +116,7 @@ class ClockTimer:
             self.next += self._interval
 
     def ask(self, t: float) -> None:
-        """Ask a countdown for its interval, in event mode at t."""
+        """Read a countdown clock's interval, in event mode at t."""
         if self.clock.variability == "countdown":
             self._count_from(Fraction(t))
 

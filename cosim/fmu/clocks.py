@@ -1,4 +1,4 @@
-"""What an FMI 3 FMU says of its clocks. FMI 3.0, sec. 2.2.9."""
+"""The clocks that an FMI 3 FMU declares in its model description. FMI 3.0, sec. 2.2.9."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,9 +11,8 @@ from handover.cosim.fmu.xml import XmlElement
 class FmuClock:
     """A clock of an FMU.
 
-    `variability` is the standard's `intervalVariability`. A time-based clock ticks whenever `interval` seconds have
-    passed, first at `shift`; where `interval` is None the unit is asked for it, see
-    `handover.cosim.fmu.clock_calls`.
+    `variability` is the standard's `intervalVariability`. A time-based clock ticks every `interval` seconds, first at
+    `shift`; where `interval` is None it is read from the unit, see `handover.cosim.fmu.clock_calls`.
     """
 
     name: str
@@ -26,7 +25,7 @@ class FmuClock:
 
     @property
     def is_triggered(self) -> bool:
-        """Whether it ticks when something happens, not at times that are known."""
+        """Whether it ticks at events, not at times known beforehand."""
         return self.variability == "triggered"
 
     @property
@@ -39,14 +38,14 @@ def clocks_of(root: XmlElement) -> dict[str, FmuClock]:
     """Read the input and output clocks off a model description.
 
     Raises:
-        ValueError: an interval or a shift is not a number, or not one that a clock can have.
+        ValueError: an interval or a shift is not a number, or is out of range.
     """
     elements = root.named("ModelVariables", "Clock")
     return {e.get("name"): _clock(e) for e in elements if e.get("causality") in ("input", "output")}
 
 
 def without_clocks(clocks: Mapping[str, FmuClock]) -> bool:
-    """Whether a unit with these clocks can run without event mode: it has none but a constant one, or none at all."""
+    """Return whether a unit with these clocks can run without event mode: it has at most constant input clocks."""
     return all(c.is_input and c.variability == "constant" for c in clocks.values())
 
 
@@ -67,7 +66,7 @@ def _clock(e: XmlElement) -> FmuClock:
 
 
 def _seconds(e: XmlElement, what: str) -> Fraction | None:
-    """Return an interval or a shift exactly: the fraction where there is one, else the decimal as it is written."""
+    """Return an interval or a shift exactly: the fraction where one is given, else the decimal as written."""
     counter, resolution, decimal = e.get(f"{what}Counter"), e.get("resolution"), e.get(f"{what}Decimal")
     try:
         if counter and resolution:

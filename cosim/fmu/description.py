@@ -1,16 +1,14 @@
-"""What an FMU says of itself, in this engine's words: its ports with kind, shape and unit, whatever the FMI version.
+"""An FMU's model description in one form for FMI 2 and FMI 3: ports with kind, shape and unit, clocks, capabilities.
 
-FMI 2 knows no arrays, and in FMI 3 some tools do without: scalar variables named `p[1]`, `p[2]`, ... (or `R[1,1]`, ...)
-that agree in type, causality, unit and timing are taken together as one array port `p`, so that units of both standards
-and forms can stand in for each other.
-
-What an FMU can do beyond stepping: the capability flags of its co-simulation interface.
+FMI 2 has no arrays, and some tools do not use those of FMI 3: scalar variables named `p[1]`, `p[2]`, ... (or `R[1,1]`,
+...) that agree in type, causality, unit and timing are grouped to one array port `p`, so that FMUs of both standards
+and both forms are interchangeable.
 """
 
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,19 +20,37 @@ from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.clocks import FmuClock, clocks_of, without_clocks
 from handover.cosim.fmu.xml import XmlElement
 
+if TYPE_CHECKING:
+    from handover.cosim.fmu.fmpy_edge import ModelDescription, ModelVariable
+
+
+_KINDS = {
+    "Real": Kind.REAL,
+    "Float32": Kind.REAL,
+    "Float64": Kind.REAL,
+    "Integer": Kind.INTEGER,
+    **{f"{sign}Int{bits}": Kind.INTEGER for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    "Boolean": Kind.BOOLEAN,
+    "Enumeration": Kind.ENUMERATION,
+    "String": Kind.STRING,
+    "Binary": Kind.BINARY,
+}
+_WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
+_ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Capabilities:
-    """Capability flags, in one wording for both standards; what a standard does not know is False.
+    """Capability flags of the co-simulation interface, for both standards; those that a standard lacks are False.
 
     Attributes:
         varies_step: its communication step may change during a run.
-        saves_state, serialises_state: its state can be fetched and set again, also as bytes.
-        interpolates_inputs: it takes derivatives of its inputs (FMI 2).
-        output_derivatives: the highest order of output derivatives that it gives.
-        directional_derivatives: it gives directional derivatives.
+        saves_state, serialises_state: its state can be saved and restored, also as bytes.
+        interpolates_inputs: it accepts derivatives of its inputs (FMI 2).
+        output_derivatives: the highest order of output derivatives that it provides.
+        directional_derivatives: it provides directional derivatives.
         event_mode, returns_early: it has event mode, and may end a step before its end (FMI 3).
-        once_per_process: a process may hold one instance of it only.
+        once_per_process: a process may hold only one instance of it.
     """
 
     varies_step: bool = False
@@ -53,7 +69,10 @@ def capabilities_of(root: XmlElement, fmi: int) -> Capabilities:
     element = next(root.named("CoSimulation"), None)
     if element is None:
         return Capabilities()
-    flag = _flags(element)
+
+    def flag(name: str) -> bool:
+        return element.get(name) in ("true", "1")
+
     state = "FMUstate" if fmi == 2 else "FMUState"
     return Capabilities(
         varies_step=flag("canHandleVariableCommunicationStepSize"),
@@ -68,28 +87,6 @@ def capabilities_of(root: XmlElement, fmi: int) -> Capabilities:
     )
 
 
-def _flags(element: XmlElement) -> Callable[[str], bool]:
-    return lambda name: element.get(name) in ("true", "1")
-
-
-if TYPE_CHECKING:
-    from handover.cosim.fmu.fmpy_edge import ModelDescription, ModelVariable
-
-_KINDS = {
-    "Real": Kind.REAL,
-    "Float32": Kind.REAL,
-    "Float64": Kind.REAL,
-    "Integer": Kind.INTEGER,
-    **{f"{sign}Int{bits}": Kind.INTEGER for sign in ("", "U") for bits in (8, 16, 32, 64)},
-    "Boolean": Kind.BOOLEAN,
-    "Enumeration": Kind.ENUMERATION,
-    "String": Kind.STRING,
-    "Binary": Kind.BINARY,
-}
-_WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
-_ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
-
-
 def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
     """Return the indices of an array's entries, counted from 1, in row-major order; one empty index for a scalar."""
     return list(itertools.product(*(range(1, n + 1) for n in shape)))
@@ -101,9 +98,11 @@ class FmuPort(Declared):
 
     Attributes:
         references: one value reference in all, or one for each entry.
+        start: its start value as written, entries with spaces between them.
+        mime: MIME type of a binary.
         discrete: whether it changes at events only.
-        nominal: the magnitude that its values usually have, in its unit, where the FMU says.
-        clocks: those of whose ticks one must be for it to be reached; none where it can be reached always.
+        nominal: the usual magnitude of its values, in its unit, where the FMU declares it.
+        clocks: it can be accessed only while one of these ticks; always where there are none.
     """
 
     fmi_type: str
@@ -116,7 +115,7 @@ class FmuPort(Declared):
 
     @property
     def is_continuous(self) -> bool:
-        """Whether its value is a real number that changes between instants."""
+        """Whether its value is a real number that changes between events."""
         return self.kind is Kind.REAL and not self.discrete
 
     @property
@@ -132,12 +131,12 @@ class FmuPort(Declared):
 class FmuDescription:
     """An FMU's ports and identity.
 
-    `feedthrough` names, by output, the inputs that it is declared to depend on at once; `presumed_feedthrough` likewise
-    where nothing is declared, which the standards take as all inputs. `sampled` says that all outputs are discrete and
-    the step is fixed: such a unit acts at instants, on the values of the instant. It is stepped without event mode, in
-    which it ticks by itself, even where it declares a clock for hosts that have event mode: its results are the same
-    in all hosts then. That needs ports that can be reached without the clock, so a unit with clocked ports, or with
-    another clock than a constant one, is not sampled in this sense.
+    `feedthrough` names, by output, the inputs with declared direct feedthrough to it; `presumed_feedthrough` likewise
+    where an FMU declares no dependencies, which the standards take as all inputs. `sampled` says that all outputs are
+    discrete and the step is fixed: such a unit computes at instants, from the inputs of the instant. It is stepped
+    without event mode, where it samples by itself, even if it declares a clock for hosts with event mode: so its
+    results are the same in all hosts. That needs ports that can be accessed without a clock, so a unit with clocked
+    ports, or with clocks that are not constant, is not sampled in this sense.
     """
 
     path: Path
@@ -161,9 +160,9 @@ def describe_fmu(path: Path) -> FmuDescription:
 
     Raises:
         InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, or a clock
-            that cannot tick.
+            with an invalid interval.
     """
-    from handover.cosim.fmu.fmpy_edge import mime_types, read_description
+    from handover.cosim.fmu.fmpy_edge import mime_types, read_description  # FMPy takes long to import
 
     md, root = read_description(path)
     is_fmi2 = md.fmiVersion == "2.0"
@@ -217,7 +216,7 @@ def _unit(u: Any) -> Unit:
 
 def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = _KINDS.get(v.type)
-    if kind is None:  # clocks, see `handover.cosim.fmu.clocks`, and whatever later standards bring
+    if kind is None:  # clocks, see `handover.cosim.fmu.clocks`, and types of later standards
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)
@@ -258,6 +257,7 @@ def _unit_of(name: str | None, units: Mapping[str, Unit], relative: bool) -> Uni
 
 
 def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
+    """Return the ports, with scalars that are elements of an array grouped to one array port."""
     groups: dict[str, list[tuple[tuple[int, ...], FmuPort]]] = defaultdict(list)
     for p in ports:
         match = None if p.shape or p.kind is Kind.BINARY else _ELEMENT.match(p.name)
@@ -268,9 +268,9 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         members.sort(key=lambda m: m[0])
         first = members[0][1]
         shape = members[-1][0]
-        whole = [m[0] for m in members] == indices_of(shape)
-        alike = len({(p.fmi_type, p.causality, p.unit, p.discrete, p.clocks) for _, p in members}) == 1
-        if shape and whole and alike:
+        is_complete = [m[0] for m in members] == indices_of(shape)
+        is_uniform = len({(p.fmi_type, p.causality, p.unit, p.discrete, p.clocks) for _, p in members}) == 1
+        if shape and is_complete and is_uniform:
             starts = [p.start for _, p in members]
             start = None if None in starts else " ".join(str(s) for s in starts)
             references = tuple(p.references[0] for _, p in members)

@@ -1,4 +1,7 @@
-"""A unit that runs in event mode: what can be set and got there, and when it wants to be there. FMI 3.0, sec. 4.2."""
+"""An instance with event mode: what can be set and read in which mode, and the times of its next events.
+
+FMI 3.0, sec. 4.2.
+"""
 
 import ctypes
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -19,16 +22,16 @@ from handover.cosim.fmu.loading import load_fmi3
 
 
 class EventInstance(Instance):
-    """A unit in event mode or in step mode; initialisation leaves it in event mode.
+    """A unit in event mode or in step mode; after initialisation it is in event mode.
 
-    Step mode lets continuous inputs be set. Discrete ones wait for event mode, clocked ones for a tick of their clock;
-    so do clocked outputs, which stay in `y` what they were at the last tick.
+    In step mode only continuous inputs can be set, in event mode discrete ones too. Clocked inputs and outputs can be
+    accessed only while one of their clocks is active; in `y` clocked outputs keep their values of the last tick.
 
     Attributes:
-        in_event_mode: whether it is there.
+        in_event_mode: whether it is in event mode.
         active: the clocks that tick in the present iteration.
         timers: its time-based clocks.
-        next_event: when it will have an event that it knows beforehand, s.
+        next_event: the time of its next event that is known beforehand, s; None if there is none.
     """
 
     def __init__(
@@ -44,17 +47,17 @@ class EventInstance(Instance):
         self._fed = [description.inputs[i] for i in fed]
         self._outputs = list(description.outputs.values())
         self._initialized = False
-        self._given: dict[str, bytes] = {}
+        self._last_set: dict[str, bytes] = {}  # by input, the value that the unit was given last
         self._parts: dict[tuple[str, tuple[str, ...]], list[SignalBuffer]] = {}
         self._clock_calls = ClockCalls(self._call, description.clocks)
         self._flags = [ctypes.c_bool() for _ in range(5)]
         self._next = ctypes.c_double()
 
     def exit_initialization(self) -> None:
-        """Ask clocks when they will tick, and go on to event mode.
+        """Read when the clocks will tick, then leave initialisation mode for event mode.
 
         Raises:
-            UnitFailure: the call failed, or a clock cannot tick as the unit says.
+            UnitFailure: the call failed, or a clock has an invalid interval.
         """
         timed = [c for c in self.description.clocks.values() if c.is_input and not c.is_triggered]
         try:
@@ -63,25 +66,25 @@ class EventInstance(Instance):
             raise UnitFailure(self.name, "fmi3ExitInitializationMode", self.time, str(e), tuple(self.log)) from e
         super().exit_initialization()
         self._initialized = self.in_event_mode = True
-        self._hold(self._fed)
+        self._note_as_set(self._fed)
 
     def set_inputs(self) -> None:
-        """Hand over those contents of `u` that the unit takes in its present mode."""
+        """Set those inputs, from `u`, that the unit accepts in its present mode."""
         ports = self._settable()
         self._set(ports)
-        self._hold(ports)
+        self._note_as_set(ports)
 
     def get_outputs(self) -> None:
-        """Fetch the outputs that the unit gives in its present mode."""
+        """Read into `y` the outputs that can be accessed in the present mode."""
         self._get([p for p in self._outputs if self._is_reachable(p)])
 
     def wants_inputs(self) -> bool:
-        """Whether a discrete input that can be set in event mode has another value than the unit was given last."""
-        return any(p.discrete and not p.clocks and self._is_other(p) for p in self._fed)
+        """Return whether a discrete input, one without clocks, differs from the value that the unit was given last."""
+        return any(p.discrete and not p.clocks and self._differs(p) for p in self._fed)
 
     def has_other_inputs(self) -> bool:
-        """Whether an input that can be set in the present mode has another value than the unit was given last."""
-        return any(self._is_other(p) for p in self._settable())
+        """Return whether an input that can be set in the present mode differs from the value that the unit has."""
+        return any(self._differs(p) for p in self._settable())
 
     def enter_event_mode(self) -> None:
         """Leave step mode."""
@@ -94,21 +97,22 @@ class EventInstance(Instance):
         self.in_event_mode = False
 
     def tick(self, clocks: Collection[str]) -> None:
-        """Let input clocks tick, in event mode; `update` ends their tick."""
+        """Activate input clocks, in event mode; `update` ends their tick."""
         self._clock_calls.tick(sorted(clocks))
         self.active |= set(clocks)
 
     def ticking(self) -> set[str]:
         """Return the output clocks that tick in the present iteration; they count as active."""
-        found = self._clock_calls.ticking()
-        self.active |= found
-        return found
+        clocks = self._clock_calls.ticking()
+        self.active |= clocks
+        return clocks
 
     def update(self, t: float) -> bool:
-        """End an iteration in event mode at t; return whether the unit wants another one.
+        """End an iteration in event mode at t; return whether the unit needs another one.
 
         Raises:
-            UnitTerminated: it wants the simulation to end. UnitFailure: its call failed.
+            UnitTerminated: it asks to end the simulation.
+            UnitFailure: its call failed.
         """
         self.time = t
         again, terminate, _, _, known = self._flags
@@ -124,21 +128,21 @@ class EventInstance(Instance):
         return again.value
 
     def get_timing(self) -> Mapping[str, Any]:
-        """Return what a run that goes on from here must know besides the unit's state; JSON can hold it."""
+        """Return, as a JSON object, what is needed besides the unit's state to resume a run from here."""
         return {
-            "held": {name: content.hex() for name, content in self._given.items()},
+            "held": {name: content.hex() for name, content in self._last_set.items()},
             "ticks": {t.clock.name: None if t.next is None else str(t.next) for t in self.timers},
             "next_event": self.next_event,
             "in_event_mode": self.in_event_mode,
         }
 
     def set_timing(self, timing: Mapping[str, Any]) -> None:
-        """Go back to what `get_timing` gave."""
-        self._given = {name: bytes.fromhex(content) for name, content in timing["held"].items()}
+        """Restore what `get_timing` returned."""
+        self._last_set = {name: bytes.fromhex(content) for name, content in timing["held"].items()}
         self.next_event, self.in_event_mode = timing["next_event"], timing["in_event_mode"]
         for timer in self.timers:
-            value = timing["ticks"][timer.clock.name]
-            timer.next = None if value is None else Fraction(value)
+            tick = timing["ticks"][timer.clock.name]
+            timer.next = None if tick is None else Fraction(tick)
 
     def _load(self, folder: Path) -> Any:
         d = self.description
@@ -150,15 +154,15 @@ class EventInstance(Instance):
         return not port.clocks or not self._initialized or not self.active.isdisjoint(port.clocks)
 
     def _settable(self) -> list[FmuPort]:
-        anything = self.in_event_mode or not self._initialized
-        return [p for p in self._fed if self._is_reachable(p) and (anything or not p.discrete)]
+        takes_discrete = self.in_event_mode or not self._initialized
+        return [p for p in self._fed if self._is_reachable(p) and (takes_discrete or not p.discrete)]
 
-    def _is_other(self, port: FmuPort) -> bool:
-        return content_of(port, self.u[port.name]) != self._given[port.name]
+    def _differs(self, port: FmuPort) -> bool:
+        return content_of(port, self.u[port.name]) != self._last_set[port.name]
 
-    def _hold(self, ports: Iterable[FmuPort]) -> None:
+    def _note_as_set(self, ports: Iterable[FmuPort]) -> None:
         for p in ports:
-            self._given[p.name] = content_of(p, self.u[p.name])
+            self._last_set[p.name] = content_of(p, self.u[p.name])
 
     def _set(self, ports: list[FmuPort]) -> None:
         if len(ports) == len(self.u):
@@ -179,7 +183,7 @@ class EventInstance(Instance):
             whole[:] = part
 
     def _part(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
-        """Return buffers of their own for some of the ports."""
+        """Return separate buffers for some of the ports; they are made once for each selection."""
         key = verb, tuple(p.name for p in ports)
         if key not in self._parts:
             self._parts[key] = self._buffers(verb, ports)

@@ -1,6 +1,7 @@
-"""The ways in which a unit can fail, each a type with its data; what they share is `UnitFailure`.
+"""The ways in which a unit can fail, each a subclass of `UnitFailure` with its data.
 
-What ends a run at an event, or at a step that a unit does not take.
+They end a run: statuses above Warning, values that are not finite, calls that hang or crash, discarded steps that are
+not repeated, and events that do not settle. `failure_of` turns an FMI status into its type.
 """
 
 import math
@@ -10,27 +11,27 @@ from typing import Any
 from handover.cosim.exceptions import UnitFailure
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
-"""The standards' names of what calls answer, by number; Pending is FMI 2's alone."""
+"""The standards' names of statuses, by number; Pending exists in FMI 2 only."""
 _DISCARD, _FATAL = 2, 4
 
 
 class UnitError(UnitFailure):
-    """A call was answered with Error: the unit may be reset or freed, nothing else."""
+    """A call returned Error: the unit may be reset or freed, nothing else."""
 
     kind = "error"
 
 
 class UnitFatal(UnitFailure):
-    """A call was answered with Fatal: the unit must not be called again, not even to be freed."""
+    """A call returned Fatal: the unit must not be called again, not even to be freed."""
 
     kind = "fatal"
 
 
 class UnitDiscarded(UnitFailure):
-    """A call was answered with Discard: the unit cannot do this, but is whole.
+    """A call returned Discard: the unit cannot do this, but its state is valid.
 
     Attributes:
-        reached: the time in seconds until which its step was successful, None where it does not tell.
+        reached: the time in seconds until which its step was successful, None where that is not known.
     """
 
     kind = "discard"
@@ -45,8 +46,31 @@ class UnitDiscarded(UnitFailure):
         return super().what + ("" if self.reached is None else f", having reached t = {self.reached:.6g} s")
 
     def as_data(self) -> dict[str, Any]:
-        """Return the failure as JSON can hold it."""
+        """Return the failure as a JSON object."""
         return {**super().as_data(), "last_successful_time": self.reached}
+
+
+class StepDiscarded(UnitDiscarded):
+    """A unit discarded a step, and the step is not repeated with a shorter one.
+
+    Attributes:
+        reached: the time in seconds until which its step was successful; in FMI 3 the step's begin.
+        reason: why it is not repeated.
+    """
+
+    def __init__(self, unit: str, call: str, t: float, reached: float, reason: str, log: Sequence[str] = ()) -> None:
+        self.reason = reason
+        super().__init__(unit, call, t, log, reached)
+
+    @property
+    def what(self) -> str:
+        """What happened, with the time that was reached and the reason."""
+        return f"{super().what}; {self.reason}"
+
+    @property
+    def message(self) -> str:
+        """What the unit logged last, and the reason."""
+        return f"{super().message} ({self.reason})"
 
 
 class NotFinite(UnitFailure):
@@ -81,11 +105,11 @@ class NotFinite(UnitFailure):
 
     @property
     def message(self) -> str:
-        """Which element has which value; that matters more than what the unit logged."""
+        """Element and value; they matter more than what the unit logged."""
         return f"{self.element} = {self.status}"
 
     def as_data(self) -> dict[str, Any]:
-        """Return the failure as JSON can hold it."""
+        """Return the failure as a JSON object."""
         return {**super().as_data(), "port": self.port, "element": list(self.index), "value": self.status}
 
 
@@ -104,7 +128,7 @@ class UnitTerminated(UnitFailure):
 
 
 class UnitHung(UnitFailure):
-    """A call did not return within the time limit; the unit is left where it is and never called again.
+    """A call did not return within the time limit; the unit is abandoned and never called again.
 
     Attributes:
         limit: seconds of wall time.
@@ -123,12 +147,12 @@ class UnitHung(UnitFailure):
 
     @property
     def message(self) -> str:
-        """The limit: what the unit logged before has led nowhere."""
+        """What happened; the unit's log is from before the call and says nothing of it."""
         return self.what
 
 
 class UnitCrashed(UnitFailure):
-    """The process ended within a unit's call; `status` says how, as "segmentation fault"."""
+    """The process ended within a unit's call; `status` says how, as in "segmentation fault"."""
 
     kind = "crash"
 
@@ -144,43 +168,12 @@ class UnitCrashed(UnitFailure):
 
     @property
     def cause(self) -> str:
-        """The same line: it needs none of the log."""
+        """The headline: the log cannot add to it."""
         return self.headline
 
 
-def failure_of(unit: str, call: str, t: float, status: int, log: Sequence[str] = ()) -> UnitFailure:
-    """Return the failure that an FMI status above Warning is."""
-    found = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-    if status == _DISCARD:
-        return UnitDiscarded(unit, call, t, log)
-    return (UnitFatal if status == _FATAL else UnitError)(unit, call, t, found, log)
-
-
-class StepDiscarded(UnitDiscarded):
-    """A unit did not carry out a step, and the step is not repeated shorter.
-
-    Attributes:
-        reached: the time in seconds until which its step was successful; in FMI 3 the step's begin.
-        reason: why it is not repeated.
-    """
-
-    def __init__(self, unit: str, call: str, t: float, reached: float, reason: str, log: Sequence[str] = ()) -> None:
-        self.reason = reason
-        super().__init__(unit, call, t, log, reached)
-
-    @property
-    def what(self) -> str:
-        """What happened, with the time that was reached and the reason."""
-        return f"{super().what}; {self.reason}"
-
-    @property
-    def message(self) -> str:
-        """What the unit logged last, and the reason."""
-        return f"{super().message} ({self.reason})"
-
-
 class UnsettledEvents(UnitFailure):
-    """Units in event mode that keep changing each other's inputs, or asking for one more iteration."""
+    """Units in event mode keep changing each other's inputs, or keep asking for another iteration."""
 
     kind = "unsettled"
 
@@ -190,5 +183,13 @@ class UnsettledEvents(UnitFailure):
         super().__init__(self.units[0], call, t, status)
 
     def as_data(self) -> dict[str, Any]:
-        """Return the failure as JSON can hold it."""
+        """Return the failure as a JSON object."""
         return {**super().as_data(), "units": list(self.units)}
+
+
+def failure_of(unit: str, call: str, t: float, status: int, log: Sequence[str] = ()) -> UnitFailure:
+    """Return the failure of an FMI status above Warning."""
+    status_name = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+    if status == _DISCARD:
+        return UnitDiscarded(unit, call, t, log)
+    return (UnitFatal if status == _FATAL else UnitError)(unit, call, t, status_name, log)

@@ -1,6 +1,7 @@
-"""The typed edge to FMPy: reading model descriptions, and unpacking.
+"""The typed edge to FMPy: reads and validates model descriptions, and unpacks FMUs.
 
-FMUs are loaded in `handover.cosim.fmu.loading`.
+FMPy has no types, so units are read only here and loaded only in `handover.cosim.fmu.loading`.
+Every file that FMPy opens is checked before: its parser would follow entities, and its unpacking paths out of a folder.
 """
 
 from pathlib import Path
@@ -54,19 +55,17 @@ class ModelDescription(Protocol):
 
 
 def read_description(path: Path) -> tuple[ModelDescription, XmlElement]:
-    """Read and validate the model description of a co-simulation FMU; return it with its XML, for what FMPy leaves out.
+    """Read and validate a co-simulation FMU's model description; return it with its XML, for what FMPy does not read.
 
     Raises:
-        InvalidFmu: with what is wrong with the file.
+        InvalidFmu: it is not a valid co-simulation FMU; the message says why.
     """
     archive = FmuArchive(path)
     root = checked_xml(archive)
     version_of(path, root)
     try:
         md: Any = fmpy.read_model_description(str(path))
-    except (
-        Exception
-    ) as e:  # FMPy raises plain Exception for what it does not know, lxml its own for what it cannot parse
+    except Exception as e:  # FMPy raises plain Exception for unknown elements, lxml its own for malformed XML
         raise InvalidFmu(path, f"its modelDescription.xml is not valid: {one_line(e)}") from e
     if md.coSimulation is None:
         raise InvalidFmu(path, "it has no co-simulation interface")
@@ -74,10 +73,10 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement]:
 
 
 def checked_xml(archive: FmuArchive) -> XmlElement:
-    """Return the root of an FMU's model description, after looking at every XML file that FMPy's reader opens.
+    """Return the root of an FMU's model description, after checking every XML file that FMPy's reader opens.
 
     Raises:
-        InvalidFmu: a file is malformed or not to be read.
+        InvalidFmu: a file is malformed or unsafe to read.
     """
     try:
         root = parse_xml(archive.description())
@@ -98,25 +97,25 @@ def version_of(path: Path, root: XmlElement) -> int:
         InvalidFmu: it is of another version, or not a model description.
     """
     if root.tag != "fmiModelDescription":
-        raise InvalidFmu(path, f"its {DESCRIPTION} begins with <{root.tag[:80]}>; <fmiModelDescription> is right")
+        raise InvalidFmu(path, f"its {DESCRIPTION} begins with <{root.tag[:80]}>; it must be <fmiModelDescription>")
     version = root.get("fmiVersion")
     if not version:
-        raise InvalidFmu(path, f"its {DESCRIPTION} does not say its fmiVersion; 2.0 or 3.0 is right")
+        raise InvalidFmu(path, f"its {DESCRIPTION} has no fmiVersion; it must be 2.0 or 3.0")
     if version != "2.0" and not version.startswith("3."):
-        raise InvalidFmu(path, f"an FMU of FMI {version[:80]}; versions 2.0 and 3.0 can be used")
+        raise InvalidFmu(path, f"an FMU of FMI {version[:80]}; supported versions: 2.0 and 3.0")
     return int(version[0])
 
 
 def problems_of(path: Path) -> tuple[list[str], str]:
-    """Return what FMPy's validation has to say of an FMU that passed `checked_xml`, and why it stopped, if it did.
+    """Return the problems that FMPy finds in an FMU that passed `checked_xml`, and why it stopped, if it did.
 
-    Where the schema is not kept, the rules beyond it are tried nonetheless, as far as the reader gets.
+    Where the description violates the schema, the rules beyond it are checked nonetheless, as far as the reader gets.
     """
     try:
         fmpy.read_model_description(str(path), validate_variable_names=True, validate_model_structure=True)
     except ValidationError as e:
         problems = [str(p) for p in cast(list[Any], e.problems)]
-    except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... where it does not understand a description
+    except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... for descriptions that it cannot interpret
         return [], f"{type(e).__name__}: {one_line(e)}"
     else:
         return [], ""
@@ -129,7 +128,7 @@ def problems_of(path: Path) -> tuple[list[str], str]:
 
 
 def required_functions(fmi: int) -> list[str]:
-    """Return the functions that FMPy loads of a co-simulation FMU: it refuses a library that lacks any of them."""
+    """Return the functions that FMPy looks up in a co-simulation FMU: it rejects a library that lacks any of them."""
     slave = fmpy.fmi2.FMU2Slave if fmi == 2 else fmpy.fmi3.FMU3Slave
     return sorted(name for name in dir(slave) if name.startswith(f"fmi{fmi}"))
 
@@ -146,27 +145,25 @@ def platform_folder(fmi: int) -> str:
 
 
 def library_path(fmi: int, identifier: str) -> str:
-    """Return where in an FMU this machine's library lies."""
+    """Return the path of this machine's library in an FMU."""
     return f"binaries/{platform_folder(fmi)}/{identifier}{fmpy.sharedLibraryExtension}"
 
 
 def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
-    """Unpack an FMU into a folder, after checking that it has a whole binary for this machine.
+    """Unpack an FMU into a folder, after checking that it has a complete binary for this machine.
 
     Raises:
-        InvalidFmu: damaged archive, a path that leads out of the folder, or no binary for this platform,
-            or one that is cut off: the system would load it and end this process.
+        InvalidFmu: a damaged archive, a path that leads out of the folder, no binary for this platform, or a truncated
+            one: loading that would end this process by a signal.
     """
     archive = FmuArchive(path)
     if library_path(fmi, identifier) not in archive.names:
-        inside = [n.split("/") for n in archive.names if n.startswith("binaries/")]
-        has = sorted({parts[1] for parts in inside if len(parts) > 2})
-        raise InvalidFmu(
-            path, f"no binary for this machine ({platform_folder(fmi)}); it has {', '.join(has) or 'none'}"
-        )
+        paths = [n.split("/") for n in archive.names if n.startswith("binaries/")]
+        platforms = ", ".join(sorted({parts[1] for parts in paths if len(parts) > 2}))
+        raise InvalidFmu(path, f"no binary for this machine ({platform_folder(fmi)}); it has {platforms or 'none'}")
     for name in archive.names:
-        here = name.startswith(f"binaries/{platform_folder(fmi)}/") and name.endswith(fmpy.sharedLibraryExtension)
-        short = shortage(archive.head(name, HEAD), archive.size(name)) if here else ""
-        if short:
-            raise InvalidFmu(path, f"{name}: {short}")
+        is_ours = name.startswith(f"binaries/{platform_folder(fmi)}/") and name.endswith(fmpy.sharedLibraryExtension)
+        fault = shortage(archive.head(name, HEAD), archive.size(name)) if is_ours else ""
+        if fault:
+            raise InvalidFmu(path, f"{name}: {fault}")
     archive.unpack(folder)

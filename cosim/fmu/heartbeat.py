@@ -1,6 +1,8 @@
-"""Which call of which unit is under way, in memory that a C loop writes and another thread or process reads.
+"""Which call of which unit is under way, in memory that C code writes and another thread or process reads.
 
-For how long the same call has been under way.
+A run notes every call in its `Heartbeat`, together with what a crash report needs. Whoever supervises the run, a thread
+of the same process or its parent process, reads there which call hangs or crashed; `StallTimer` measures for how long
+the same call has been under way.
 """
 
 import json
@@ -11,16 +13,16 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 SIZE = 2**20
-"""Bytes of a heartbeat; the system gives only those that are used."""
+"""Bytes of a heartbeat; the system allocates only the pages that are used."""
 
-_NONE = -1
-_DOING, _COUNT, _TIME, _STOP, _LIMIT, _OVER = range(6)
-_UNITS, _CALLS, _LOG, _NOTES = (64, 2**18), (2**18, 2**14), (2**18 + 2**14, 2**16), (2**19, 2**19)
-_CALLS_OF_A_UNIT = 256
+_NONE = -1  # no call is under way
+_CODE, _COUNT, _TIME, _STOP, _LIMIT, _STATUS = range(6)  # cells
+_UNITS, _CALLS, _LOG, _FACTS = (64, 2**18), (2**18, 2**14), (2**18 + 2**14, 2**16), (2**19, 2**19)  # offset, size
+_MAX_CALLS = 256  # different calls in a run; further ones share the last number
 
 
 class Abandoned(BaseException):
-    """A call returned too late: the units belong to another thread, and this one has to end at once."""
+    """A call returned after its unit was abandoned: units may no longer be touched, and this thread has to end."""
 
 
 class Call(NamedTuple):
@@ -32,19 +34,20 @@ class Call(NamedTuple):
 
 
 class Heartbeat:
-    """Tells which call is under way. Writing costs a few stores in memory and no system call.
+    """Shows which call is under way. Writing costs a few stores in memory and no system call.
 
     The first 64 bytes are eight cells: 0 the call under way as int64 (see `code`; -1: none), 1 a count as int64 that
-    changes with every call, 2 simulated time as float64, 3 an int64 that is not 0 when the units are taken from who
-    steps them.
-    A C loop over units writes cell 2 at each step's time, then before a call adds one to cell 1 and sets cell 0, and
-    after the last call sets cell 0 to -1. After each call it reads cell 3 before it goes on; where that is not 0 it
-    touches no unit any more and returns, and its caller raises `Abandoned`.
+    changes with every call, 2 simulated time as float64, 3 an int64 that is not 0 when the thread that steps the units
+    has to stop.
+    C code that steps units writes cell 2 at each step's time, then before a call adds one to cell 1 and sets cell 0,
+    and after the last call sets cell 0 to -1. After each call it reads cell 3; where that is not 0 it touches no unit
+    any more and returns, and its caller raises `Abandoned`.
 
-    Without a clock in it, whoever watches sees by the count that calls go on, and takes the time himself.
+    The heartbeat holds no wall time, which would cost a system call: a supervisor sees by the count whether calls
+    proceed, and measures the time itself.
 
     Attributes:
-        abandoned: names of instances that did not return; they and their libraries are left alone.
+        abandoned: names of instances that did not return; they and their libraries are neither called nor freed.
     """
 
     def __init__(self, memory: mmap.mmap | None = None) -> None:
@@ -52,9 +55,9 @@ class Heartbeat:
         whole = memoryview(self.memory)
         self._cells, self._seconds = whole[:64].cast("q"), whole[:64].cast("d")
         self._units, self._calls = _Lines(self.memory, *_UNITS), _Lines(self.memory, *_CALLS)
-        self._log, self._notes = _Lines(self.memory, *_LOG), _Lines(self.memory, *_NOTES)
-        self._places = {name: i for i, name in enumerate(self._units.read())}
-        self._known = {name: i for i, name in enumerate(self._calls.read())}
+        self._log, self._facts = _Lines(self.memory, *_LOG), _Lines(self.memory, *_FACTS)
+        self._unit_numbers = {name: i for i, name in enumerate(self._units.read())}
+        self._call_numbers = {name: i for i, name in enumerate(self._calls.read())}
         self._write = struct.Struct("=qqd").pack_into
         self._count = 0
         self.abandoned: set[str] = set()
@@ -63,40 +66,41 @@ class Heartbeat:
 
     def code(self, unit: str, call: str) -> int:
         """Return what cell 0 holds while this call of this instance is under way."""
-        place, which = self._places.get(unit), self._known.get(call)
-        if place is None:
-            place = self._places[unit] = len(self._places)
+        unit_number, call_number = self._unit_numbers.get(unit), self._call_numbers.get(call)
+        if unit_number is None:
+            unit_number = self._unit_numbers[unit] = len(self._unit_numbers)
             self._units.append(unit)
-        if which is None:
-            which = self._known[call] = min(len(self._known), _CALLS_OF_A_UNIT - 1)
+        if call_number is None:
+            call_number = self._call_numbers[call] = min(len(self._call_numbers), _MAX_CALLS - 1)
             self._calls.append(call)
-        return place * _CALLS_OF_A_UNIT + which
+        return unit_number * _MAX_CALLS + call_number
 
     def begin(self, code: int, t: float) -> None:
-        """Tell that a call begins, at simulated time t in seconds."""
+        """Note that a call begins, at simulated time t in seconds."""
         self._count += 1
         self._write(self.memory, 0, code, self._count, t)
 
     def end(self) -> None:
-        """Tell that the call has returned."""
-        self._cells[_DOING] = _NONE
+        """Note that the call has returned."""
+        self._cells[_CODE] = _NONE
 
     @property
     def beat(self) -> tuple[int, int] | None:
-        """A call under way as code and count, which the next one does not share; None between calls."""
-        count, code = self._cells[_COUNT], self._cells[_DOING]
+        """The call under way as code and count, a pair that no other call has; None between calls."""
+        count, code = self._cells[_COUNT], self._cells[_CODE]
         return None if code == _NONE else (code, count)
 
     @property
     def under_way(self) -> Call | None:
         """The call under way, by names."""
-        code = self._cells[_DOING]
+        code = self._cells[_CODE]
         if code == _NONE:
             return None
-        place, which = divmod(code, _CALLS_OF_A_UNIT)
+        unit_number, call_number = divmod(code, _MAX_CALLS)
         units, calls = self._units.read(), self._calls.read()
-        unit = units[place] if place < len(units) else f"number {place + 1}"
-        return Call(unit, calls[which] if which < len(calls) else "a call", self._seconds[_TIME])
+        unit = units[unit_number] if unit_number < len(units) else f"number {unit_number + 1}"
+        call = calls[call_number] if call_number < len(calls) else "a call"
+        return Call(unit, call, self._seconds[_TIME])
 
     @property
     def time(self) -> float:
@@ -105,7 +109,7 @@ class Heartbeat:
 
     @property
     def stopped(self) -> bool:
-        """Whether the units are taken from who steps them."""
+        """Whether the thread that steps the units has to stop."""
         return self._cells[_STOP] != 0
 
     @stopped.setter
@@ -114,7 +118,7 @@ class Heartbeat:
 
     @property
     def limit(self) -> float:
-        """Seconds that a call may take, 0 where there is no limit; for a process that watches."""
+        """Seconds that a call may take, 0 where there is no limit; for a supervising process."""
         return self._seconds[_LIMIT]
 
     @limit.setter
@@ -123,36 +127,36 @@ class Heartbeat:
 
     @property
     def status(self) -> int | None:
-        """With what status the process that writes ends because it is done; None: it is not done."""
-        return self._cells[_OVER] - 1 if self._cells[_OVER] else None
+        """The exit status with which the process that writes is about to end; None while it is not done."""
+        return self._cells[_STATUS] - 1 if self._cells[_STATUS] else None
 
     @status.setter
     def status(self, status: int) -> None:
-        self._cells[_OVER] = status + 1
+        self._cells[_STATUS] = status + 1
 
     def tell(self, **facts: Any) -> None:
-        """Keep facts, which JSON can hold, for the case that this process dies."""
-        text = json.dumps({**self.facts, **facts})
-        self._notes.clear()
-        self._notes.append(text)
+        """Keep facts, in addition to those kept before, for the report if this process crashes; JSON must hold them."""
+        line = json.dumps({**self.facts, **facts})
+        self._facts.clear()
+        self._facts.append(line)
 
     def record_scratch_folder(self, folder: str) -> None:
-        """Keep the place of a folder that is to be removed if this process dies."""
+        """Keep the path of a folder that is to be removed if this process crashes."""
         self.tell(scratch=[*self.facts.get("scratch", []), folder])
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What was told, by name."""
-        lines = self._notes.read()
+        """What `tell` kept, by name."""
+        lines = self._facts.read()
         return json.loads(lines[0]) if lines else {}
 
     def log(self, unit: str, message: str) -> None:
-        """Keep what an instance logged; where there is no room, what was logged before is forgotten."""
+        """Keep what an instance logged; where there is no room, earlier lines are dropped."""
         for line in message.splitlines():
-            sentence = f"{unit}\t{line}"
-            if not self._log.append(sentence):
+            entry = f"{unit}\t{line}"
+            if not self._log.append(entry):
                 self._log.clear()
-                self._log.append(sentence)
+                self._log.append(entry)
 
     def log_of(self, unit: str) -> tuple[str, ...]:
         """Return the last lines that an instance logged."""
@@ -161,14 +165,14 @@ class Heartbeat:
 
     @property
     def address(self) -> int:
-        """Where the cells lie, for C."""
+        """Address of the cells, for C code."""
         import ctypes
 
         return ctypes.addressof(ctypes.c_char.from_buffer(self.memory))
 
 
 class _Lines:
-    """Lines of text in a part of the memory, which begins with their length in bytes: set last, so they are whole."""
+    """Lines of text in a part of the memory, after their length in bytes; that is set last, so lines are whole."""
 
     def __init__(self, memory: mmap.mmap, at: int, size: int) -> None:
         self._memory, self._at, self._size = memory, at, size
@@ -193,20 +197,20 @@ class _Lines:
 
 
 class StallTimer:
-    """Looks at a heartbeat now and then, and adds up the time in which one call did not return.
+    """Measures, by polling a heartbeat, for how long the same call has been under way.
 
-    Of the time between two looks at most `most` seconds count: if more has passed, it was the whole process, or the
-    machine, that stood still.
+    Of the time between two polls at most `max_gap` seconds count: if more has passed, the whole process or the machine
+    was suspended.
     """
 
     def __init__(self, heartbeat: Heartbeat, max_gap: float, clock: Callable[[], float] = time.monotonic) -> None:
         self._heartbeat, self._max_gap, self._clock = heartbeat, max_gap, clock
         self.beat: tuple[int, int] | None = None
-        """The call that was under way at the last look."""
+        """The call that was under way at the last poll."""
         self._seconds, self._checked_at = 0.0, clock()
 
     def elapsed(self) -> float:
-        """Return the seconds for which the call that is under way has been seen; 0 where there is none."""
+        """Poll; return the seconds for which the present call has been under way, 0 where there is none."""
         now, beat = self._clock(), self._heartbeat.beat
         passed, self._checked_at = now - self._checked_at, now
         if beat is None or beat != self.beat:

@@ -1,4 +1,8 @@
-"""One FMU, unpacked, loaded and instantiated, behind the same few calls for FMI 2 and FMI 3."""
+"""One FMU, unpacked, loaded and instantiated, behind the same few methods for FMI 2 and FMI 3.
+
+An instance has its values in preallocated buffers, `u` for inputs and `y` for outputs. Every call goes through the
+heartbeat and is checked: a status above Warning raises the `UnitFailure` of that status.
+"""
 
 import collections
 import ctypes
@@ -24,7 +28,7 @@ _DISCARD, _FATAL, _PENDING = 2, 4, 5
 class Instance:
     """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
 
-    Each call is told to `heartbeat`. If a call returns after the unit was given up, `Abandoned` is raised.
+    Each call is noted in `heartbeat`. If a call returns after the unit was abandoned, `Abandoned` is raised.
 
     Raises:
         InvalidFmu: the library does not load or does not instantiate.
@@ -57,9 +61,9 @@ class Instance:
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
         self.y: dict[str, Views] = {k: v for b in self._getters for k, v in b.views.items()}
         self.du: dict[str, Views] = {}
-        """Time derivatives of inputs that `interpolate` named."""
+        """Time derivatives of the inputs that were given to `interpolate`."""
         self.can_roll_back = False
-        """Whether states of times before the current communication point may be restored; the unit is told."""
+        """Whether states from before the present communication point may be restored; passed to the unit in DoStep."""
         self._step_arguments = self._make_step_arguments()
         self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
 
@@ -84,34 +88,34 @@ class Instance:
         self._call("ExitInitializationMode")
 
     def set_inputs(self) -> None:
-        """Hand the contents of `u`, and of `du`, to the unit."""
+        """Set the unit's inputs to the contents of `u`, and their derivatives to those of `du`."""
         self._set_or_get(self._setters)
 
     def set_some_inputs(self, names: Iterable[str]) -> None:
-        """Hand the contents of `u` to the unit, but only of these inputs; the others stay as they are."""
+        """Set only these inputs of the unit to the contents of `u`."""
         setters = self._buffers("Set", [self.description.inputs[n] for n in names])
         for buffer in setters:
             for name, views in buffer.views.items():
-                for mine, held in zip(views, self.u[name], strict=True):
-                    mine[:] = held
+                for target, source in zip(views, self.u[name], strict=True):
+                    target[:] = source
         self._set_or_get(setters)
 
     def interpolate(self, names: Iterable[str]) -> None:
-        """Hand these inputs' time derivatives to the unit too, whenever inputs are set (FMI 2)."""
+        """Set these inputs' time derivatives too, from `du`, whenever inputs are set (FMI 2)."""
         ports = [self.description.inputs[n] for n in names]
         buffer = InputDerivatives(self._function("SetRealInputDerivatives"), self._component, ports)
         self._setters.append(buffer)
         self.du = dict(buffer.views)
 
     def get_outputs(self) -> None:
-        """Fetch the unit's outputs into `y`."""
+        """Read the unit's outputs into `y`."""
         self._set_or_get(self._getters)
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt.
 
         Raises:
-            UnitFailure: the unit answered anything but OK or a warning, or ended the simulation.
+            UnitFailure: the status is above Warning, or the unit asks to end the simulation.
         """
         self.time = t
         self._begins(self._step_call)
@@ -121,7 +125,7 @@ class Instance:
         self.time = t + dt
 
     def try_step(self, t: float, dt: float) -> StepEnd:
-        """Advance from t by dt, or as far as the unit goes; raise as `step`, but for a discard."""
+        """Advance from t by dt, or as far as the unit gets; raises as `step` does, except for a discarded step."""
         self.time = t
         self._begins(self._step_call)
         status = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_arguments)
@@ -140,24 +144,24 @@ class Instance:
         return StepDiscarded(self.name, self._step_call, self.time, reached, reason, tuple(self.log))
 
     def judge_step(self, status: int) -> None:
-        """Look at what a step that was taken at `time` answered.
+        """Check the status of a step that began at `time`.
 
         Raises:
-            UnitFailure: anything but OK or a warning, or the wish to end the simulation.
+            UnitFailure: it is above Warning, or the unit asks to end the simulation.
         """
         if status == _DISCARD:
             raise self.discarded(self._reached(), "steps are repeated shorter only with repeat_discarded")
-        if status == _PENDING:  # the standard knows steps that go on by themselves; nothing here would go on meanwhile
+        if status == _PENDING:  # an asynchronous step of FMI 2, which is not supported
             self._function("CancelStep")(self._component)
         self.judge(self._step_call, status)
         if self._fmi == 3 and self._terminate.value:
             raise UnitTerminated(self.name, self._step_call, self.time, tuple(self.log))
 
     def judge(self, call: str, status: int) -> None:
-        """Look at what a call answered at `time`.
+        """Check the status of a call at `time`.
 
         Raises:
-            UnitFailure: anything but OK or a warning.
+            UnitFailure: it is above Warning.
         """
         if status > 1:
             self._fail(call, status)
@@ -169,28 +173,28 @@ class Instance:
 
     @property
     def getters(self) -> Sequence[SignalBuffer]:
-        """The buffers that `get_outputs` fetches."""
+        """The buffers that `get_outputs` reads."""
         return self._getters
 
     @property
     def native_step(self) -> NativeStep:
-        """The call that `step` makes, for a program in C."""
+        """The call that `step` makes, for C code."""
         function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
         flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
         return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
 
     def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Return how outputs change with inputs at this instant, the unit's state being as it is.
+        """Return the directional derivative dy = (dy/du) du of outputs at this instant, with the unit's state held.
 
         Args:
-            outputs: names of real outputs.
-            inputs: a direction: how fast each of some real inputs changes, all its entries in row-major order.
+            outputs: names of the real outputs y.
+            inputs: the direction du, by name of real inputs, all entries in row-major order.
 
         Returns:
-            How fast the outputs change then, by name.
+            dy by output's name, flattened in row-major order.
 
         Raises:
-            UnitFailure: it does not tell.
+            UnitFailure: the call failed.
         """
         return derivatives_along(self._call, self._fmi, self.description, outputs, inputs)
 
@@ -203,7 +207,7 @@ class Instance:
         return self._states.save()
 
     def restore_state(self, state: State) -> None:
-        """Go back to a saved state of this instance, which may be used again.
+        """Restore a saved state of this instance, which may be used again.
 
         Raises:
             UnitFailure: it cannot.
@@ -211,12 +215,12 @@ class Instance:
         self._states.restore(state)
 
     def free_state(self, state: State) -> None:
-        """Free a saved state; it is left where the unit itself has to be left, see `lost`."""
+        """Free a saved state, unless no call may follow, see `lost`."""
         if not self.lost:
             self._states.free(state)
 
     def serialise_state(self) -> bytes:
-        """Return the unit's state as bytes that mean the same in another process.
+        """Return the unit's state as bytes that are valid in another process too.
 
         Raises:
             UnitFailure: it cannot.
@@ -228,7 +232,7 @@ class Instance:
             self.free_state(state)
 
     def deserialise_state(self, data: bytes) -> None:
-        """Go to a state that `serialise_state` gave.
+        """Restore a state that `serialise_state` returned.
 
         Raises:
             UnitFailure: it cannot.
@@ -240,21 +244,21 @@ class Instance:
             self.free_state(state)
 
     def contents(self) -> list[list[bytes]]:
-        """Return what `y` and the plain values of `u` hold: not always the unit's values at its present time."""
-        return [b.contents() for b in self._held()]
+        """Return the contents of `y` and of `u` without strings and binaries; the unit may have advanced since."""
+        return [b.contents() for b in self._restorable_buffers()]
 
     def refill(self, contents: Sequence[Sequence[bytes]]) -> None:
-        """Hold what `contents` gave, be it in another process."""
-        for buffer, content in zip(self._held(), contents, strict=True):
+        """Set the buffers to what `contents` returned, possibly in another process."""
+        for buffer, content in zip(self._restorable_buffers(), contents, strict=True):
             buffer.refill(content)
 
     def end(self) -> None:
-        """Terminate the unit, unless a call failed: the standards forbid it then, but for Discard."""
+        """Terminate the unit, unless a call failed with another status than Discard: the standards forbid it then."""
         if not self.failed and not self._abandoned:
             self._call("Terminate")
 
     def free(self) -> None:
-        """Free the unit and its library; it is left after a fatal error, as the standards ask, or if a call hangs."""
+        """Free the unit and its library, unless no call may follow, see `lost`."""
         if self._component is not None and not self.lost:
             self._component = None
             self._begins(f"{self._prefix}FreeInstance")
@@ -263,17 +267,17 @@ class Instance:
 
     @property
     def fatal(self) -> bool:
-        """Whether a call was answered with Fatal."""
+        """Whether a call returned Fatal."""
         return self._failed == _FATAL
 
     @property
     def failed(self) -> bool:
-        """Whether a call was answered in a way after which the unit cannot go on."""
+        """Whether a call returned a status after which the unit cannot be stepped."""
         return self._failed not in (None, _DISCARD)
 
     @property
     def lost(self) -> bool:
-        """Whether no call may follow, not even to free it: one was answered with Fatal, or did not return."""
+        """Whether no call may follow, not even to free the unit: one returned Fatal, or did not return."""
         return self.fatal or self._abandoned
 
     @property
@@ -296,9 +300,9 @@ class Instance:
         return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
 
     def _reached(self) -> float:
-        """Return how far a step came that was discarded; raise if that was because the unit wants to end."""
-        reached, ended = discarded_step(self._function, self._component, self.time, self._fmi)
-        if ended:
+        """Return how far a discarded step got; raise if the unit discarded it to end the simulation."""
+        reached, terminated = discarded_step(self._function, self._component, self.time, self._fmi)
+        if terminated:
             raise UnitTerminated(self.name, self._step_call, self.time, tuple(self.log))
         return reached
 
@@ -317,15 +321,15 @@ class Instance:
         return [self._buffer(verb, group) for group in by_type.values()]
 
     def _buffer(self, verb: str, ports: list[FmuPort]) -> SignalBuffer:
-        kind = ports[0].fmi_type
-        if kind == "Enumeration":
-            kind = "Integer" if self._fmi == 2 else "Int64"
-        make = OutputBuffer if verb == "Get" and kind in ("String", "Binary") else SignalBuffer
-        call = f"{self._prefix}{verb}{kind}"
-        return make(call, self._function(f"{verb}{kind}"), self._component, self._fmi, ports)
+        fmi_type = ports[0].fmi_type
+        if fmi_type == "Enumeration":  # has no calls of its own
+            fmi_type = "Integer" if self._fmi == 2 else "Int64"
+        buffer_class = OutputBuffer if verb == "Get" and fmi_type in ("String", "Binary") else SignalBuffer
+        call = f"{self._prefix}{verb}{fmi_type}"
+        return buffer_class(call, self._function(f"{verb}{fmi_type}"), self._component, self._fmi, ports)
 
-    def _held(self) -> list[SignalBuffer]:
-        """Return the buffers but those of inputs that hold addresses of others' outputs, which are copied anew."""
+    def _restorable_buffers(self) -> list[SignalBuffer]:
+        """Return all buffers but those of inputs that hold addresses of other units' outputs."""
         return [*self._getters, *(b for b in self._setters if not b.name.endswith(("String", "Binary")))]
 
     def _set_or_get(self, buffers: Iterable[SignalBuffer]) -> None:
@@ -340,11 +344,11 @@ class Instance:
         buffer = self._buffer("Set", [port])
         views = buffer.views[port.name]
         if port.kind is Kind.STRING:
-            kept = ctypes.create_string_buffer(str(value).encode())
-            views[0][0] = ctypes.addressof(kept)
+            content = ctypes.create_string_buffer(str(value).encode())
+            views[0][0] = ctypes.addressof(content)
         elif port.kind is Kind.BINARY:
-            kept = ctypes.create_string_buffer(bytes(value), len(value))
-            views[0][0], views[1][0] = ctypes.addressof(kept), len(value)
+            content = ctypes.create_string_buffer(bytes(value), len(value))
+            views[0][0], views[1][0] = ctypes.addressof(content), len(value)
         else:
             views[0][:] = numbers_of(port, value)
         self._begins(buffer.name)
@@ -369,7 +373,7 @@ class Instance:
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:
-            found = message.removeprefix(f"{self.name}: ")  # whoever shows a log says whose it is
-            line = f"[{STATUS[status] if status < len(STATUS) else status}] {found}"
+            text = message.removeprefix(f"{self.name}: ")  # logs are shown with the instance's name
+            line = f"[{STATUS[status] if status < len(STATUS) else status}] {text}"
             self.log.append(line)
             self._heartbeat.log(self.name, line)

@@ -1,9 +1,9 @@
-"""What a shared library's first bytes say: for which platforms it is made, and how long it is. ELF, PE and Mach-O."""
+"""Reads the headers of shared libraries, ELF, PE and Mach-O: the platforms that they are for, and their length."""
 
 import struct
 from collections.abc import Iterator
 
-HEAD = 4096  # bytes that hold what is read here
+HEAD = 4096  # bytes from the beginning, enough for the headers that are read here
 
 _ELF = {3: "x86", 40: "arm", 62: "x86_64", 183: "aarch64"}
 _PE = {0x14C: "x86", 0x8664: "x86_64", 0xAA64: "aarch64"}
@@ -35,17 +35,17 @@ def platforms_of(head: bytes) -> tuple[str, ...]:
 def shortage(head: bytes, size: int) -> str:
     """Return what is wrong with a library of `size` bytes that is cut off, by its first bytes; empty if it is whole.
 
-    The system maps what the headers promise: a process that touches the part that is missing dies by SIGBUS.
+    The system maps as much as the headers announce: a process that accesses the missing part is ended by SIGBUS.
     """
-    promised = max(_ends(head), default=0)
-    if promised <= size:
+    announced = max(_ends(head), default=0)
+    if announced <= size:
         return ""
-    text = f"it has {size} bytes of at least {promised}"
-    return f"the library is shorter than its headers say ({text}); export or copy the FMU again"
+    sizes = f"it has {size} bytes of at least {announced}"
+    return f"the library is shorter than its headers say ({sizes}); export or copy the FMU again"
 
 
 def _ends(head: bytes) -> Iterator[int]:
-    """Yield where parts of a library end, in bytes from its beginning, as far as the headers in `head` tell."""
+    """Yield where parts of a library end, in bytes from its beginning, as far as its headers are in `head`."""
     try:
         if head.startswith(b"\x7fELF"):
             yield from _elf_ends(head)
@@ -69,7 +69,7 @@ def _elf_ends(head: bytes) -> Iterator[int]:
     yield programs + program_size * program_count
     yield sections + section_size * section_count
     for i in range(program_count):
-        at = programs + program_size * i  # the part's place in the file, then two addresses, then its size in the file
+        at = programs + program_size * i  # holds the part's offset in the file, two addresses, its size in the file
         offset, _, _, length = struct.unpack_from(f"{order}{'4Q' if wide else '4I'}", head, at + (8 if wide else 4))
         yield offset + length
 
@@ -82,7 +82,7 @@ def _pe_ends(head: bytes) -> Iterator[int]:
     (optional,) = struct.unpack_from("<H", head, at + 20)
     for i in range(count):
         length, offset = struct.unpack_from("<II", head, at + 24 + optional + 40 * i + 16)
-        if offset:  # none of what is zero at the start
+        if offset:  # sections of zeros have no bytes in the file
             yield offset + length
 
 

@@ -1,4 +1,7 @@
-"""Reads XML that others wrote: without entities, document types and whatever else can exhaust memory or reach out."""
+"""Reads XML from untrusted files: document types and entities, which can exhaust memory or fetch files, are rejected.
+
+defusedxml decides whether a document is safe; lxml, which knows the line of each element, then parses it.
+"""
 
 import importlib
 from collections.abc import Iterator, Mapping
@@ -9,11 +12,11 @@ from xml.etree.ElementTree import ParseError
 import defusedxml
 import defusedxml.ElementTree
 
-_etree: Any = importlib.import_module("lxml.etree")  # has no types, nor have its classes
+_etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
 
 
 class UnsafeXml(ValueError):
-    """XML that is malformed or not to be read; the message says what and where."""
+    """XML that is malformed or unsafe to read; the message says what is wrong and where."""
 
 
 @dataclass(frozen=True)
@@ -42,18 +45,18 @@ def parse_xml(content: bytes) -> XmlElement:
     """Parse a document.
 
     Raises:
-        UnsafeXml: it is not well-formed, in an encoding that is not known, or has a document type or entities.
+        UnsafeXml: it is not well-formed, in an unknown encoding, or has a document type or entities.
     """
     check_xml(content)
     try:
         parser = _etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
         return _converted(_etree.fromstring(content, parser))
-    except SyntaxError as e:  # what lxml raises is one
+    except SyntaxError as e:  # the base class of lxml's errors
         raise UnsafeXml(f"it is not well-formed: {' '.join(str(e).split())}") from e
 
 
 def check_xml(content: bytes) -> None:
-    """Let a document through that other parsers may read too.
+    """Check that a document is safe for other parsers too.
 
     Raises:
         UnsafeXml: as `parse_xml`.
@@ -69,16 +72,17 @@ def check_xml(content: bytes) -> None:
         ) from e
     except defusedxml.DefusedXmlException as e:
         raise UnsafeXml(f"it refers to what lies outside of it: {' '.join(str(e).split())}") from e
-    except (LookupError, ValueError) as e:  # an encoding that is not known, or one of many bytes
-        raise UnsafeXml(f"its encoding cannot be read: {e}; UTF-8 is right") from e
+    except (LookupError, ValueError) as e:  # an encoding that is unknown or of several bytes per character
+        raise UnsafeXml(f"its encoding cannot be read: {e}; use UTF-8") from e
 
 
 def _converted(root: Any) -> XmlElement:
     """Convert lxml's tree, from its leaves up."""
-    made: dict[Any, list[XmlElement]] = {}
+    converted: dict[Any, list[XmlElement]] = {}  # by parent, its children so far
     for _, element in _etree.iterwalk(root, events=("end",)):
         if isinstance(element.tag, str):  # else a processing instruction
             attributes = {str(k): str(v) for k, v in element.attrib.items()}
-            one = XmlElement(element.tag, attributes, int(element.sourceline), tuple(made.pop(element, ())))
-            made.setdefault(element.getparent(), []).append(one)
-    return made[None][0]
+            children = tuple(converted.pop(element, ()))
+            one = XmlElement(element.tag, attributes, int(element.sourceline), children)
+            converted.setdefault(element.getparent(), []).append(one)
+    return converted[None][0]

@@ -1,6 +1,7 @@
-"""What a run needs to go on in another process: the states of its units and of its master, in one file.
+"""Checkpoints, from which a run resumes in another process: the states of its units and of its master, in one file.
 
-Writes checkpoints while a run goes on.
+A `Checkpointer` writes them during a run. The file is a zip archive: `checkpoint.json`, for each unit its state, the
+contents of its buffers and its CPU times, and `kept`, bytes of whoever runs the master.
 """
 
 import array
@@ -22,11 +23,13 @@ from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 
+_log = logging.getLogger(__name__)
+
 _FORMAT = 1
 
 
 class InvalidCheckpoint(CosimError):
-    """A checkpoint cannot be used."""
+    """A checkpoint is missing, damaged or of another format."""
 
     def __init__(self, path: Path, fault: str) -> None:
         super().__init__(f"{path}: {fault}")
@@ -34,16 +37,16 @@ class InvalidCheckpoint(CosimError):
 
 
 class StateNotSaved(CosimError):
-    """Units of a run that should write checkpoints cannot save their states; nothing has started."""
+    """Units of a run with checkpoints cannot save their states; nothing has started."""
 
     def __init__(self, units: Mapping[str, str]) -> None:
-        text = "; ".join(f"{name}: {reason}" for name, reason in units.items())
-        super().__init__(f"a run with these units cannot write checkpoints, as they do not save their states: {text}")
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in units.items())
+        super().__init__(f"a run with these units cannot write checkpoints, as they do not save states: {reasons}")
         self.units = dict(units)
 
 
 def check_states(system: System) -> None:
-    """Check that all units say that their states can be fetched, set and serialised.
+    """Check that all units declare that their states can be fetched, set and serialised.
 
     Raises:
         StateNotSaved: with all that do not.
@@ -51,12 +54,12 @@ def check_states(system: System) -> None:
     faults: dict[str, str] = {}
     for name, unit in system.units.items():
         d, state = unit.description, "FMUstate" if unit.description.fmi == 2 else "FMUState"
-        able = {
+        flags = {
             f"canGetAndSet{state}": d.capabilities.saves_state,
             f"canSerialize{state}": d.capabilities.serialises_state,
         }
-        if not all(able.values()):
-            faults[name] = f"{d.path.name} lacks {' and '.join(flag for flag, has in able.items() if not has)}"
+        if not all(flags.values()):
+            faults[name] = f"{d.path.name} lacks {' and '.join(flag for flag, has in flags.items() if not has)}"
     if faults:
         raise StateNotSaved(faults)
 
@@ -68,11 +71,11 @@ class Checkpoint:
     Attributes:
         time: simulated time, s.
         rows: rows of the record until then.
-        stepper: what the stepper says of itself.
+        stepper: the state of the stepper.
         units: of each unit its serialised state.
-        contents: of each unit what its buffers held, which may be values of another time than its state's.
+        contents: of each unit the contents of its buffers, which may be values of another time than its state's.
         cpu: of each unit the CPU seconds of its steps.
-        kept: what whoever runs the master wants back.
+        kept: bytes of whoever runs the master.
     """
 
     time: float
@@ -84,10 +87,10 @@ class Checkpoint:
     kept: bytes = b""
 
     def restore(self, master: Master) -> None:
-        """Take a master that has been entered to where this one was.
+        """Restore this run in a master that has been entered.
 
         Raises:
-            UnitFailure: a unit does not take its state. CosimError: these are other units.
+            UnitFailure: a unit does not accept its state. CosimError: the master has other units.
         """
         if set(self.units) != set(master.system.units):
             raise CosimError(f"a checkpoint of the units {', '.join(self.units)}, not of these")
@@ -100,7 +103,7 @@ class Checkpoint:
 
 
 def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
-    """Return where a master is, of whose record there are so many rows.
+    """Return a checkpoint of a master, whose record has `rows` rows.
 
     Raises:
         UnitFailure: a unit does not give its state.
@@ -118,12 +121,12 @@ def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint: the file is either the former one or whole, whenever the process ends.
+    """Write a checkpoint atomically: the file is the former one or the whole new one, whenever the process ends.
 
     Raises:
         OSError: it cannot be written; the former one stays.
     """
-    head = {
+    header = {
         "format": _FORMAT,
         "time": checkpoint.time,
         "rows": checkpoint.rows,
@@ -134,7 +137,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     try:
         with open(unfinished, "wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
-                archive.writestr("checkpoint.json", json.dumps(head))
+                archive.writestr("checkpoint.json", json.dumps(header))
                 for i, name in enumerate(checkpoint.units):
                     archive.writestr(f"{i}.state", checkpoint.units[name])
                     archive.writestr(f"{i}.contents", pickle.dumps(checkpoint.contents[name]))
@@ -149,27 +152,29 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
 
 
 def remove_checkpoint(path: Path) -> None:
-    """Remove a checkpoint, and what a process left that died as it wrote one."""
+    """Remove a checkpoint, and the unfinished one of a process that crashed while writing."""
     path.unlink(missing_ok=True)
     _unfinished(path).unlink(missing_ok=True)
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Read a checkpoint. Python objects in it are unpickled, so it must be from someone whom one trusts.
+    """Read a checkpoint. Python objects in it are unpickled, so it must be from a trusted source.
 
     Raises:
         InvalidCheckpoint: there is none, or it is damaged or of another version.
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            head = json.loads(archive.read("checkpoint.json"))
-            if head["format"] != _FORMAT:
-                raise InvalidCheckpoint(path, f"a checkpoint of format {head['format']}; format {_FORMAT} can be read")
-            names: list[str] = head["units"]
+            header = json.loads(archive.read("checkpoint.json"))
+            if header["format"] != _FORMAT:
+                raise InvalidCheckpoint(
+                    path, f"a checkpoint of format {header['format']}; format {_FORMAT} can be read"
+                )
+            names: list[str] = header["units"]
             return Checkpoint(
-                time=head["time"],
-                rows=head["rows"],
-                stepper=head["stepper"],
+                time=header["time"],
+                rows=header["rows"],
+                stepper=header["stepper"],
                 units={name: archive.read(f"{i}.state") for i, name in enumerate(names)},
                 contents={name: pickle.loads(archive.read(f"{i}.contents")) for i, name in enumerate(names)},
                 cpu={name: archive.read(f"{i}.cpu") for i, name in enumerate(names)},
@@ -179,15 +184,12 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
     except InvalidCheckpoint:
         raise
-    except Exception as e:  # whatever the readers of archive, JSON and pickle make of damaged bytes
+    except Exception as e:  # the readers of zip, JSON and pickle raise various exceptions on damaged bytes
         raise InvalidCheckpoint(path, f"the checkpoint is damaged: {one_line(e)}") from e
 
 
 def _unfinished(path: Path) -> Path:
     return path.with_name(path.name + ".part")
-
-
-_log = logging.getLogger(__name__)
 
 
 def nothing() -> bytes:
@@ -198,13 +200,13 @@ def nothing() -> bytes:
 class Checkpointer:
     """An observer of `Master.run`, the last of them, that writes a checkpoint every so many simulated seconds.
 
-    A checkpoint is due at the multiples of `every`, and written at the first communication point that is not before.
+    A checkpoint is due at the multiples of `every`, and written at the first communication point at or after one.
 
     Args:
-        path: the checkpoint's file, of which a newer one takes the place.
+        path: the file, which each checkpoint replaces.
         every: seconds.
         master, recorder: of the run.
-        keep: gives what has to be kept besides, such as the states of other observers.
+        keep: returns what to keep besides, such as the states of other observers.
     """
 
     def __init__(
@@ -228,19 +230,19 @@ class Checkpointer:
     def write(self) -> None:
         """Write a checkpoint of the communication point that observers saw last; raises as by calling.
 
-        Where it cannot be written, the log says so, the former one stays, and the run goes on.
+        Where it cannot be written, that is logged, the former one stays, and the run continues.
         """
         checkpoint = take_checkpoint(self._master, self._recorder.sync(), self._keep())
         try:
             write_checkpoint(self.path, checkpoint)
         except OSError as e:
-            value = e.strerror or e
+            reason = e.strerror or e
             _log.warning(
-                "%s cannot be written at t = %g s, the former one stays: %s", self.path, checkpoint.time, value
+                "%s cannot be written at t = %g s, the former one stays: %s", self.path, checkpoint.time, reason
             )
 
     def _after(self, t: float) -> float:
         count = math.floor(Fraction(t) / self._every)
-        while float(count * self._every) <= t:  # a time is rounded, so a multiple may seem to be not reached
+        while float(count * self._every) <= t:  # t is rounded, so a multiple that is reached may seem to lie after it
             count += 1
         return float(count * self._every)

@@ -1,4 +1,4 @@
-"""Runs a system of FMUs: checks it, loads it, and takes it from one communication point to the next."""
+"""The master algorithm: checks a system of FMUs, loads it, and runs it from one communication point to the next."""
 
 import array
 from collections.abc import Callable, Sequence
@@ -9,8 +9,8 @@ from typing import TypeVar
 from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.master.method import StepperFactory
 from handover.cosim.master.pacing import Pacer
+from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
@@ -29,7 +29,7 @@ _PLAIN = MasterOptions()
 
 
 def never() -> bool:
-    """Let a run go on to its stop time."""
+    """Let a run continue to its stop time."""
     return False
 
 
@@ -39,7 +39,7 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU cannot be used. ScheduleError: see `Method`.
+        WiringError: the system has faults. InvalidFmu: an FMU is invalid. ScheduleError: see `StepperFactory`.
         InitializationError: a unit did not accept its parameters or did not initialise.
     """
 
@@ -51,7 +51,7 @@ class Master:
         self.schedule = self._factory.schedule
         self.heartbeat = heartbeat or Heartbeat()
         self.pacer = Pacer(options.pace) if options.pace is not None else None
-        """What keeps the run in step with the wall clock, if it is to."""
+        """Keeps the run in step with the wall clock; None where it runs as fast as it can."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
         self._cleanups = CleanupStack()
         self._ensemble: Ensemble | None = None
@@ -97,14 +97,14 @@ class Master:
 
     @property
     def stepper(self) -> Stepper:
-        """What moves the units through time; there is none before the master is entered."""
+        """What advances the units through time; there is none before the master is entered."""
         if self._stepper is None:
             raise RuntimeError("enter the master first: `with Master(system) as master:`")
         return self._stepper
 
     @property
     def iterations(self) -> IterationCount:
-        """How much work iterating was."""
+        """Counts of iterated steps, their iterations and rollbacks."""
         return self._coupling.count if isinstance(self._coupling, GaussSeidel) else IterationCount()
 
     @property
@@ -114,7 +114,7 @@ class Master:
 
     @property
     def steps(self) -> StepStatistics | None:
-        """What became of steps that follow their error; None where steps are fixed."""
+        """Counts of adaptive steps; None where steps are fixed."""
         return self._stepper.statistics if isinstance(self._stepper, AdaptiveStepper) else None
 
     @property
@@ -141,10 +141,10 @@ class Master:
         """Step until `stop` seconds, or until `until()` says so after the observers have seen a communication point.
 
         Gauss-Seidel: at a communication point t, sampled units act on the values at t, then the observers see all
-        signals at t, then the other units go on from t. Jacobi: a step's results count from the time where it ends, for
-        sampled units too. A second call goes on where the first one ended.
+        signals at t, then the other units step from t. Jacobi: a step's results count from the time where it ends, for
+        sampled units too. A second call continues where the first one ended.
 
-        With `MasterOptions.call_limit` everything, observers included, is called from a thread of the master's own.
+        With `MasterOptions.call_limit`, units and observers are called in a thread of the master's own.
 
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
@@ -155,10 +155,10 @@ class Master:
         self.call_units(lambda: self._run(stop, observers, until))
 
     def call_units(self, job: Callable[[], T]) -> T:
-        """Do something else with the units in the thread that they are called from, with the same time limit.
+        """Run another job with the units in the thread that they are called in, with the same time limit.
 
         Raises:
-            UnitHung: a unit does not return. Besides, whatever the job raises.
+            UnitHung: a unit does not return. Whatever else the job raises.
         """
         return self._watchdog.run_job(job)
 
@@ -188,9 +188,9 @@ class Master:
             raise RuntimeError("the units are freed: run inside of `with Master(system) as master:`")
         for name, instance in self.ensemble.instances.items():
             if instance.failed or instance.lost:
-                raise RuntimeError(f"{name} failed, and the standards forbid that it goes on: make another master")
+                raise RuntimeError(f"{name} failed, and the standards forbid further calls of it: make another master")
         if self.schedule.time(self.schedule.ticks(stop)) < self.time:
-            raise ValueError(f"a run to {float(stop):g} s, but {self.time:g} s are reached: later is right")
+            raise ValueError(f"a run to {float(stop):g} s, but {self.time:g} s are reached: a later stop is valid")
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
@@ -214,7 +214,7 @@ class Master:
             self.stepper.depart()
 
     def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
-        """Return what waits until the wall clock is where the simulated time is."""
+        """Return a function that waits until the wall clock has reached the simulated time."""
 
         def pause() -> None:
             if self.pacer is not None:

@@ -5,19 +5,19 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-_SLICE = 0.1  # s, after which a wait asks whether the run is to end
+_SLICE = 0.1  # s, how often a wait checks whether the run is to end
 
 
 @dataclass(frozen=True)
 class PaceReport:
-    """How a run kept its pace.
+    """How well a run kept pace with the wall clock.
 
     Attributes:
         pace: simulated seconds per second of wall time.
         deadlines: communication points that had to wait for the clock.
         missed: those that were reached too late.
         largest_lateness: seconds of wall time by which the worst of them was late; 0 where none was.
-        latest_at: simulated time of that one in seconds; None where none was late.
+        latest_at: simulated time of that deadline in seconds; None where none was late.
         reached: simulated seconds per second of wall time until the last deadline; None before the first.
     """
 
@@ -30,7 +30,7 @@ class PaceReport:
 
     @property
     def share(self) -> float:
-        """The part of the deadlines that were missed."""
+        """Part of the deadlines that was missed."""
         return self.missed / self.deadlines if self.deadlines else 0.0
 
     def as_data(self) -> dict[str, Any]:
@@ -41,19 +41,19 @@ class PaceReport:
         if not self.missed:
             return f"none of {self.deadlines}"
         late = self.largest_lateness
-        text = f"{late * 1000:.3g} ms" if late < 0.1 else f"{late:.2f} s"
+        lateness = f"{late * 1000:.3g} ms" if late < 0.1 else f"{late:.2f} s"
         share = f"{self.missed} of {self.deadlines} ({self.share:.1%})"
-        return f"{share}, at most {text} late, at t = {self.latest_at:.6g} s"
+        return f"{share}, at most {lateness} late, at t = {self.latest_at:.6g} s"
 
 
 class Pacer:
     """Lets simulated time t pass at w(t) = w_0 + (t - t_0) / pace of the wall clock, where the run is quick enough.
 
-    Deadlines are counted from the run's start, so lateness of one does not shift the others and nothing adds up.
+    Deadlines are counted from the run's start, so a late one does not shift the others, and lateness does not add up.
 
     Args:
         pace: simulated seconds per second of wall time.
-        clock: tells the time in seconds.
+        clock: returns the wall time in seconds.
         sleep: waits for so many seconds.
     """
 
@@ -66,11 +66,11 @@ class Pacer:
 
     @property
     def report(self) -> PaceReport:
-        """How it went until now."""
+        """The report until now."""
         return self._report
 
     def start(self, t: float) -> None:
-        """Let the wall clock count from here, at simulated time t in seconds."""
+        """Count the wall clock from now, at simulated time t in seconds."""
         self._t_0, self._w_0 = t, self._clock()
 
     def wait(self, t: float, ended: Callable[[], bool]) -> None:

@@ -1,4 +1,4 @@
-"""Carries out work with units in a thread of its own, so that a call which does not return does not stop the caller."""
+"""Runs jobs with units in a thread of its own, so that a call which does not return does not block the caller."""
 
 import queue
 import threading
@@ -13,7 +13,7 @@ from handover.cosim.fmu.heartbeat import Call, Heartbeat, StallTimer
 T = TypeVar("T")
 
 _GRACE = 2.0
-"""How long an interrupted thread gets to reach the end of its step, and a unit to be freed beside one that hangs, s."""
+"""Seconds for an interrupted thread to finish its step, and for freeing a unit where another one hangs."""
 
 _MAX_POLL_INTERVAL = 0.25  # s
 
@@ -27,16 +27,17 @@ class _Task:
 
 
 class Watchdog:
-    """Watches the heartbeat of work with units; where there is no limit, work is simply done.
+    """Watches the heartbeat of jobs with units; without a limit, jobs simply run in the caller's thread.
 
-    All work is done in one thread, as units may expect. A thread whose call does not return is left to itself; further
-    work is done in another one. When a thread that was left comes back, it finds its unit in `Heartbeat.abandoned` and
-    ends. Time in which this process itself stood still, as in a machine that sleeps, does not count.
+    All jobs run in one thread, as units may expect. A thread whose call does not return is abandoned, and further jobs
+    run in another one. When the call of an abandoned thread returns after all, the thread finds its unit in
+    `Heartbeat.abandoned` and ends. Time in which this process itself was suspended, as in a machine that sleeps, does
+    not count.
 
     Args:
-        heartbeat: what the work writes.
-        limit: seconds of wall time that a call may take; None: any.
-        clock: tells the time in seconds.
+        heartbeat: what the job's calls write.
+        limit: seconds of wall time that a call may take; None: no limit.
+        clock: returns the wall time in seconds.
     """
 
     def __init__(self, heartbeat: Heartbeat, limit: float | None, clock: Callable[[], float] = time.monotonic) -> None:
@@ -45,10 +46,10 @@ class Watchdog:
         heartbeat.limit = limit or 0.0
 
     def run_job(self, job: Callable[[], T]) -> T:
-        """Do a job and return what it returns.
+        """Run a job and return what it returns.
 
         Raises:
-            UnitHung: a call did not return within the limit. Besides, whatever the job raises.
+            UnitHung: a call did not return within the limit. Whatever else the job raises.
         """
         if self._limit is None:
             return job()
@@ -60,10 +61,10 @@ class Watchdog:
             self._watch(task, self._limit)
         except UnitHung:
             raise
-        except BaseException:  # Ctrl-C: the thread stops after its step, or is left
+        except BaseException:  # Ctrl-C: the thread stops after its step, or is abandoned
             self._heartbeat.stopped = True
             if not task.done.wait(_GRACE):
-                self._leave(self._heartbeat.under_way)
+                self._abandon_thread(self._heartbeat.under_way)
             raise
         if task.error is not None:
             raise task.error
@@ -76,14 +77,14 @@ class Watchdog:
             self._tasks = None
 
     def _watch(self, task: _Task, limit: float) -> None:
-        look = min(limit / 4, _MAX_POLL_INTERVAL)
-        stall_timer = StallTimer(self._heartbeat, 2 * look, self._clock)
-        while not task.done.wait(look):
+        poll_interval = min(limit / 4, _MAX_POLL_INTERVAL)
+        stall_timer = StallTimer(self._heartbeat, 2 * poll_interval, self._clock)
+        while not task.done.wait(poll_interval):
             if stall_timer.elapsed() >= limit and stall_timer.beat is not None:
                 self._give_up(task, stall_timer.beat, limit)
 
     def _give_up(self, task: _Task, beat: tuple[int, int], limit: float) -> None:
-        """Leave the thread in its call and raise UnitHung, unless the call returns in this very moment."""
+        """Abandon the thread in its call and raise UnitHung, unless the call returns in this very moment."""
         call = self._heartbeat.under_way
         if call is None:
             return
@@ -93,11 +94,11 @@ class Watchdog:
             self._heartbeat.abandoned.discard(call.unit)
             self._heartbeat.stopped = False
             return
-        self._leave(call)
+        self._abandon_thread(call)
         raise UnitHung(call.unit, call.call, call.t, limit, self._heartbeat.log_of(call.unit))
 
-    def _leave(self, call: Call | None) -> None:
-        """Have nothing more to do with the thread, nor with the unit that it is in."""
+    def _abandon_thread(self, call: Call | None) -> None:
+        """Use neither the thread any more nor the unit that it is in."""
         if call is not None:
             self._heartbeat.abandoned.add(call.unit)
         self.close()

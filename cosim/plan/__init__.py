@@ -1,1 +1,1 @@
-"""Fixed steps without events as a flat list of operations, carried out in C."""
+"""Fixed steps without events as a flat list of operations, executed in C."""

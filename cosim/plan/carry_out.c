@@ -1,4 +1,4 @@
-/* Carries out operations, one after another. */
+/* Executes operations, one after another. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,7 +26,7 @@ enum { OK, WARNING };
         return;                                                                                                        \
     }
 
-/* An unsigned number of 64 bits keeps its bits. */
+/* An unsigned integer of 64 bits is returned with the same bits. */
 static int64_t integer(const void *from, int type, size_t i) {
     switch (type) {
         LOAD(BOOL8, uint8_t)
@@ -101,7 +101,7 @@ static bool fits(const Operation *o) {
     return true;
 }
 
-/* A number times zero is zero, unless it is infinite or none. */
+/* A number times zero is zero, unless it is infinite or NaN: a sum without branches, which compilers vectorise. */
 static bool finite(const Operation *o) {
     double sum = 0;
     for (size_t i = 0; i < o->check.n; i++)
@@ -153,8 +153,8 @@ static void charge(Plan *plan, const Operation *o) {
     plan->clock = now;
 }
 
-/* Return PAUSED if all went well, else STOPPED, and the plan tells at which operation and what that answered; ABANDONED
- * if the units were taken from this thread while it was in a call. */
+/* Return PAUSED if all succeeded, else STOPPED, with the operation and its status in the plan; ABANDONED if the units
+ * were taken from this thread while it was in a call. */
 enum outcome carry_out(Plan *plan, const Segment *segment) {
     const Operation *all = plan->operations, *end = all + segment->end;
     volatile int64_t *heartbeat = plan->heartbeat;

@@ -1,8 +1,6 @@
-"""Compiles the plan's loop, `cosim/plan/*.c`, for this machine.
+"""Compiles the plan's loop, `cosim/plan/*.c`, for this machine; by hand: `python -m handover.cosim.plan.compile`.
 
-`python -m handover.cosim.plan.compile` does it by hand.
-
-Used by `setup.py` while the package is built, where nothing but the standard library and ziglang is installed.
+`setup.py` imports this while the package is built, where nothing but the standard library and ziglang is installed.
 """
 
 from pathlib import Path
@@ -14,20 +12,20 @@ SOURCES = ("carry_out.c", "cpu_clock.c", "exact_time.c", "plan.c")
 
 
 def compile_plan() -> None:
-    """Compile the library if it is missing or older than its sources; nothing on a machine that zig is not told of.
+    """Compile the library if it is missing or older than its sources; do nothing on a platform that is not a target.
 
     Raises:
-        CompilationError: the compiler refused or is missing, or there is no place for the library.
+        CompilationError: the compiler failed or is missing, or the library cannot be written.
     """
     if host_platform() in TARGETS:
         _libraries().compile(host_platform())
 
 
 def plan_library() -> "Path | None":
-    """Return the library for this machine, compiled first if it has to be and can; None if there is none.
+    """Return the library for this machine, compiled first if necessary and possible; None if there is none.
 
     Raises:
-        CompilationError: the compiler refused, or there is no place for the library.
+        CompilationError: the compiler failed, or the library cannot be written.
     """
     host = host_platform()
     if host in TARGETS and not _libraries().is_current(host) and has_compiler():

@@ -25,7 +25,7 @@ double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator) {
         shift++;
     }
     bool more = rest != 0;
-    while (quotient >> 62) { /* at least two bits more than a double holds stay, and one that tells of the others */
+    while (quotient >> 62) { /* two bits more than a double has are kept, and a sticky bit for all below them */
         more = more || (quotient & 1);
         quotient >>= 1;
         shift--;

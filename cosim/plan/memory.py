@@ -1,4 +1,4 @@
-"""The memory that a plan's loop works on: the structs of `plan.h`, and the functions of its library."""
+"""The memory that a plan's loop works on, as the structs of `plan.h`, and the functions of its library."""
 
 import ctypes
 import functools
@@ -19,19 +19,19 @@ class Kept(ctypes.Structure):
 
 
 class Segment(ctypes.Structure):
-    """Operations of units that are due together."""
+    """Operations of units that are due together: those from `first` until before `end`."""
 
     _fields_ = (("group", ctypes.c_int64), ("first", ctypes.c_int64), ("end", ctypes.c_int64))
 
 
 class Group(ctypes.Structure):
-    """Units that are due together, and when; in ticks."""
+    """Units with the same step, which are due together, and when; in ticks."""
 
     _fields_ = tuple((name, ctypes.c_int64) for name in ("every", "due", "acted", "sampled"))
 
 
 class Part(ctypes.Structure):
-    """Where values of a row come from and go."""
+    """Where a part of a record's rows comes from and where it goes; see `RecordBlock`."""
 
     _fields_ = (("values", ctypes.c_void_p), ("rows", ctypes.c_void_p), ("bytes", ctypes.c_size_t))
 
@@ -49,7 +49,7 @@ class Rows(ctypes.Structure):
 
 
 class Plan(ctypes.Structure):
-    """All that the loop knows."""
+    """All state of the loop."""
 
     _fields_ = (
         ("operations", ctypes.c_void_p),
@@ -86,7 +86,7 @@ def loop() -> "ctypes.CDLL | None":
 
 
 class KeptMemory:
-    """As many empty `Kept` as are asked for; their memory is freed with the last reference to this."""
+    """An array of n `Kept`, empty at first; their memory is freed with the last reference to this."""
 
     def __init__(self, library: ctypes.CDLL, n: int) -> None:
         array = (Kept * n)()

@@ -1,4 +1,4 @@
-/* The loop over communication points; what Python calls. The order of calls is that of grid_stepper.py. */
+/* The loop over communication points, and the functions that Python calls. Calls are in the order of GridStepper. */
 #include "plan.h"
 
 #include <stdatomic.h>
@@ -63,7 +63,7 @@ static enum outcome depart(Plan *plan) {
     return PAUSED;
 }
 
-/* Return whether the record is full: the row counts only after it is written, whenever the process may die. */
+/* Return whether the record is full. The row is counted only after it is written, so that a crash leaves whole rows. */
 static bool add_row(const Plan *plan, const Record *record) {
     int64_t row = *record->filled;
     record->time[row] = plan->time;
@@ -80,8 +80,8 @@ API int plan_arrive(Plan *plan, int64_t last) { return arrive(plan, last); }
 
 API int plan_depart(Plan *plan) { return depart(plan); }
 
-/* Go through at most `points` communication points, tick `last` at the latest, with a row of the record at each.
- * Where the former call left the plan at a communication point, as all but the first of a run do, `leave` it first. */
+/* Pass at most `points` communication points, tick `last` at the latest, with a row of the record at each. `leave` is
+ * whether the plan is at a communication point to depart from first, as after every call but the first of a run. */
 API int plan_run(Plan *plan, int64_t last, int64_t points, bool leave, const Record *record) {
     enum outcome outcome = PAUSED;
     for (int64_t i = 0; i < points && outcome == PAUSED; i++) {

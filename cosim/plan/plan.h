@@ -1,6 +1,6 @@
 /* A run of fixed steps as a flat list of operations over memory that the Python side owns.
  *
- * The layout of these structs is written by `operations.py` and `memory.py`: what changes here changes there. */
+ * The same layout is in `plan_maker.py` (operations) and `memory.py` (the rest): what changes here changes there. */
 #ifndef PLAN_H
 #define PLAN_H
 
@@ -13,7 +13,7 @@ enum kind {
     CONVERT,     /* numbers of one type to another */
     SCALE,       /* reals, times a factor, plus an offset */
     FITS,        /* integers must lie between two bounds */
-    FINITE,      /* reals must be neither infinite nor not a number */
+    FINITE,      /* reals must be neither infinite nor NaN */
     ACCESS_2,    /* fmi2Set*, fmi2Get* */
     ACCESS_3,    /* fmi3Set*, fmi3Get* */
     BINARIES_3,  /* fmi3SetBinary, fmi3GetBinary */
@@ -42,7 +42,7 @@ typedef struct {
 typedef struct {
     int32_t kind;
     int32_t unit;
-    int64_t code; /* of a call: its name in the heartbeat */
+    int64_t code; /* of a call: its number in the heartbeat; else -1 */
     union {
         struct {
             void *to;
@@ -82,9 +82,9 @@ typedef struct {
     };
 } Operation;
 
-_Static_assert(sizeof(Operation) == 72, "operations.py packs an operation into 72 bytes");
+_Static_assert(sizeof(Operation) == 72, "plan_maker.py packs an operation into 72 bytes");
 
-/* Operations of units that are due together; of group -1 at every communication point. */
+/* Operations of units that are due together; those of group -1 are executed at every communication point. */
 typedef struct {
     int64_t group, first, end;
 } Segment;
@@ -108,8 +108,8 @@ typedef struct {
     int64_t n_parts;
 } Record;
 
-/* Cells of the heartbeat, see heartbeat.py: what is called (-1: nothing), how many calls began, when (a double), and
- * whether the units are taken from this thread. */
+/* Cells of the heartbeat, see heartbeat.py: which call is under way (-1: none), how many calls began, the simulated time
+ * (a double), and whether the units were taken from this thread. */
 enum cell { DOING, COUNT, TIME, TAKEN };
 
 enum outcome { LAST_REACHED, PAUSED, RECORD_FULL, STOPPED, ABANDONED };
@@ -128,8 +128,8 @@ typedef struct {
     int64_t spent_capacity;
     double clock;
     volatile int64_t *heartbeat;
-    int64_t stopped_at; /* the operation that did not go well */
-    int64_t status;     /* what it answered */
+    int64_t stopped_at; /* the operation that failed */
+    int64_t status;     /* what it returned */
 } Plan;
 
 double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator);

@@ -1,7 +1,4 @@
-"""Turns what a coupling does at a communication point into a flat list of operations.
-
-Operations of a plan as `plan.h` lays them out, 72 bytes each.
-"""
+"""Turns what a coupling does at a communication point into a flat list of operations, packed as in `plan.h`."""
 
 import ctypes
 import enum
@@ -23,7 +20,14 @@ from handover.cosim.stepping.transfers import FiniteCheck, Narrowing
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.schedule import Schedule, Slot
 
+Judge = Callable[[int, float], None]
+"""Takes the status of an operation that stopped the plan, and the time, and raises what the general path would."""
+
+ALWAYS = -1
+"""The group of operations that are executed at every communication point."""
+
 SIZE = 72
+"""Bytes of an operation."""
 _COPY, _CHECK, _ACCESS, _KEEP, _STEP, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", ""
 _TYPES = {
     np.dtype(name): number
@@ -110,21 +114,15 @@ def _packed(form: str, kind: _Kind, unit: int, *fields: Any, code: int = -1) -> 
     return struct.pack(f"@iiq{form}", kind, unit, code, *fields).ljust(SIZE, b"\0")
 
 
-Judge = Callable[[int, float], None]
-"""Takes what an operation that stopped the plan answered, and when, and raises what the general path would."""
-
-ALWAYS = -1
-
-
 class PlanMaker:
     """Lays out the operations of a plan: what `Jacobi` and `GaussSeidel` do, in the same order.
 
     Attributes:
-        judges: for each operation that can stop the plan, what tells why.
+        judges: for each operation that can stop the plan, by its index, what raises the failure.
         arrive, depart: the operations at a communication point before and after observers look.
         groups: by group, the units that are always due together.
         library: the functions of the loop.
-        has_clock: whether CPU time is taken of steps.
+        has_clock: whether CPU times of steps are measured.
     """
 
     def __init__(
@@ -148,10 +146,10 @@ class PlanMaker:
             self._start_clock(self.depart)
             self._add(self.depart, due, self._step, self._charge)
         else:
-            whole = (self._feed, self._step, self._publish, self._charge)
+            actions = (self._feed, self._step, self._publish, self._charge)
             for phase, slots in ((self.arrive, schedule.sampled), (self.depart, schedule.continuous)):
                 self._start_clock(phase)
-                self._add(phase, slots, *whole)
+                self._add(phase, slots, *actions)
 
     @property
     def packed(self) -> bytes:
@@ -238,7 +236,7 @@ class PlanMaker:
 
 
 def _without_copies(copies: Sequence[Copy], setters: Sequence[SignalBuffer]) -> tuple[list[Copy], list[Views]]:
-    """Return what has to be copied, and from where each buffer is set: where its source has all of it, from there."""
+    """Return the copies that are left, and the arrays to set each buffer from: where possible, its source's."""
     left = list(copies)
     given: list[Views] = []
     for buffer in setters:
@@ -263,4 +261,4 @@ def _judge_fit(narrowing: Narrowing) -> Judge:
 
 
 def _out_of_memory(_status: int, _t: float) -> None:
-    raise MemoryError("there is no memory for what a unit gave")
+    raise MemoryError("there is no memory for a copy of a unit's binaries or texts")

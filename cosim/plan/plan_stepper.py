@@ -1,4 +1,4 @@
-"""Fixed steps, each unit at its own rate, on one exact grid: the same calls as by `GridStepper`, made in C."""
+"""Fixed steps, each unit at its own rate, on one exact grid: the same calls as `GridStepper` makes, made in C."""
 
 import array
 import ctypes
@@ -18,11 +18,11 @@ from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 
 _STRETCH = 0.05
-"""Seconds of wall time after which the loop comes back to Python, where a signal such as Ctrl-C is noticed."""
+"""Seconds of wall time after which the loop returns to Python, where a signal such as Ctrl-C is handled."""
 _MAX_STEPS = 4096
-"""Communication points at most until then."""
+"""Limit of communication points until then."""
 _ROOM = 2 * _MAX_STEPS
-"""CPU times of a unit that the loop can take before they are told."""
+"""CPU times of a unit that the loop can hold before `publish_cpu_times` fetches them."""
 _LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
 _MAX_TICKS = 2**62
 
@@ -30,36 +30,36 @@ _MAX_TICKS = 2**62
 class PlanStepper:
     """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
 
-    Its states are those of `GridStepper`: either goes on from the other's.
+    Its states are those of `GridStepper`: either can resume from the other's.
 
     Attributes:
         coupling: what does the same as the plan on the general path.
     """
 
-    def __init__(self, schedule: Schedule, ensemble: Ensemble, coupling: Coupling, made: PlanMaker) -> None:
+    def __init__(self, schedule: Schedule, ensemble: Ensemble, coupling: Coupling, plan: PlanMaker) -> None:
         self._schedule, self._ensemble, self.coupling = schedule, ensemble, coupling
-        self._library, self._clock = made.library, made.has_clock
-        self._judges, self._units = made.judges, list(ensemble.instances)
-        self._members = list(made.groups.values())
+        self._library, self._clock = plan.library, plan.has_clock
+        self._judges, self._units = plan.judges, list(ensemble.instances)
+        self._members = list(plan.groups.values())
         n = len(self._units)
-        self._operations = ctypes.create_string_buffer(made.packed, len(made.packed))
-        self._groups = (memory.Group * len(made.groups))(
-            *(memory.Group(every, 0, -1, sampled) for every, sampled in made.groups)
+        self._operations = ctypes.create_string_buffer(plan.packed, len(plan.packed))
+        self._groups = (memory.Group * len(plan.groups))(
+            *(memory.Group(every, 0, -1, sampled) for every, sampled in plan.groups)
         )
-        self._arrive = (memory.Segment * len(made.arrive))(*made.arrive)
-        self._depart = (memory.Segment * len(made.depart))(*made.depart)
+        self._arrive = (memory.Segment * len(plan.arrive))(*plan.arrive)
+        self._depart = (memory.Segment * len(plan.depart))(*plan.depart)
         self._times = (ctypes.c_double * n)()
         self._spent = (ctypes.c_double * (n * _ROOM if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
-        self._unpublished = 0  # communication points at which CPU times were taken that the ensemble does not know
+        self._unpublished = 0  # communication points whose CPU times the ensemble does not have yet
         self._plan = memory.Plan(
             operations=ctypes.addressof(self._operations),
             arrive=self._arrive,
             depart=self._depart,
             groups=self._groups,
-            n_arrive=len(made.arrive),
-            n_depart=len(made.depart),
-            n_groups=len(made.groups),
+            n_arrive=len(plan.arrive),
+            n_depart=len(plan.depart),
+            n_groups=len(plan.groups),
             numerator=schedule.tick.numerator,
             denominator=schedule.tick.denominator,
             unit_times=self._times,
@@ -78,20 +78,20 @@ class PlanStepper:
     def arrive(self, last: int) -> bool:
         """Go to the next tick at which a unit is due; see `Stepper`."""
         self._make_room(1)
-        return self._concluded(self._library.plan_arrive(self._plan, min(last, _MAX_TICKS))) == _LAST_REACHED
+        return self._checked(self._library.plan_arrive(self._plan, min(last, _MAX_TICKS))) == _LAST_REACHED
 
     def depart(self) -> None:
         """Step what is due at the tick."""
-        self._concluded(self._library.plan_depart(self._plan))
+        self._checked(self._library.plan_depart(self._plan))
 
     def run(
         self, last: int, signals: Signals, observers: Sequence[Observer],
         until: Callable[[], bool] | None = None, pause: Callable[[], None] | None = None,
     ) -> None:  # fmt: skip
-        """Go on to tick `last` as `Master.run` says; `pause` is called before observers look.
+        """Step until tick `last` as `Master.run` says; `pause` is called before the observers.
 
-        The loop itself writes the rows of a recorder that stands first among the observers, be it from then on. Nobody
-        else watching, it takes many communication points at once.
+        The loop itself writes the rows of a recorder that is the first of the observers, also one in an `ObserveAfter`.
+        Without other observers, it passes many communication points in one call.
         """
         first = observers[0] if observers else None
         seen = first.t_0 if isinstance(first, ObserveAfter) else -math.inf
@@ -104,9 +104,10 @@ class PlanStepper:
         while True:
             self._make_room(points)
             began = time.perf_counter()
-            written = rows if leave else None  # whether the first point was seen before is known once it is reached
+            # The loop does not write the row of the first point: whether it was seen before shows when it is reached.
+            written = rows if leave else None
             outcome = self._library.plan_run(self._plan, min(last, _MAX_TICKS), points, leave, written)
-            self._concluded(outcome)
+            self._checked(outcome)
             if recorder is not None:
                 if not leave and self.time > seen:
                     recorder(self.time, signals)
@@ -124,7 +125,7 @@ class PlanStepper:
                 points = min(2 * points, _MAX_STEPS) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
 
     def publish_cpu_times(self) -> None:
-        """Have the ensemble know the CPU times that the loop has taken."""
+        """Hand over to the ensemble the CPU times that the loop has measured."""
         for i, unit in enumerate(self._units):
             spent = array.array("d", self._spent[i * _ROOM : i * _ROOM + self._n_spent[i]])
             self._ensemble.cpu[unit].extend(spent)
@@ -146,7 +147,7 @@ class PlanStepper:
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to ticks that `get_state` gave."""
+        """Restore the ticks that `get_state` returned."""
         for units, group in zip(self._members, self._groups, strict=True):
             group.due = state["due"][units[0]]
             group.acted = state["acted"].get(units[0], -1)
@@ -156,13 +157,14 @@ class PlanStepper:
         self._read_times()
 
     def _make_room(self, points: int) -> None:
-        """See to it that the CPU times of so many communication points have a place."""
+        """Make sure that the CPU times of so many further communication points can be held."""
         if self._clock:
             if self._unpublished + points > _ROOM:
                 self.publish_cpu_times()
             self._unpublished += points
 
-    def _concluded(self, outcome: int) -> int:
+    def _checked(self, outcome: int) -> int:
+        """Return an outcome of the loop, unless it is a failure, which is raised as on the general path."""
         if outcome == _ABANDONED:
             raise Abandoned
         if outcome == _STOPPED:
@@ -186,10 +188,10 @@ def _flush_if_full(recorder: Recorder) -> None:
 
 
 def _rows_of(recorder: Recorder, signals: Signals) -> "memory.Rows":
-    """Return where a recorder's rows go; it is opened if no row has been recorded yet."""
+    """Return where a recorder's rows go; open it if no row has been recorded yet."""
     if not recorder.is_open:
         recorder.open(signals)
-    _flush_if_full(recorder)  # where it could not be written before, the loop must not go on behind its end
+    _flush_if_full(recorder)  # full where a flush failed before; the loop writes a row before it looks
     block: RecordBlock = recorder.block
     parts = (memory.Part * len(block.parts))(
         *(memory.Part(p.values.ctypes.data, p.rows.ctypes.data, p.values.nbytes) for p in block.parts)

@@ -1,4 +1,4 @@
-"""Which signal of a record stands where in its rows, and how it is typed."""
+"""Columns of a record: their types and metadata, and where in a row each signal is."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _TYPES = {Kind.REAL: pa.float64(), Kind.INTEGER: pa.int64(), Kind.ENUMERATION: p
 
 @dataclass(frozen=True)
 class RecordColumns:
-    """The columns of a record: their types with what is told of them, and of each its part of a block and its place.
+    """The columns of a record: their types with metadata, and of each its part of a block and its index in that.
 
     The first column is `time` in seconds. A column's metadata hold its unit and description, an enumeration's also its
     items.
@@ -29,7 +29,7 @@ class RecordColumns:
     places: Sequence[tuple[int, int]]
 
     def batch(self, block: RecordBlock, begin: int = 0) -> "pa.RecordBatch":
-        """Return a block's rows from row `begin` of the block on as columns."""
+        """Return the rows of a block from its row `begin` on as columns."""
         end = block.filled
         turned: list[NDArray[Any]] = [part.rows[begin:end].T.copy(order="C") for part in block.parts]
         columns: list[NDArray[Any]] = [block.time[begin:end].copy()]
@@ -40,9 +40,9 @@ class RecordColumns:
 
 
 def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArray[Any]]]:
-    """Return where these signals stand in rows, and the whole arrays that the parts of a row are copied from.
+    """Return where these signals are in rows, and the whole arrays that the parts of a row are copied from.
 
-    A unit's outputs of one type are views of one array: copying that at once costs a tenth of going entry by entry.
+    A unit's outputs of one type are views of one array: copying it as a whole costs a tenth of copying each entry.
     """
     wholes: list[NDArray[Any]] = []
     part_of: dict[int, int] = {}
@@ -59,13 +59,13 @@ def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArr
 
 
 def column_metadata(schema: "pa.Schema") -> list[tuple[str, dict[str, str]]]:
-    """Return of each column its name and what is told of it: `unit`, `description`, and `items` of an enumeration."""
-    entries: list[tuple[str, dict[str, str]]] = []
+    """Return the name of each column and its metadata: `unit`, `description`, and `items` of an enumeration."""
+    columns: list[tuple[str, dict[str, str]]] = []
     for name in schema.names:
         metadata: dict[bytes, bytes] = schema.field(name).metadata or {}
-        known = {"unit": "1", "description": "", "items": ""}
-        entries.append((name, known | {k.decode(): v.decode() for k, v in metadata.items()}))
-    return entries
+        defaults = {"unit": "1", "description": "", "items": ""}
+        columns.append((name, defaults | {k.decode(): v.decode() for k, v in metadata.items()}))
+    return columns
 
 
 def _type_of(c: Column) -> "pa.DataType":

@@ -1,4 +1,7 @@
-"""Locks a file for as long as a process lives; Windows, where a mapped file is protected anyway, needs none."""
+"""Locks a file or folder for as long as a process lives.
+
+Windows, where a mapped file cannot be changed by others anyway, needs none.
+"""
 
 import contextlib
 import os
@@ -13,11 +16,11 @@ except ImportError:  # Windows
 
 
 class FileLocked(OSError):
-    """Another process that runs holds the file or folder."""
+    """Another running process holds the lock of the file or folder."""
 
 
 def lock_file(file: IO[bytes]) -> None:
-    """Lock an open file; the lock goes with the process, however it ends.
+    """Lock an open file; the lock ends with the process, in whatever way that ends.
 
     Raises:
         FileLocked: it is locked already.
@@ -27,7 +30,7 @@ def lock_file(file: IO[bytes]) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as e:
-        raise FileLocked(f"{file.name} belongs to a run that still goes on") from e
+        raise FileLocked(f"{file.name} belongs to a run that is still going on") from e
 
 
 def unlock_file(file: IO[bytes]) -> None:
@@ -37,24 +40,24 @@ def unlock_file(file: IO[bytes]) -> None:
 
 
 def holder_of(path: Path) -> int | None:
-    """Return the process that holds a folder by `folder_locked`, as Linux lists it; None where that is not known."""
+    """Return the process that holds a folder by `folder_locked`, from Linux's list of locks; None where not known."""
     try:
-        there = path.stat()
+        folder = path.stat()
         locks = Path("/proc/locks").read_text(encoding="ascii")
     except (OSError, ValueError):
         return None
-    place = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"
+    inode = f"{os.major(folder.st_dev):02x}:{os.minor(folder.st_dev):02x}:{folder.st_ino}"
     for line in locks.splitlines():
         words = line.split()  # 1: FLOCK ADVISORY WRITE 4711 fe:01:123456 0 EOF
-        if "FLOCK" in words[:2] and place in words:
-            process = int(words[words.index(place) - 1])
+        if "FLOCK" in words[:2] and inode in words:
+            process = int(words[words.index(inode) - 1])
             return process if process > 0 else None
     return None
 
 
 @contextlib.contextmanager
 def folder_locked(path: Path) -> Generator[None, None, None]:
-    """Lock a folder, for those who would change what is in it, without a file of its own that could be left behind.
+    """Lock a folder against others that would change its content, without a lock file that could be left behind.
 
     Raises:
         FileLocked: it is locked already. OSError: it cannot be opened.
@@ -67,7 +70,7 @@ def folder_locked(path: Path) -> Generator[None, None, None]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as e:
-            raise FileLocked(f"{path} belongs to a run that still goes on") from e
+            raise FileLocked(f"{path} belongs to a run that is still going on") from e
         except OSError:  # some network file systems lock only what can be written to
             pass
         yield

@@ -1,6 +1,6 @@
-"""Reads the signals of a run back, array by array: `record["arm.p_WG"]` is of shape (rows, 3).
+"""Reads the signals of a run from its record: `record["arm.p_WG"]` is an array of shape (rows, 3).
 
-The signals of a run that has ended, one instant at a time, as its watch saw them.
+`RecordedSignals` replays a record row by row, as an observer of the run saw its signals.
 """
 
 import re
@@ -20,7 +20,7 @@ class Record:
     """The signals of a run. `time` is in seconds, shape (rows,)."""
 
     def __init__(self, path: Path) -> None:
-        import pyarrow.parquet as pq  # long to load, and records are named by scenarios that have none yet
+        import pyarrow.parquet as pq  # slow to import, and scenarios import this class before there is any record
 
         self._table = pq.read_table(path)
         self._columns: dict[str, list[str]] = {}
@@ -37,10 +37,10 @@ class Record:
         if signal not in self._columns:
             raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
         names = self._columns[signal]
-        last = _SUBSCRIPT.search(names[-1])
-        if last is None:
+        last_subscript = _SUBSCRIPT.search(names[-1])
+        if last_subscript is None:
             return self._values(names[0])
-        shape = tuple(int(i) for i in last[1].split(","))
+        shape = tuple(int(i) for i in last_subscript[1].split(","))
         return np.column_stack([self._values(n) for n in names]).reshape(-1, *shape)
 
     @property
@@ -53,13 +53,13 @@ class Record:
         return self._metadata(signal).get(b"unit", b"1").decode()
 
     def description(self, signal: str) -> str:
-        """Return what a signal is; "" where nobody told."""
+        """Return the description of a signal; "" where it has none."""
         return self._metadata(signal).get(b"description", b"").decode()
 
     def items(self, signal: str) -> dict[int, str]:
         """Return the names of an enumeration's values; none for another signal."""
-        found = self._metadata(signal).get(b"items", b"").decode()
-        pairs = (item.partition(" ") for item in found.split(", ") if item)
+        items = self._metadata(signal).get(b"items", b"").decode()
+        pairs = (item.partition(" ") for item in items.split(", ") if item)
         return {int(value): name for value, _, name in pairs}
 
     def _metadata(self, signal: str) -> dict[bytes, bytes]:
@@ -70,7 +70,7 @@ class Record:
 
 
 class RecordedSignals(Signals):
-    """Answers as the signals of the running system did at one row of its record, which holds no pictures and texts.
+    """The signals of a run at one row of its record, which holds no pictures and texts.
 
     Attributes:
         row: of the record.

@@ -1,4 +1,4 @@
-"""Records the scalar signals of a run, one column a signal, so that no row is lost however the process ends."""
+"""Records the scalar signals of a run, one column per signal; no row is lost in whatever way the process ends."""
 
 import contextlib
 from collections.abc import Generator, Sequence
@@ -15,19 +15,19 @@ from handover.cosim.system.signals import Signals
 class Recorder:
     """An observer of `Master.run` that records every communication point. Use as a context manager.
 
-    The record is `path`, a Parquet file, with further forms beside it as `formats` asks: see `RECORD_FORMATS`. Such
+    The record is `path`, a Parquet file, with other formats beside it as `formats` asks: see `RECORD_FORMATS`. Such
     files cannot be written as rows come. Rows go to a block in a memory-mapped file (`signals.tail`), and whole blocks
     to an Arrow stream (`signals.arrows`), both beside the record; leaving turns the two into the record, also when the
-    run was cut short. If the process dies, both files stay with every row, and `complete_record` makes the record of
-    them.
+    run was cut short. If the process crashes, both files stay with every row, and `complete_record` makes the
+    record of them.
 
-    Who steps units in another way than `Master.run` calls `open`, then adds rows to `block` as that describes, and
-    calls `flush` when it is full.
+    Code that steps units in another way than `Master.run` calls `open`, then adds rows to `block` as `RecordBlock`
+    describes, and calls `flush` when it is full.
 
     Args:
         path: the record, with the suffix `.parquet`.
-        formats: forms of the record; Parquet is always written.
-        after: go on with a record that a process left, after so many rows; later ones are forgotten.
+        formats: names of `RECORD_FORMATS`; Parquet is always written.
+        after: continue the record of an earlier process after so many rows; later ones are discarded.
     """
 
     def __init__(self, path: Path, formats: Sequence[str] = (), after: int = 0) -> None:
@@ -64,7 +64,7 @@ class Recorder:
             self.flush()
 
     def open(self, signals: Signals) -> None:
-        """Begin the files; the first row does it where nobody has.
+        """Begin the files, as the first row does otherwise.
 
         Raises:
             RecordNotWritten: they cannot be made, or another process records into them.
@@ -82,12 +82,12 @@ class Recorder:
 
     @property
     def is_open(self) -> bool:
-        """Whether `open` was called, or the first row has done it."""
+        """Whether the files are begun, by `open` or by the first row."""
         return self._block is not None
 
     @property
     def block(self) -> RecordBlock:
-        """The rows that are not in the stream yet, and where more of them go. It stays the same while recording."""
+        """The rows that are not in the stream yet, and where further rows go; the same block while recording."""
         if self._block is None:
             raise RuntimeError("nothing is recorded before `open`")
         return self._block

@@ -1,6 +1,8 @@
-"""The file that rows of a record go to block by block: an Arrow stream, to which one can return after a crash.
+"""The Arrow stream that a record's rows go to block by block, and how it becomes the record, also after a crash.
 
-Makes a record of what a process has left of it: the stream of whole blocks and the block under way.
+While a run is under way, whole blocks are in the stream (`signals.arrows`) and the rows after them in the tail
+(`signals.tail`). `finish_record` makes the record of a complete stream, `complete_record` of what a crashed process
+left of both.
 """
 
 import os
@@ -17,13 +19,13 @@ from handover.cosim.record.tail import DamagedTail, RecordBlock
 
 
 class RecordStream:
-    """Appends record batches to a file in Arrow's streaming format, which other tools can read as it is.
+    """Appends record batches to a file in Arrow's streaming format, which other tools can read as it grows.
 
     A batch that cannot be written whole leaves nothing behind.
     """
 
     def __init__(self, path: Path, schema: pa.Schema, size: int = 0) -> None:
-        """Begin a file, or go on with one after its first `size` bytes.
+        """Begin a file, or continue one after its first `size` bytes.
 
         Raises:
             OSError: the file cannot be written.
@@ -47,7 +49,7 @@ class RecordStream:
         self._append(batch.serialize())
 
     def sync(self) -> None:
-        """Wait until all is on the disk, so that it outlives the machine's end."""
+        """Wait until all is on the disk, so that it survives a crash of the machine."""
         os.fsync(self._file.fileno())
 
     def close(self) -> None:
@@ -70,7 +72,7 @@ def stream_schema(path: Path) -> "pa.Schema":
     """Return the schema of a stream.
 
     Raises:
-        OSError: there is no such file, or not even its beginning is whole.
+        OSError: there is no such file, or its schema is not complete.
     """
     try:
         with pa.OSFile(str(path), "rb") as source, pa.ipc.open_stream(source) as stream:
@@ -92,21 +94,21 @@ def stream_batches(path: Path) -> Generator["pa.RecordBatch", None, None]:
 
 
 Batches = Callable[[], Iterable["pa.RecordBatch"]]
-"""Gives all rows of a record, each time from the first one on."""
+"""Returns all rows of a record, at each call from the first one on."""
 
 
 def stream_of(path: Path) -> Path:
-    """Return where the whole blocks of a record under way are."""
+    """Return the path of the whole blocks of a record under way."""
     return path.with_suffix(".arrows")
 
 
 def tail_of(path: Path) -> Path:
-    """Return where the rows of the block under way are."""
+    """Return the path of the rows after the last whole block."""
     return path.with_suffix(".tail")
 
 
 def complete_record(path: Path) -> int:
-    """Complete the record that a process left which died, in the forms that it was asked for; return its rows.
+    """Complete the record of a crashed process, in the formats that it was to write; return the number of rows.
 
     Nothing is changed where the record is complete already.
 
@@ -114,7 +116,7 @@ def complete_record(path: Path) -> int:
         path: the record (`signals.parquet`), which need not exist yet.
 
     Raises:
-        FileLocked: the process still runs. OSError: there is nothing of a record, or it cannot be written.
+        FileLocked: the process still runs. OSError: there are no rows at all, or the record cannot be written.
     """
     stream = stream_of(path)
     if not stream.exists():
@@ -135,7 +137,7 @@ def complete_record(path: Path) -> int:
 
 
 def finish_record(path: Path, formats: Sequence[str], batches: Batches) -> int:
-    """Write a record in Parquet and other forms, then remove its stream; return the number of rows.
+    """Write a record in Parquet and other formats, then remove its stream; return the number of rows.
 
     Raises:
         OSError: a file cannot be written; the stream stays.
@@ -155,36 +157,36 @@ def finish_record(path: Path, formats: Sequence[str], batches: Batches) -> int:
 
 
 def rewind_stream(path: Path, schema: "pa.Schema", rows: int) -> int:
-    """Cut a record's stream after so many rows, or make it again of the completed record; return its bytes.
+    """Cut a record's stream after `rows` rows, or make it again from the completed record; return its size in bytes.
 
     Raises:
         OSError: neither is there, or they have fewer rows or other columns.
     """
     stream = stream_of(path)
     source = stream if stream.exists() else path
-    found = stream_schema(stream) if source == stream else pq.read_schema(path)
-    if not found.equals(schema, check_metadata=True):
+    present = stream_schema(stream) if source == stream else pq.read_schema(path)
+    if not present.equals(schema, check_metadata=True):
         raise OSError(f"{source} has other columns than this run records")
     batches = stream_batches(stream) if source == stream else pq.ParquetFile(path).iter_batches()
-    made = RecordStream(stream.with_name(stream.name + ".part"), schema)
+    rewound = RecordStream(stream.with_name(stream.name + ".part"), schema)
     left = rows
     try:
         for batch in batches:
             if left:
-                made.write(batch.slice(0, left))
+                rewound.write(batch.slice(0, left))
                 left -= min(left, batch.num_rows)
     finally:
-        made.close()
+        rewound.close()
     if left:
         raise OSError(f"{source} has {rows - left} rows where the checkpoint counts {rows}")
-    os.replace(made.path, stream)
-    return made.size
+    os.replace(rewound.path, stream)
+    return rewound.size
 
 
 def _unfinished_block(path: Path) -> RecordBlock | None:
     try:
         return RecordBlock.open(path)
-    except (FileNotFoundError, DamagedTail):  # the process died before there was a row in it
+    except (FileNotFoundError, DamagedTail):  # the process crashed before there was a row in it
         return None
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from handover.cosim.record.file_lock import FileLocked, lock_file, unlock_file
 
 _MAGIC = b"HANDOVER"
-_HEAD = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
+_HEADER = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
 _ALIGNMENT = 64
 _BYTES = 2**22
 _MIN_ROWS, _MAX_ROWS = 16, 4096
@@ -34,14 +34,14 @@ class DamagedTail(ValueError):
 
 
 class RecordBlock:
-    """Rows that wait to be written, in memory that the system keeps when the process dies in whatever way.
+    """Rows that wait to be written, in memory that the operating system keeps in whatever way the process ends.
 
     To add a row: set `time[i]` and, of every part, `rows[i, :] = values` with i = `counters[0]`, and only then add one
-    to `counters[0]`; what the counter does not count is not there. When it reaches `capacity`, the recorder's `flush`
-    has to be called. Python and C do alike; C must not let its compiler put the counter before the rows (a volatile or
-    atomic store).
+    to `counters[0]`: only counted rows are valid. When it reaches `capacity`, the recorder's `flush`
+    has to be called. Python and C do the same; C must keep its compiler from storing the counter before the rows
+    (by a volatile or atomic store).
 
-    The file holds 32 bytes of head (magic, bytes of layout, the two counters), the layout in JSON, and, each at a
+    The file holds a header of 32 bytes (magic, bytes of layout, the two counters), the layout in JSON, and, each at a
     multiple of 64 bytes, `time` and the rows of the parts. While the block is open, the file is locked.
 
     Attributes:
@@ -52,28 +52,28 @@ class RecordBlock:
     """
 
     def __init__(self, file: mmap.mmap, handle: Any, sources: Sequence[NDArray[Any]] | None = None) -> None:
-        head = np.frombuffer(file, dtype=_HEAD, count=1)
-        if head["magic"][0] != _MAGIC:
+        header = np.frombuffer(file, dtype=_HEADER, count=1)
+        if header["magic"][0] != _MAGIC:
             raise DamagedTail("it does not begin as the last rows of a record do")
-        size = int(head["layout"][0])
-        self.layout: dict[str, Any] = json.loads(file[_HEAD.itemsize : _HEAD.itemsize + size])
+        size = int(header["layout"][0])
+        self.layout: dict[str, Any] = json.loads(file[_HEADER.itemsize : _HEADER.itemsize + size])
         self._file, self._handle = file, handle
         self.counters: NDArray[np.int64] = np.frombuffer(file, dtype=np.int64, count=2, offset=16)
         self.capacity = int(self.layout["capacity"])
-        at = _aligned(_HEAD.itemsize + size)
-        self.time: NDArray[np.float64] = np.frombuffer(file, dtype=np.float64, count=self.capacity, offset=at)
-        at = _aligned(at + self.time.nbytes)
+        offset = _aligned(_HEADER.itemsize + size)
+        self.time: NDArray[np.float64] = np.frombuffer(file, dtype=np.float64, count=self.capacity, offset=offset)
+        offset = _aligned(offset + self.time.nbytes)
         self.parts: list[Part] = []
-        for i, (name, n) in enumerate(self.layout["parts"]):
-            flat: NDArray[Any] = np.frombuffer(file, dtype=name, count=self.capacity * n, offset=at)
-            self.parts.append(Part(sources[i] if sources is not None else np.zeros(n, name), flat.reshape(-1, n)))
-            at = _aligned(at + flat.nbytes)
+        for i, (dtype, n) in enumerate(self.layout["parts"]):
+            flat: NDArray[Any] = np.frombuffer(file, dtype=dtype, count=self.capacity * n, offset=offset)
+            self.parts.append(Part(sources[i] if sources is not None else np.zeros(n, dtype), flat.reshape(-1, n)))
+            offset = _aligned(offset + flat.nbytes)
 
     @classmethod
     def create(cls, path: Path, sources: Sequence[NDArray[Any]], about: dict[str, Any]) -> "RecordBlock":
         """Make the file for rows of these arrays; `about` is kept in its layout.
 
-        Its place on the disk is taken at once: to find the disk full while writing to mapped memory ends a process.
+        Its space on the disk is allocated here: a full disk while writing to mapped memory would kill the process.
 
         Raises:
             FileLocked: a running process records into that file. OSError: it cannot be made.
@@ -82,15 +82,15 @@ class RecordBlock:
         row = 8 + sum(a.itemsize * len(a) for a in sources)
         capacity = min(max(_BYTES // row, _MIN_ROWS), _MAX_ROWS)
         layout = json.dumps({**about, "capacity": capacity, "parts": parts}).encode()
-        size = _aligned(_aligned(_HEAD.itemsize + len(layout)) + 8 * capacity)
+        size = _aligned(_aligned(_HEADER.itemsize + len(layout)) + 8 * capacity)
         for a in sources:
             size = _aligned(size + a.itemsize * len(a) * capacity)
         handle = open(path, "a+b")  # noqa: SIM115 (kept open: it carries the lock)
         try:
             lock_file(handle)
             handle.truncate(0)
-            head = np.array([(_MAGIC, len(layout), 0, 0)], dtype=_HEAD)
-            handle.write((head.tobytes() + layout).ljust(size, b"\0"))
+            header = np.array([(_MAGIC, len(layout), 0, 0)], dtype=_HEADER)
+            handle.write((header.tobytes() + layout).ljust(size, b"\0"))
             handle.flush()
             return cls(mmap.mmap(handle.fileno(), size), handle, sources)
         except BaseException:
@@ -99,7 +99,7 @@ class RecordBlock:
 
     @classmethod
     def open(cls, path: Path) -> "RecordBlock":
-        """Open what a process left.
+        """Open the file of an earlier process.
 
         Raises:
             FileLocked: that process still runs. DamagedTail: the file is not whole. OSError: it cannot be read.
@@ -111,7 +111,7 @@ class RecordBlock:
         except FileLocked:
             handle.close()
             raise
-        except (ValueError, KeyError, TypeError) as e:  # too short, or not in the form that `create` writes
+        except (ValueError, KeyError, TypeError) as e:  # too short, or not in the format that `create` writes
             handle.close()
             raise DamagedTail(f"{path}: {e}") from e
 
@@ -135,16 +135,19 @@ class RecordBlock:
         return i + 1 == self.capacity
 
     def clear(self, first: int) -> None:
-        """Forget the rows: `first` are in the stream. In this order a process may die between the two."""
+        """Discard the rows, as `first` rows are in the stream now.
+
+        In this order: after a crash between the two, the block is empty, and no row is counted twice.
+        """
         self.counters[0] = 0
         self.counters[1] = first
 
     def close(self) -> None:
-        """Let go of the file. Who still holds one of the arrays keeps its memory."""
+        """Close the file. Memory of arrays that are still held elsewhere stays."""
         unlock_file(self._handle)
         self._handle.close()
-        nothing = np.zeros(2, dtype=np.int64)
-        self.counters, self.time, self.parts = nothing, np.zeros(0), []
+        # The mapping can be closed only when no array refers to it any more.
+        self.counters, self.time, self.parts = np.zeros(2, dtype=np.int64), np.zeros(0), []
         with contextlib.suppress(BufferError):  # an array of it is held elsewhere
             self._file.close()
 

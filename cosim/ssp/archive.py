@@ -1,4 +1,4 @@
-"""An SSP's zip archive, looked through before anything is taken out of it."""
+"""An SSP's zip archive, which is checked before anything is unpacked."""
 
 import posixpath
 from collections.abc import Generator
@@ -18,10 +18,10 @@ class _Packed(FmuArchive):
 
 
 class SspArchive:
-    """A zip archive with SystemStructure.ssd at its top, and what is referred to there by relative URIs.
+    """A zip archive with SystemStructure.ssd at its top, and the files that it refers to by relative URIs.
 
     Raises:
-        InvalidSsp: no such file, not a zip archive, or with members that are not to be unpacked.
+        InvalidSsp: no such file, not a zip archive, or with members that must not be unpacked.
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,7 +51,7 @@ class SspArchive:
         """Unpack everything into a folder, after all of it has been verified.
 
         Raises:
-            InvalidSsp: a member is damaged, or the folder does not take it.
+            InvalidSsp: a member is damaged, or cannot be written to the folder.
         """
         with _ssp_errors(self.path):
             self._packed.unpack(folder)
@@ -66,7 +66,7 @@ class SspArchive:
         if parts.scheme or parts.netloc or parts.path.startswith("/"):
             raise ValueError(f"{uri!r} lies outside of the SSP; a relative URI, such as 'resources/unit.fmu', is right")
         if parts.fragment or parts.query or not parts.path:
-            raise ValueError(f"{uri!r} names no file of the SSP; 'resources/unit.fmu' is of the right form")
+            raise ValueError(f"{uri!r} names no file of the SSP; 'resources/unit.fmu' is a valid one")
         member = posixpath.normpath(unquote(parts.path))
         if member.split("/")[0] == "..":
             raise ValueError(f"{uri!r} leads out of the SSP")

@@ -1,4 +1,4 @@
-"""Finds the variables that an SSP's connectors name in FMUs, entries of arrays among them."""
+"""Finds the FMU variables that an SSP's connectors name: ports, or single entries of arrays of scalars."""
 
 import re
 from collections.abc import Collection, Mapping
@@ -18,7 +18,7 @@ def ports_of(d: FmuDescription) -> dict[str, FmuPort]:
 
 
 def find_entry(ports: Mapping[str, FmuPort], name: str) -> Entry | None:
-    """Return the port of a name, or the port and entry that a name such as `p[1]` means in an array of scalars."""
+    """Return the port of a name, or for a name such as `p[1]` of an array of scalars the port and the entry."""
     if name in ports:
         return ports[name], None
     match = _SUBSCRIPT.match(name)

@@ -1,6 +1,7 @@
-"""Takes nested systems apart: which variable of which FMU feeds which, and with which values all start.
+"""Flattens nested systems: which variable of which FMU feeds which, and with which values all start.
 
-What is wrong with a component's connectors, compared with the variables of its FMU.
+Connections of systems within systems are composed to connections from FMU to FMU, connectors are checked against the
+variables of their FMUs, and all faults are collected.
 """
 
 import logging
@@ -17,6 +18,11 @@ from handover.cosim.ssp.start_values import Given, chained, converted
 from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
 from handover.cosim.system.conversion import LinearTransformation
 
+_log = logging.getLogger(__name__)
+
+Node = tuple[str, str]
+"""A connector: the path of its element, empty for the outermost system, and its name."""
+
 GIVES = {"output", "calculatedParameter"}
 """Kinds of connector that a component gives values by."""
 
@@ -32,51 +38,9 @@ _KINDS: Mapping[str, tuple[Kind, ...]] = {
 """What a connector's type may be in an FMU."""
 
 
-def connector_faults(component: SspComponent, path: str, d: FmuDescription) -> list[str]:
-    """Return what is wrong with the connectors of a component; `path` is its name, with those of the systems around it.
-
-    Connectors of other kinds than inputs, outputs and parameters are not looked at: they cannot be connected here.
-    """
-    ports = ports_of(d)
-    faults: list[str] = []
-    for c in component.connectors.values():
-        found = find_entry(ports, c.name)
-        if found is not None and c.kind in TAKES | GIVES:
-            faults += [f"{c.where}{path}.{c.name} {fault}" for fault in _differences(c, found[0])]
-        elif c.kind in ("input", "output", "parameter"):
-            near = nearest(c.name, variable_names(d))
-            faults.append(f"{c.where}the FMU of {path!r} has no variable {c.name!r}; {near}")
-    return faults
-
-
-def _differences(c: SspConnector, port: FmuPort) -> list[str]:
-    found: list[str] = []
-    if port.causality.value != c.kind:
-        found.append(f"is of kind {c.kind} here and of causality {port.causality.value} in its FMU")
-    if c.type_name in _KINDS and port.kind not in _KINDS[c.type_name]:
-        found.append(f"is of type {c.type_name} here and {port.type_name} in its FMU")
-    if _differ(c.unit, port.unit):
-        undefined = "" if c.unit.defined else ", which <ssd:Units> does not define,"
-        found.append(f"is in {c.unit.symbol}{undefined} here and in {port.unit.symbol} in its FMU")
-    return found
-
-
-def _differ(a: Unit, b: Unit) -> bool:
-    try:
-        return converted(a, b) is not None
-    except ValueError:
-        return True
-
-
-_log = logging.getLogger(__name__)
-
-Node = tuple[str, str]
-"""A connector: the path of its element, empty for the outermost system, and its name."""
-
-
 @dataclass(frozen=True)
 class Fed:
-    """Who feeds a connector, by which connection."""
+    """What feeds a connector, by which connection."""
 
     source: Node
     by: SspConnection
@@ -84,7 +48,7 @@ class Fed:
 
 @dataclass(frozen=True)
 class FlatConnection:
-    """A variable that feeds another. `linear` is in place of a conversion of units; None leaves that to the master."""
+    """A variable that feeds another. `linear` replaces a conversion of units; None leaves that to the master."""
 
     source: Node
     target: Node
@@ -113,7 +77,7 @@ def components_of(system: SspNestedSystem, path: str = "") -> Iterator[tuple[str
 
 
 def flatten(system: SspNestedSystem, descriptions: Mapping[str, FmuDescription]) -> FlatSystem:
-    """Return a system's components with what connects them; what is wrong is in `faults`, all of it."""
+    """Return a system's components, connections and start values; all that is wrong is in `faults`."""
     return _Flattening(system, descriptions).flat
 
 
@@ -145,14 +109,14 @@ class _Flattening:
                 self._enter(element, here)
             else:
                 self._connectors |= {(here, c.name): c for c in element.connectors.values()}
-                self.flat.faults += connector_faults(element, here, self._descriptions[here])
+                self.flat.faults += _connector_faults(element, here, self._descriptions[here])
                 self._bind(element, here)
         self._bind(system, path)
         for connection in system.connections:
             self._connect(system, path, connection)
 
     def _bind(self, element: SspElement, path: str) -> None:
-        """Apply an element's bindings; what is bound further out, and later, takes the place of what was before."""
+        """Apply an element's bindings; bindings further out, and later ones, replace earlier ones."""
         for binding in element.bindings:
             for name, value in binding.items():
                 if not self._assign(element, path, name, value):
@@ -160,21 +124,22 @@ class _Flattening:
                     _log.warning("%sno variable is called %r; %s; its value is left out", value.where, name, near)
 
     def _assign(self, element: SspElement, path: str, name: str, value: SspValue) -> bool:
+        """Give a value to a name as seen from an element; return False if there is none of that name."""
         if isinstance(element, SspComponent):
             d = self._descriptions[path]
-            found = find_entry({**d.parameters, **d.inputs}, name) is not None
+            assigned = find_entry({**d.parameters, **d.inputs}, name) is not None
         else:
-            found = name in element.connectors
-        if found:
+            assigned = name in element.connectors
+        if assigned:
             self._values[path, name] = value
         for child in element.elements.values() if isinstance(element, SspNestedSystem) else ():
             if name.startswith(f"{child.name}."):
                 rest = name.removeprefix(f"{child.name}.")
-                found = self._assign(child, _join(path, child.name), rest, value) or found
-        return found
+                assigned = self._assign(child, _join(path, child.name), rest, value) or assigned
+        return assigned
 
     def _names(self, element: SspElement, path: str) -> Iterator[str]:
-        """Yield the names that values can be given to, as they are called from an element."""
+        """Yield the names that values can be given to, as seen from an element."""
         if isinstance(element, SspComponent):
             yield from settable_names(self._descriptions[path])
         else:
@@ -188,16 +153,16 @@ class _Flattening:
         if len(nodes) < 2:
             return
         gives = [self._gives(end, node) for (end, _), node in zip(ends, nodes, strict=True)]
-        text = f"{connection.where}{connection.start} - {connection.end}: "
+        where = f"{connection.where}{connection.start} - {connection.end}: "
         if None in gives:
             kind = self._connectors[nodes[gives.index(None)]].kind
-            self.flat.faults.append(f"{text}connectors of kind {kind!r} cannot be connected; inputs and outputs can")
+            self.flat.faults.append(f"{where}connectors of kind {kind!r} cannot be connected; inputs and outputs can")
         elif gives[0] == gives[1]:
-            self.flat.faults.append(f"{text}both ends {'give' if gives[0] else 'take'} a value; one of each is right")
+            self.flat.faults.append(f"{where}both ends {'give' if gives[0] else 'take'} a value; one of each is right")
         else:
             source, target = nodes if gives[0] else reversed(nodes)
             if target in self._fed:
-                self.flat.faults.append(f"{text}{_join(*target)} is fed twice")
+                self.flat.faults.append(f"{where}{_join(*target)} is fed twice")
             self._fed[target] = Fed(source, connection)
 
     def _end(self, system: SspNestedSystem, path: str, end: SspEnd, connection: SspConnection) -> Node | None:
@@ -215,14 +180,14 @@ class _Flattening:
         return (path if end.element is None else _join(path, owner.name)), end.connector
 
     def _gives(self, end: SspEnd, node: Node) -> bool | None:
-        """Tell whether an end is a source within its system; None where it is neither that nor a sink."""
+        """Return whether an end is a source within its system; None where it is neither source nor sink."""
         kind = self._connectors[node].kind
         if kind not in GIVES | TAKES:
             return None
         return kind in (TAKES if end.element is None else GIVES)
 
     def _follow(self, target: Node) -> None:
-        """Find what feeds a component's variable through the systems between; of a system's connector only check it."""
+        """Follow what feeds a connector through the systems between; add a connection if it is a component's."""
         hops: list[tuple[SspConnection, Node]] = []
         node, seen = target, set[Node]()
         while node in self._fed and (node not in seen):
@@ -246,7 +211,7 @@ class _Flattening:
             self.flat.given.setdefault(target[0], {})[target[1]] = Given(self._values[node], self._unit(node), linear)
 
     def _composed(self, source: Node, hops: list[tuple[SspConnection, Node]]) -> LinearTransformation | None:
-        """Return what a value goes through from its source; None where it is what a master does by itself."""
+        """Return the transformation of a value on its way; None where it is the master's own conversion of units."""
         total, unit = LinearTransformation(), self._unit(source)
         for connection, node in hops:
             following = self._unit(node)
@@ -255,17 +220,54 @@ class _Flattening:
             total = total if connection.linear is None else chained(total, connection.linear)
             unit = unit if following == UNKNOWN else following
         try:
-            by_itself = converted(self._own_unit(source), self._own_unit(hops[-1][1])) or LinearTransformation()
-        except ValueError:  # a conversion is forbidden that could not be done
+            own = converted(self._own_unit(source), self._own_unit(hops[-1][1])) or LinearTransformation()
+        except ValueError:  # units that cannot be converted, which `suppressUnitConversion` allows
             return total
-        return None if total == by_itself else total
+        return None if total == own else total
 
     def _own_unit(self, node: Node) -> Unit:
         """Return the unit that a variable has in its FMU."""
         d = self._descriptions.get(node[0])
-        found = None if d is None else find_entry(ports_of(d), node[1])
-        return UNKNOWN if found is None else found[0].unit
+        entry = None if d is None else find_entry(ports_of(d), node[1])
+        return UNKNOWN if entry is None else entry[0].unit
 
     def _unit(self, node: Node) -> Unit:
+        """Return the unit of a variable in its FMU, or else that of its connector."""
         own = self._own_unit(node)
         return self._connectors[node].unit if own == UNKNOWN else own
+
+
+def _connector_faults(component: SspComponent, path: str, d: FmuDescription) -> list[str]:
+    """Return what is wrong with the connectors of a component; `path` is its name, with those of the systems around it.
+
+    Connectors of other kinds than inputs, outputs and parameters are not checked: they cannot be connected here.
+    """
+    ports = ports_of(d)
+    faults: list[str] = []
+    for c in component.connectors.values():
+        entry = find_entry(ports, c.name)
+        if entry is not None and c.kind in TAKES | GIVES:
+            faults += [f"{c.where}{path}.{c.name} {fault}" for fault in _differences(c, entry[0])]
+        elif c.kind in ("input", "output", "parameter"):
+            near = nearest(c.name, variable_names(d))
+            faults.append(f"{c.where}the FMU of {path!r} has no variable {c.name!r}; {near}")
+    return faults
+
+
+def _differences(c: SspConnector, port: FmuPort) -> list[str]:
+    differences: list[str] = []
+    if port.causality.value != c.kind:
+        differences.append(f"is of kind {c.kind} here and of causality {port.causality.value} in its FMU")
+    if c.type_name in _KINDS and port.kind not in _KINDS[c.type_name]:
+        differences.append(f"is of type {c.type_name} here and {port.type_name} in its FMU")
+    if _differ(c.unit, port.unit):
+        undefined = "" if c.unit.defined else ", which <ssd:Units> does not define,"
+        differences.append(f"is in {c.unit.symbol}{undefined} here and in {port.unit.symbol} in its FMU")
+    return differences
+
+
+def _differ(a: Unit, b: Unit) -> bool:
+    try:
+        return converted(a, b) is not None
+    except ValueError:
+        return True

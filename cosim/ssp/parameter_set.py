@@ -1,4 +1,4 @@
-"""Parameter sets (SSV) and mappings of their names (SSM), in files of their own or inside the system's description."""
+"""Parameter sets (SSV) and mappings of their names (SSM), in files of their own or in the system's description."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,18 +8,18 @@ from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.ssp.xml import SspPart, local, short_name
 from handover.cosim.system.conversion import LinearTransformation
 
-_LISTS = ("String", "Enumeration", "Binary")
-"""Types whose values are not numbers between blanks."""
+_SINGLE = ("String", "Enumeration", "Binary")
+"""Types whose value is one text; of others it is a list with blanks between."""
 
 _TYPES = (
-    *("Real", "Float64", "Float32", "Integer", "Boolean", *_LISTS),
+    *("Real", "Float64", "Float32", "Integer", "Boolean", *_SINGLE),
     *(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")),
 )
 
 
 @dataclass(frozen=True)
 class SspValue:
-    """A parameter's value as it is written, one text for each entry, in a unit that may be UNKNOWN.
+    """A parameter's value as written in the file, one text for each entry, in a unit that may be UNKNOWN.
 
     `linear` is applied after a conversion to the target's unit, or where `keeps_units` instead of one.
     """
@@ -34,7 +34,7 @@ class SspValue:
 
 @dataclass(frozen=True)
 class Mapped:
-    """Where a mapping sends a parameter."""
+    """The name that a mapping gives a parameter, and how it transforms the value."""
 
     target: str
     linear: LinearTransformation | None
@@ -56,7 +56,7 @@ def read_units(part: SspPart, parent: XmlElement, prefix: str) -> dict[str, Unit
 
 
 def unit_named(element: XmlElement, units: Mapping[str, Unit]) -> Unit:
-    """Return the unit that a type names: UNKNOWN if none, one that is not defined if there is none of that name."""
+    """Return the unit that a type names: UNKNOWN if none, and an undefined one if there is none of that name."""
     symbol = element.get("unit")
     return units.get(symbol, Unit(symbol, defined=False)) if symbol else UNKNOWN
 
@@ -65,7 +65,7 @@ def read_parameter_set(part: SspPart, root: XmlElement, units: Mapping[str, Unit
     """Return the values of a parameter set by name; `units` are those of the description around it.
 
     Raises:
-        InvalidSsp: a value is missing, of no type that is known, or there twice.
+        InvalidSsp: a value is missing, of an unknown type, or there twice.
     """
     known = {**units, **read_units(part, root, "ssv")}
     values: dict[str, SspValue] = {}
@@ -80,14 +80,14 @@ def read_parameter_set(part: SspPart, root: XmlElement, units: Mapping[str, Unit
 def _value(part: SspPart, parameter: XmlElement, units: Mapping[str, Unit]) -> SspValue:
     types = [c for c in parameter.children if local(c.tag) in _TYPES]
     if len(types) != 1:
-        wanted = f"one of {', '.join(_TYPES)} is right"
-        raise part.fault(parameter, f"parameter {part.text(parameter, 'name')!r} has {len(types)} types; {wanted}")
+        valid = f"one of {', '.join(_TYPES)} is right"
+        raise part.fault(parameter, f"parameter {part.text(parameter, 'name')!r} has {len(types)} types; {valid}")
     (element,) = types
     type_name = local(element.tag)
     entries = list(part.children(element, "ssv:Value"))
     if entries:
         texts = [part.text(e, "value") for e in entries]
-    elif type_name in _LISTS:
+    elif type_name in _SINGLE:
         texts = [part.text(element, "value")]
     else:
         texts = part.text(element, "value").split()
@@ -95,10 +95,10 @@ def _value(part: SspPart, parameter: XmlElement, units: Mapping[str, Unit]) -> S
 
 
 def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:
-    """Return where a mapping sends parameters, by their names in the parameter set.
+    """Return the targets of a mapping, by the parameters' names in the parameter set.
 
     Raises:
-        InvalidSsp: two are sent to one name, or by a transformation that is not linear.
+        InvalidSsp: two parameters are mapped to one name, or a transformation is not linear.
     """
     mapping: dict[str, list[Mapped]] = {}
     targets: set[str] = set()
@@ -131,7 +131,7 @@ def mapped_values(values: Mapping[str, SspValue], mapping: Mapping[str, Sequence
     """Return the values under the names that they are mapped to; others are left out, as the standard has it."""
     return {
         m.target: replace(values[source], linear=m.linear, keeps_units=m.keeps_units)
-        for source, entries in mapping.items()
-        for m in entries
+        for source, targets in mapping.items()
+        for m in targets
         if source in values
     }

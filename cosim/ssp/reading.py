@@ -31,17 +31,17 @@ SET_TYPE = "application/x-ssp-parameter-set"
 MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
 _PERIOD = re.compile(r"[1-9]\d{0,11}(/[1-9]\d{0,11})?")
-"""Seconds as `write_ssp` writes them; what is longer could take long to reckon with."""
+"""Seconds as `write_ssp` writes them; limited in length, as longer fractions could take long to compute with."""
 
 _NO_TYPES = ("ConnectorGeometry", "Annotations", "Dimension", "MetaData", "Signature")
-"""What a connector has besides its type."""
+"""Children of a connector that are not its type."""
 
 
 def read_structure(archive: SspArchive) -> SspStructure:
-    """Read what an SSP says of its system.
+    """Read the structure of an SSP's system.
 
     Raises:
-        InvalidSsp: it is malformed, or refers to what is not there or not supported.
+        InvalidSsp: it is malformed, or refers to what is missing or not supported.
     """
     part = SspPart(archive.path, STRUCTURE, archive.structure(), "ssd:SystemStructureDescription")
     systems = list(part.children(part.root, "ssd:System"))
@@ -74,10 +74,10 @@ class _Reader:
         elements: dict[str, SspComponent | SspNestedSystem] = {}
         for holder in part.children(e, "ssd:Elements"):
             for child in holder.children:
-                made = self._element(child)
-                if made.name in elements:
-                    raise part.fault(child, f"two elements are called {made.name!r}")
-                elements[made.name] = made
+                element = self._element(child)
+                if element.name in elements:
+                    raise part.fault(child, f"two elements are called {element.name!r}")
+                elements[element.name] = element
         connections = tuple(map(self._connection, part.children(e, "ssd:Connections", "ssd:Connection")))
         return SspNestedSystem(
             part.text(e, "name"), self._connectors(e), self._bindings(e), part.where(e, ""), elements, connections
@@ -93,13 +93,13 @@ class _Reader:
 
     def _component(self, e: XmlElement) -> SspComponent:
         part = self._part
-        type_name, form = e.get("type", FMU_TYPE), e.get("implementation", "any")
+        type_name, implementation = e.get("type", FMU_TYPE), e.get("implementation", "any")
         if type_name != FMU_TYPE:
             raise part.fault(e, f"a component of type {type_name[:80]!r}; only FMUs ({FMU_TYPE}) are supported")
-        if form not in ("any", "CoSimulation"):
-            raise part.fault(e, f"a component for {form[:80]}; only co-simulation is supported")
+        if implementation not in ("any", "CoSimulation"):
+            raise part.fault(e, f"a component for {implementation[:80]}; only co-simulation is supported")
         name, member = part.text(e, "name"), self._member(e, part.text(e, "source"))
-        period, sampled = self._annotated(e)
+        period, sampled = self._annotated_step(e)
         return SspComponent(name, self._connectors(e), self._bindings(e), part.where(e, ""), member, period, sampled)
 
     def _member(self, e: XmlElement, uri: str) -> str:
@@ -108,7 +108,8 @@ class _Reader:
         except ValueError as fault:
             raise self._part.fault(e, str(fault)) from fault
 
-    def _annotated(self, e: XmlElement) -> tuple[Fraction | None, bool | None]:
+    def _annotated_step(self, e: XmlElement) -> tuple[Fraction | None, bool | None]:
+        """Return the communication step of a component, and whether it is sampled, as `write_ssp` annotates them."""
         for annotation in self._part.children(e, "ssd:Annotations", "ssc:Annotation"):
             if annotation.get("type") != STEP_ANNOTATION:
                 continue
@@ -121,16 +122,16 @@ class _Reader:
 
     def _connectors(self, e: XmlElement) -> dict[str, SspConnector]:
         part = self._part
-        made: dict[str, SspConnector] = {}
+        connectors: dict[str, SspConnector] = {}
         for c in part.children(e, "ssd:Connectors", "ssd:Connector"):
             name = part.text(c, "name")
-            if name in made:
+            if name in connectors:
                 raise part.fault(c, f"two connectors are called {name!r}")
             types = [t for t in c.children if local(t.tag) not in _NO_TYPES]
             unit = unit_named(types[0], self._units) if types else UNKNOWN
             type_name = local(types[0].tag) if types else ""
-            made[name] = SspConnector(name, part.text(c, "kind"), type_name, unit, part.where(c, ""))
-        return made
+            connectors[name] = SspConnector(name, part.text(c, "kind"), type_name, unit, part.where(c, ""))
+        return connectors
 
     def _connection(self, e: XmlElement) -> SspConnection:
         part = self._part
@@ -157,7 +158,7 @@ class _Reader:
         return values
 
     def _content(self, e: XmlElement, wanted: str, type_name: str, *holder: str) -> tuple[SspPart, XmlElement]:
-        """Return what a binding or a mapping refers to, or else has inside, with the file that it is in."""
+        """Return the element that a binding or a mapping refers to, or else contains, with the file that it is in."""
         part = self._part
         if e.get("type", type_name) != type_name:
             raise part.fault(e, f"type {e.get('type')[:80]!r} is not supported; {type_name} is")

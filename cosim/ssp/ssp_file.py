@@ -1,8 +1,7 @@
 """An SSP as a system that the master runs.
 
-Takes connections of single entries together to connections of whole arrays, or takes arrays apart.
-
-SSP 1.0 knows no arrays: `a.p[1]` feeds `b.p[1]`, `a.p[2]` feeds `b.p[2]`, and so on.
+SSP 1.0 has no arrays: `a.p[1]` feeds `b.p[1]`, `a.p[2]` feeds `b.p[2]`, and so on. `Grouping` joins such connections to
+connections of whole arrays, which the master copies as a whole, or splits arrays where they cannot be joined.
 """
 
 import tempfile
@@ -22,14 +21,17 @@ from handover.cosim.ssp.start_values import start_values
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
 
+_MAX_DENOMINATOR = 10**6
+"""Of stop times that are taken for rounded fractions."""
+
 Wire = tuple[PortName, PortName, LinearTransformation | None]
 
 Feeds = dict[int, tuple[PortName, int, LinearTransformation | None]]
-"""By entry of an input: the output, its entry, and what the value goes through."""
+"""By entry of an input: the output, its entry, and the transformation of the value."""
 
 
 class Grouping:
-    """The connections of a flat system by ports, and the arrays that they take apart.
+    """The connections of a flat system by ports, and the arrays that have to be split for them.
 
     Attributes:
         wires: output, input and transformation.
@@ -50,7 +52,7 @@ class Grouping:
         self._feeds: dict[PortName, Feeds] = {}
         for c in connections:
             self._take(c)
-        while self._part():
+        while self._split():  # each split array may leave another one that it was connected with in parts
             pass
         self._check_divisible()
         for target, feeds in self._feeds.items():
@@ -65,7 +67,7 @@ class Grouping:
                     self.faults.append(f"{c.where}{'.'.join(node)} is no {role} of its FMU, so it cannot be connected")
             return
         if i is None and k is None and a.shape != b.shape:
-            self.wires.append((source, target, c.linear))  # the system's check tells of it, with both ends
+            self.wires.append((source, target, c.linear))  # a fault, which the system's check reports with both ends
             return
         if (a.size if i is None else 1) != (b.size if k is None else 1):
             self.faults.append(f"{c.where}{source} -> {target}: a whole array and a single entry")
@@ -80,16 +82,15 @@ class Grouping:
     def _entry(self, node: Node, role: str) -> tuple[FmuPort | None, int | None, PortName]:
         unit, name = node
         d = self._descriptions[unit]
-        found = find_entry(d.outputs if role == "output" else d.inputs, name)
-        port, index = found or (None, None)
+        port, index = find_entry(d.outputs if role == "output" else d.inputs, name) or (None, None)
         return port, index, PortName(unit, name if port is None else port.name)
 
     def _port(self, name: PortName) -> FmuPort:
         d = self._descriptions[name.unit]
         return d.outputs[name.port] if name.port in d.outputs else d.inputs[name.port]
 
-    def _part(self) -> bool:
-        """Take apart what cannot be connected as a whole; tell whether anything was taken apart."""
+    def _split(self) -> bool:
+        """Split arrays that cannot be connected as a whole; return whether any further one was split."""
         before = sum(map(len, self.apart.values()))
         for target, feeds in self._feeds.items():
             if not self._is_whole(target, feeds):
@@ -115,8 +116,8 @@ class Grouping:
             for name in sorted(names):
                 port = {**d.parameters, **d.inputs, **d.outputs}[name]
                 if len(port.references) == 1:
-                    text = f"{unit}.{name} is one array variable (FMI 3); its entries cannot be connected one by one"
-                    self.faults.append(text)
+                    fault = f"{unit}.{name} is one array variable (FMI 3); its entries cannot be connected one by one"
+                    self.faults.append(fault)
 
     def _wire(self, target: PortName, feeds: Feeds) -> None:
         if self._is_whole(target, feeds):
@@ -124,30 +125,29 @@ class Grouping:
             self.wires.append((source, target, linear))
             return
         for k, (source, i, linear) in feeds.items():
-            self.wires.append((self._part_of(source, i), self._part_of(target, k), linear))
+            self.wires.append((self._entry_name(source, i), self._entry_name(target, k), linear))
 
-    def _part_of(self, name: PortName, k: int) -> PortName:
+    def _entry_name(self, name: PortName, k: int) -> PortName:
+        """Return the name of a port's entry: its own if it is split, else the port's."""
         if not self._is_apart(name):
             return name
-        return PortName(name.unit, entry_names(self._port(name))[min(k, len(entry_names(self._port(name))) - 1)])
-
-
-_MAX_DENOMINATOR = 10**6
+        names = entry_names(self._port(name))
+        return PortName(name.unit, names[min(k, len(names) - 1)])  # of an array variable, a fault, there is one name
 
 
 class SspFile:
     """A System Structure and Parameterization file, version 1.0 or 2.0, of co-simulation FMUs. A context manager.
 
-    Systems within systems are taken apart: their units are named `system.unit`. Its FMUs lie in a temporary folder
-    until it is closed, so `system` is to be run before.
+    Systems within systems are flattened: their units are named `system.unit`. Its FMUs lie in a temporary folder until
+    it is closed, so `system` has to be run before.
 
-    Not supported, and refused: signal dictionaries, components that are SSPs, mappings of booleans, integers or
+    Not supported, and rejected: signal dictionaries, components that are SSPs, mappings of booleans, integers or
     enumerations, connected parameters, single entries of FMI 3 arrays, clocks, files outside of the archive.
 
     Args:
         path: the file.
-        step: communication step of all units, s; without it each has the one that its FMU proposes, or that an
-            annotation of `write_ssp` tells.
+        step: communication step of all units, s; without it each has the one of an annotation by `write_ssp`, or
+            else the one that its FMU proposes.
 
     Attributes:
         name: the system's name.
@@ -155,7 +155,7 @@ class SspFile:
         stop: the stop time of its default experiment, s, if it has one.
 
     Raises:
-        InvalidSsp: with what is wrong with it.
+        InvalidSsp: with all that is wrong with it.
     """
 
     def __init__(self, path: Path, step: Fraction | None = None) -> None:
@@ -205,9 +205,9 @@ class SspFile:
         starts, partly = dict[str, dict[str, object]](), dict[str, set[str]]()
         for unit, given in flat.given.items():
             ports = {**descriptions[unit].parameters, **descriptions[unit].inputs}
-            found = {name: (entry, g) for name, g in given.items() if (entry := find_entry(ports, name)) is not None}
-            starts[unit], partly[unit], wrong = start_values(found)
-            faults += wrong
+            known = {name: (entry, g) for name, g in given.items() if (entry := find_entry(ports, name)) is not None}
+            starts[unit], partly[unit], start_faults = start_values(known)
+            faults += start_faults
         grouping = Grouping(flat.connections, descriptions, partly)
         faults += grouping.faults
         if faults:
@@ -216,8 +216,8 @@ class SspFile:
         for name, component in flat.components.items():
             path = Path(self._folder.name) / component.member
             unit = system.add(name, path, period=step or component.period, sampled=component.sampled)
-            parted = taken_apart(descriptions[name], grouping.apart.get(name, ()))
-            system.units[name] = replace(unit, description=parted, start=starts.get(name, {}))
+            description = taken_apart(descriptions[name], grouping.apart.get(name, ()))
+            system.units[name] = replace(unit, description=description, start=starts.get(name, {}))
         for source, target, linear in grouping.wires:
             system.connect(source, target, linear)
         try:

@@ -1,7 +1,4 @@
-"""Turns values as an SSP writes them into start values of a unit's ports.
-
-Linear changes of values one after another, and those that units need.
-"""
+"""Converts values as an SSP writes them, in units and through transformations, to start values of a unit's ports."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,19 +13,21 @@ from handover.cosim.ssp.connected_ports import Entry, entry_names
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.system.conversion import LinearTransformation, conversion, pass_as_they_are
 
+_BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+
 
 def applied(change: LinearTransformation, number: float) -> float:
-    """Return a number after a change."""
+    """Return a number transformed."""
     return change.factor * number + change.offset
 
 
 def chained(first: LinearTransformation, following: LinearTransformation) -> LinearTransformation:
-    """Return the change that makes two, one after the other."""
+    """Return the composition of two transformations."""
     return LinearTransformation(following.factor * first.factor, following.factor * first.offset + following.offset)
 
 
 def converted(source: Unit, target: Unit) -> LinearTransformation | None:
-    """Return what makes numbers in one unit numbers in another, None where they are alike or one is not told.
+    """Return the conversion from one unit to another, None where numbers pass as they are or a unit is unknown.
 
     Raises:
         ValueError: they differ in dimension, or one of two that differ in name is not defined.
@@ -48,14 +47,12 @@ def converted(source: Unit, target: Unit) -> LinearTransformation | None:
     return None if change.is_identity else change
 
 
-_TRUTHS = {"true": True, "1": True, "false": False, "0": False}
-
-
 @dataclass(frozen=True)
 class Given:
-    """A value for a variable. `unit` is that of whatever it was given to, and `then` leads from there to the variable.
+    """A value for a variable, or for a connector of a system that feeds it.
 
-    Most are given to the variable itself; others to a connector of a system that feeds it.
+    `unit` is that of the connector, and `then` the transformation from there to the variable; both are left out of
+    values for the variable itself.
     """
 
     value: SspValue
@@ -64,32 +61,32 @@ class Given:
 
 
 def start_values(given: Mapping[str, tuple[Entry, Given]]) -> tuple[dict[str, Any], set[str], list[str]]:
-    """Return a unit's start values by port, the arrays of which only some entries are given, and what is wrong.
+    """Return a unit's start values by port, the arrays of which only some entries are given, and all faults.
 
-    Entries of those arrays have values of their own, by names such as `p[1]`.
+    Given entries of those arrays have values of their own, by names such as `p[1]`.
     """
     values: dict[str, Any] = {}
     entries: dict[str, dict[int, Any]] = {}
     ports: dict[str, FmuPort] = {}
     faults: list[str] = []
-    for name, ((port, index), one) in given.items():
+    for name, ((port, index), source) in given.items():
         try:
-            value = _value(port, index, one)
+            value = _value(port, index, source)
         except ValueError as e:
-            faults.append(f"{one.value.where}{name}: {e}")
+            faults.append(f"{source.value.where}{name}: {e}")
             continue
         if index is None:
             values[port.name] = value
         else:
             entries.setdefault(port.name, {})[index] = value
             ports[port.name] = port
-    partly = {n for n, found in entries.items() if len(found) < ports[n].size}
-    for name, found in entries.items():
+    partly = {n for n, by_index in entries.items() if len(by_index) < ports[n].size}
+    for name, by_index in entries.items():
         if name in partly:
             names = entry_names(ports[name])
-            values |= {names[k]: value for k, value in found.items()}
+            values |= {names[k]: value for k, value in by_index.items()}
         else:
-            values[name] = np.array([found[k] for k in range(len(found))]).reshape(ports[name].shape)
+            values[name] = np.array([by_index[k] for k in range(len(by_index))]).reshape(ports[name].shape)
     return values, partly, faults
 
 
@@ -101,7 +98,7 @@ def _value(port: FmuPort, index: int | None, given: Given) -> Any:
     if port.kind is not Kind.REAL:
         if (given.then or value.linear) is not None:
             raise ValueError(f"a linear transformation of {port.kind.value} values; only reals can be transformed")
-        return _shaped([_plain(port, value.type_name, text) for text in value.texts], shape)
+        return _shaped([_parsed(port, value.type_name, text) for text in value.texts], shape)
     if value.type_name in ("Boolean", "String", "Enumeration", "Binary"):
         raise ValueError(f"it is real, and the value given is of type {value.type_name}")
     numbers = [_float(text) for text in value.texts]
@@ -112,16 +109,16 @@ def _value(port: FmuPort, index: int | None, given: Given) -> Any:
     return _shaped(numbers, shape)
 
 
-def _plain(port: FmuPort, type_name: str, text: str) -> Any:
+def _parsed(port: FmuPort, type_name: str, text: str) -> Any:
     whole = type_name == "Integer" or "Int" in type_name
     if port.kind is Kind.INTEGER and whole:
         return _int(text)
     if port.kind is Kind.ENUMERATION and (type_name == "Enumeration" or whole):
         return _int(text) if whole else text
     if port.kind is Kind.BOOLEAN and type_name == "Boolean":
-        if text not in _TRUTHS:
+        if text not in _BOOLEANS:
             raise ValueError(f"{text[:80]!r} is neither true nor false")
-        return _TRUTHS[text]
+        return _BOOLEANS[text]
     if port.kind is Kind.STRING and type_name == "String":
         return text
     if port.kind is Kind.BINARY and type_name == "Binary":

@@ -1,4 +1,7 @@
-"""What a SystemStructure.ssd says: nested systems of components, their connectors, connections and parameters."""
+"""The content of a SystemStructure.ssd: nested systems of components, their connectors, connections and parameters.
+
+`where` is the file and line of an element, with which messages begin.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,7 +36,7 @@ class SspEnd:
 
 @dataclass(frozen=True)
 class SspConnection:
-    """Two ends; which one gives follows from the kinds of their connectors. `keeps_units` forbids conversions."""
+    """Two ends; the kinds of their connectors decide which one is the source. `keeps_units` forbids conversions."""
 
     start: SspEnd
     end: SspEnd
@@ -54,7 +57,7 @@ class SspElement:
 
 @dataclass(frozen=True)
 class SspComponent(SspElement):
-    """An FMU of the SSP: a member of its archive, and where it is annotated its communication step."""
+    """An FMU of the SSP: a member of its archive, and where that is annotated its communication step."""
 
     member: str
     period: Fraction | None

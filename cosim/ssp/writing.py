@@ -1,9 +1,4 @@
-"""Writes a system as an SSP that other tools load.
-
-Writes the start values of a unit as a parameter set (SSV).
-
-Types, units and enumerations of an FMU's ports, as an SSP names them.
-"""
+"""Writes a system as an SSP that other tools load, with its FMUs, and its start values as parameter sets (SSV)."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -29,7 +24,7 @@ Items = tuple[tuple[str, int], ...]
 class DescribedTypes:
     """Collects the units and enumerations that types refer to by name, and writes types.
 
-    Units that have one name but are not the same cannot be told apart: then the FMUs' own count.
+    Different units of one name cannot be distinguished in an SSP: these are left out, and the FMUs' own count.
     """
 
     def __init__(self, ports: Iterable[FmuPort]) -> None:
@@ -45,7 +40,7 @@ class DescribedTypes:
                 self._enumerations[port.items] = f"{port.name}-{same + 1}" if same else port.name
 
     def add_type(self, parent: ET.Element, prefix: str, port: FmuPort) -> ET.Element:
-        """Add the element that tells a port's type, such as `<ssc:Real unit="m"/>`."""
+        """Add the element of a port's type, such as `<ssc:Real unit="m"/>`."""
         attributes: dict[str, str] = {}
         if port.kind is Kind.REAL and self._units.get(port.unit.symbol) == port.unit:
             attributes["unit"] = port.unit.symbol
@@ -83,7 +78,7 @@ def add_dimensions(parent: ET.Element, shape: Sequence[int]) -> None:
 def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
     """Return the start values to bind, by port.
 
-    An enumeration that is what the FMU starts with anyway is left out: libcosim ends its process at enumerations.
+    An enumeration that equals the FMU's start value is left out: libcosim ends its process at enumerations.
     """
     ports = ports_of(unit.description)
     values = {name: (ports[name], value) for name, value in unit.start.items()}
@@ -97,7 +92,7 @@ def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
 def parameter_set(unit: PlacedUnit, version: str, name: str) -> bytes:
     """Return the SSV file of a unit's start values.
 
-    All units' sets have one name: Ecos applies the sets of the name that it is told.
+    All units' sets have one name: Ecos applies the sets of one name, which it is called with.
     """
     values = bound_values(unit)
     types = DescribedTypes(port for port, _ in values.values() if port.kind is not Kind.ENUMERATION)
@@ -132,9 +127,9 @@ def _texts(port: FmuPort, value: Any) -> list[str]:
 def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = None) -> Path:
     """Write a system with its FMUs and start values as an SSP; it appears complete or not at all.
 
-    It is of version 1.0 if all units are of FMI 2, else of 2.0. A communication step that is not the one that an FMU
-    proposes is told in an annotation, which other tools need not know. A conversion of units is written out, as not
-    every tool converts.
+    It is of version 1.0 if all units are of FMI 2, else of 2.0. A communication step other than the one that an FMU
+    proposes is written to an annotation, which other tools may ignore. A conversion of units is written as a linear
+    transformation, as not every tool converts.
 
     Args:
         system: the system.
@@ -155,7 +150,7 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
     bound = {n: u for n, u in system.units.items() if bound_values(u)}
     sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
     contents |= {sets[n]: parameter_set(u, version, name) for n, u in bound.items()}
-    contents[STRUCTURE] = _Structure(system, version, files, sets).described(name, stop)
+    contents[STRUCTURE] = _Structure(system, version, files, sets).content(name, stop)
     return write_archive(path, contents)
 
 
@@ -180,7 +175,7 @@ class _Structure:
         self._connected = {end for c in system.connections for end in (c.source, c.target)}
         self._types = DescribedTypes(p for u in system.units.values() for p in self._shown(u))
 
-    def described(self, name: str, stop: Fraction | None) -> bytes:
+    def content(self, name: str, stop: Fraction | None) -> bytes:
         """Return SystemStructure.ssd."""
         root = root_element("ssd:SystemStructureDescription", self._version, name)
         system = ET.SubElement(root, "ssd:System", name=name)
@@ -222,8 +217,8 @@ class _Structure:
         if (unit.period, unit.sampled) != (proposed_step(d.step), d.sampled):
             annotations = ET.SubElement(component, "ssd:Annotations")
             annotation = ET.SubElement(annotations, "ssc:Annotation", type=STEP_ANNOTATION)
-            facts = {"xmlns": "urn:handover:communication", "period": str(unit.period)}
-            ET.SubElement(annotation, "Step", {**facts, "sampled": str(unit.sampled).lower()})
+            step = {"period": str(unit.period), "sampled": str(unit.sampled).lower()}
+            ET.SubElement(annotation, "Step", {"xmlns": "urn:handover:communication", **step})
 
     def _add_connections(self, system: ET.Element) -> None:
         connections, clocks = self._system.connections, self._system.clock_connections()
@@ -239,13 +234,13 @@ class _Structure:
             from_, to = entry_names(a), entry_names(b)
             if len(from_) != len(to):
                 one, other = (c.source, c.target) if len(from_) < len(to) else (c.target, c.source)
-                faults.append(f"{one} is one array variable and each entry of {other} one; FMUs of one form are right")
+                faults.append(f"{one} is one array variable and each entry of {other} one; both must be of one kind")
                 continue
-            change = c.transformation or self._system.change_by(c)
+            linear = c.transformation or self._system.change_by(c)
             for y, u in zip(from_, to, strict=True):
                 ends = {"startElement": c.source.unit, "startConnector": y}
                 ends |= {"endElement": c.target.unit, "endConnector": u}
-                _add_connection(parent, ends, change)
+                _add_connection(parent, ends, linear)
         if faults:
             raise NotExportable(faults)
 
@@ -255,10 +250,10 @@ class _Structure:
         return a.outputs[c.source.port], b.inputs[c.target.port]
 
 
-def _add_connection(parent: ET.Element, ends: dict[str, str], change: LinearTransformation | None) -> None:
-    if change is None:
+def _add_connection(parent: ET.Element, ends: dict[str, str], linear: LinearTransformation | None) -> None:
+    if linear is None:
         ET.SubElement(parent, "ssd:Connection", ends)
         return
     element = ET.SubElement(parent, "ssd:Connection", {**ends, "suppressUnitConversion": "true"})
-    numbers = {"factor": repr(change.factor), "offset": repr(change.offset)}
+    numbers = {"factor": repr(linear.factor), "offset": repr(linear.offset)}
     ET.SubElement(element, "ssc:LinearTransformation", numbers)

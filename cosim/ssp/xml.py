@@ -1,10 +1,7 @@
-"""Names of elements in an SSP's XML files, by the prefixes that the standard uses for their namespaces.
+"""XML files of an SSP: read with checks whose faults name file and line, written, and the names of their elements.
 
-An XML file of an SSP, and what is wrong where in it.
-
-Makes the XML files of an SSP.
-
-Elements have the standard's own prefixes in their names: libcosim knows elements by these, not by their namespaces.
+Elements are named by the prefixes that the standard uses for their namespaces, such as `ssd:System`. They are written
+with these prefixes too: libcosim knows elements by them, not by their namespaces.
 """
 
 import functools
@@ -29,10 +26,13 @@ NAMESPACES = {
 """The same in SSP 1.0 and 2.0."""
 
 STRUCTURE = "SystemStructure.ssd"
-"""What an SSP's archive has at its top."""
+"""The file at the top of an SSP's archive."""
 
 STEP_ANNOTATION = "handover.communication"
 """Type of the annotation of a component whose communication step is not the one that its FMU proposes."""
+
+VERSIONS = ("1.0", "2.0")
+"""Versions of SSP that can be read."""
 
 _PREFIXES = {uri: prefix for prefix, uri in NAMESPACES.items()}
 
@@ -69,11 +69,11 @@ _SCHEMAS = {
     "ssm:ParameterMapping": "SystemStructureParameterMapping.xsd",
 }
 _MAX_REPORTED = 3
-VERSIONS = ("1.0", "2.0")
+"""Violations of the schema in an error: further ones mostly follow from the first."""
 
 
 class SspPart:
-    """An XML file of an SSP. One of version 1.0 keeps to the standard's schema; of 2.0 no schema is at hand.
+    """An XML file of an SSP. One of version 1.0 is validated by the standard's schema; for 2.0 there is none here.
 
     Args:
         path: the SSP.
@@ -82,7 +82,7 @@ class SspPart:
         wanted: name of its root, such as `ssv:ParameterSet`.
 
     Raises:
-        InvalidSsp: it is malformed, not to be read, of another version, or not what it should be.
+        InvalidSsp: it is malformed, unsafe, of another version, invalid, or has another root.
     """
 
     def __init__(self, path: Path, member: str, content: bytes, wanted: str) -> None:
@@ -98,10 +98,10 @@ class SspPart:
                 raise InvalidSsp(path, [f"{member}, {fault}" for fault in faults])
 
     def check_root(self, root: XmlElement, wanted: str) -> None:
-        """Check the name and the version of a file's root, or of what stands for one inside another file.
+        """Check the name and the version of a file's root, or of an element in its place inside another file.
 
         Raises:
-            InvalidSsp: it is another one.
+            InvalidSsp: it has another name or version.
         """
         if root.tag != tag(wanted):
             raise self.fault(root, f"<{short_name(root.tag)[:80]}> where <{wanted}> is right")
@@ -110,7 +110,7 @@ class SspPart:
             raise self.fault(root, f"the version of <{wanted}> is {version}; {' and '.join(VERSIONS)} can be read")
 
     def fault(self, element: XmlElement, fault: str) -> InvalidSsp:
-        """Return the exception that tells of a fault at an element."""
+        """Return the exception for a fault at an element."""
         return InvalidSsp(self.path, [self.where(element, fault)])
 
     def where(self, element: XmlElement, fault: str) -> str:
@@ -118,24 +118,24 @@ class SspPart:
         return f"{self.member}, line {element.line}: {fault}"
 
     def children(self, parent: XmlElement, *names: str) -> Iterator[XmlElement]:
-        """Yield the elements that are reached by a path of names such as `ssd:Elements`."""
+        """Yield the elements at a path of names such as `ssd:Elements`."""
         return parent.named(*map(tag, names))
 
     def text(self, element: XmlElement, name: str) -> str:
-        """Return an attribute that must be there.
+        """Return a required attribute.
 
         Raises:
-            InvalidSsp: it is not.
+            InvalidSsp: it is missing.
         """
         if name not in element.attributes:
             raise self.fault(element, f"<{short_name(element.tag)}> has no attribute {name!r}")
         return element.attributes[name]
 
     def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
-        """Return an attribute that is a finite number; it must be there if there is no default.
+        """Return an attribute that is a finite number; it is required if there is no default.
 
         Raises:
-            InvalidSsp: it is none.
+            InvalidSsp: it is missing, or no finite number.
         """
         if default is not None and name not in element.attributes:
             return default

@@ -1,7 +1,4 @@
-"""Steps whose length follows their error.
-
-A step that cannot be made as small as its error asks for.
-"""
+"""Steps of variable length: the error of each is estimated by step doubling, and the next one's length follows it."""
 
 import dataclasses
 import math
@@ -18,6 +15,11 @@ from handover.cosim.stepping.step_control import PiController, StepError, StepSt
 from handover.cosim.stepping.stepper import Coupling
 from handover.cosim.system.schedule import Schedule, Slot
 from handover.cosim.system.system import System
+
+_MAY_BE_TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
+"""Failures of a step that a shorter one may avoid."""
+_RESOLUTION = 8
+"""Ticks of the fine grid in the smallest step."""
 
 
 class StepTooSmall(UnitFailure):
@@ -43,27 +45,21 @@ class StepTooSmall(UnitFailure):
 
     @property
     def message(self) -> str:
-        """The signal with the largest error, and what may help."""
+        """The signal with the largest error, and a remedy."""
         return (
             f"with a step of {self.step:.3g} s the error of {self.signal} is {self.error:.3g} times what is tolerated; "
             "if it is noise, leave it uncontrolled"
         )
 
 
-_TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
-"""What a shorter step may cure."""
-_RESOLUTION = 8
-"""Ticks of the fine grid in the smallest step."""
-
-
 class AdaptiveStepper:
     """Takes all continuous units together through steps whose error is tolerated, by step doubling.
 
-    Each step is taken as one, rolled back, and taken again as two of half the length. What the two attempts differ by
-    tells the error, see `StepError`, and the error the next step's length, see `PiController`. A step with a larger
-    error than tolerated is rolled back and tried shorter, and so is one that a unit discards, that gives no numbers, or
-    whose iteration does not converge; else the units go on from the two halves. Sampled units act at their instants,
-    once.
+    Each step is taken as one, rolled back, and taken again as two of half the length. The difference of the two
+    attempts estimates the error, see `StepError`, from which the next step's length follows, see `PiController`. A step
+    with a larger error than tolerated is rolled back and tried shorter, and so is one that a unit discards, whose
+    outputs are not finite, or whose iteration does not converge; otherwise the units continue from the two halves.
+    Sampled units act at their instants, once; no step reaches beyond one.
 
     Communication points are whole ticks of a grid that divides the schedule's by a power of two, and every instant of
     a sampled unit and the stop time is one of them. What observers see there ends the second half: an output that is a
@@ -95,7 +91,7 @@ class AdaptiveStepper:
             ensemble.instances[unit].can_roll_back = True
 
     def arrive(self, last: int) -> bool:
-        """Let sampled units act that are due; see `Stepper`."""
+        """Let the sampled units that are due act; see `Stepper`."""
         self._last = last * self._per_tick
         due = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick > self._acted[s.unit]]
         self._coupling.arrive(self.time, due, ())
@@ -117,12 +113,12 @@ class AdaptiveStepper:
             try:
                 while not self._attempt(self._length()):
                     self._ensemble.restore(states)
-            except (StepTooSmall, *_TOO_LONG):
+            except (StepTooSmall, *_MAY_BE_TOO_LONG):
                 self._ensemble.restore(states)
                 raise
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return ticks, the step wanted, and what control and inputs remember; see `Stepper`."""
+        """Return the ticks, the step wanted, and the state of step control and extrapolation; see `Stepper`."""
         extrapolated_inputs = self._ensemble.extrapolated_inputs
         return {
             "tick": self._tick,
@@ -137,7 +133,7 @@ class AdaptiveStepper:
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._tick, self._wanted = state["tick"], state["wanted"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self.time = self._seconds(self._tick)
@@ -149,11 +145,11 @@ class AdaptiveStepper:
             self._ensemble.extrapolated_inputs.set_state(state["lines"])
 
     def _attempt(self, length: int) -> bool:
-        """Try a step from where the units are; return whether it was accepted."""
+        """Try a step from the present states of the units; return whether it was accepted."""
         failure: UnitFailure | None = None
         try:
-            worst = self._try(length)
-        except _TOO_LONG as e:
+            worst = self._worst_error(length)
+        except _MAY_BE_TOO_LONG as e:
             failure, worst = e, WorstSignal(e.unit, "", math.inf)
         if worst.error > 1:
             self.statistics.rejected += 1
@@ -171,7 +167,8 @@ class AdaptiveStepper:
         self.time = self._seconds(self._tick)
         return True
 
-    def _try(self, length: int) -> WorstSignal:
+    def _worst_error(self, length: int) -> WorstSignal:
+        """Take a step as a whole, then as two halves, from which the units continue; return the largest difference."""
         with self._ensemble.saved(self._units) as states:
             self._step(self._tick, length)
             whole = self._error.values()
@@ -188,9 +185,10 @@ class AdaptiveStepper:
 
     def _length(self) -> int:
         """Return the length to try: as wanted, but up to the next communication point, in parts of similar length."""
-        left = min(self._last, *self._due.values()) - self._tick if self._due else self._last - self._tick
+        left = min((self._last, *self._due.values())) - self._tick
         if self._wanted >= left:
             return left
+        # At most half of what is left, so that no sliver remains before the communication point; even, to be halved.
         return min(self._wanted, max(2, left // 4 * 2))
 
     def _within_limits(self, length: int) -> int:
@@ -198,7 +196,7 @@ class AdaptiveStepper:
         return length if self._largest is None else min(length, self._largest // 2 * 2)
 
     def _seconds(self, ticks: int) -> float:
-        """Return so many ticks in seconds, rounded once."""
+        """Convert ticks to seconds, rounded once."""
         return ticks * self._grid.numerator / self._grid.denominator
 
 
@@ -211,10 +209,10 @@ def fine_tick(schedule: Schedule, control: AdaptiveStep) -> Fraction:
 
 
 def check_control(system: System, control: AdaptiveStep) -> None:
-    """Check that the step of all units that do not act at instants can be controlled.
+    """Check that the step of all units that are not sampled can follow its error.
 
     Raises:
-        ScheduleError: it cannot; all units are named that are in the way, and signals that are not there.
+        ScheduleError: it cannot; names all units that do not allow it, and uncontrolled signals that do not exist.
     """
     units = [u for u in system.units.values() if not u.sampled]
     faults = [f"{u.name} cannot save its state" for u in units if not u.description.capabilities.saves_state]

@@ -1,8 +1,6 @@
-"""The units of a system in a run: loaded, wired through their buffers, initialised, and freed at the end.
+"""The units of a system in a run: loaded, wired through their buffers, initialised, stepped, and freed at the end.
 
-What has to be done at the end of a run: units terminated, then freed, then their files removed.
-
-Saved states of several units.
+At the end of a run units are terminated, then freed, then their files are removed, whatever of that fails.
 """
 
 import array
@@ -28,21 +26,21 @@ from handover.cosim.system.system import System
 
 
 class CleanupStack:
-    """Things to do at the end, the last one first, each once, whatever becomes of the others."""
+    """Cleanups to run at the end, the last one added first, each once, even where others fail."""
 
     def __init__(self) -> None:
         self._cleanups: collections.deque[Callable[[], object]] = collections.deque()
         self._first_error: Exception | None = None
 
     def add(self, cleanup: Callable[[], object]) -> None:
-        """Have something done before all that was added until now."""
+        """Add a cleanup, which runs before those added until now."""
         self._cleanups.append(cleanup)
 
     def close(self) -> None:
-        """Do what is left. Where one thing did not return, another thread may call this again and goes on after it.
+        """Run what is left. Where a cleanup does not return, another thread may call this again and continues after it.
 
         Raises:
-            Exception: the first that any of it raised, after all was done.
+            Exception: the first that a cleanup raised, after all have run.
         """
         while self._cleanups:
             try:
@@ -63,16 +61,16 @@ class SavedStates(dict[str, State]):
 
 
 class Ensemble:
-    """Loads a system's units and carries out what an algorithm wants of them, one unit at a time.
+    """Loads a system's units and makes the calls that an algorithm asks for, one unit at a time.
 
     Raises:
-        InvalidFmu: an FMU cannot be used; what was loaded until then is freed.
+        InvalidFmu: an FMU is invalid; what was loaded until then is freed.
     """
 
     def __init__(
         self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None
     ) -> None:
-        """Load the units; with `endings` given, whoever gave them carries them out if this fails."""
+        """Load the units; where `cleanups` is given, the caller closes it, also if this fails."""
         self.system = system
         self.heartbeat = heartbeat or Heartbeat()
         self.instances: dict[str, Instance] = {}
@@ -81,7 +79,7 @@ class Ensemble:
         self.measures_cpu = False
         """Whether CPU time is taken of steps."""
         self.extrapolated_inputs: LinearExtrapolation | None = None
-        """What inputs follow that are extrapolated; None where all are held."""
+        """Sets the inputs that are extrapolated; None where all are held."""
         self._feedings: dict[str, Feeding] = {}
         self._finite: dict[str, FiniteCheck] = {}
         self._cleanups = cleanups or CleanupStack()
@@ -103,12 +101,12 @@ class Ensemble:
         ports = {n: u.description.outputs for n, u in self.system.units.items()}
         return Signals({n: i.y for n, i in self.instances.items()}, ports, self)
 
-    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
+    def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:
         """Take all units through initialisation mode.
 
         Args:
             slots: in the order in which they leave it.
-            work_out: is called in between, to set inputs and get outputs in whatever order.
+            compute_values: is called in between, to set inputs and get outputs in any order.
 
         Raises:
             UnitFailure: a unit does not accept its start values or does not initialise.
@@ -116,7 +114,7 @@ class Ensemble:
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
-        work_out()
+        compute_values()
         for slot in slots:
             self.feed(slot.unit, 0.0)
             self.instances[slot.unit].exit_initialization()
@@ -124,14 +122,14 @@ class Ensemble:
             self.publish(slot.unit)
 
     def extrapolate(self, tick: Fraction) -> None:
-        """Let inputs follow lines from here on, the start; steps are whole numbers of `tick`, in seconds."""
+        """Extrapolate inputs linearly from now, the start, on; steps are multiples of `tick`, in seconds."""
         self.extrapolated_inputs = LinearExtrapolation(self.system, self.instances, tick)
 
     def feed(self, unit: str, t: float, dt: float | None = None) -> None:
         """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
 
         Raises:
-            UnitFailure: the unit does not take them.
+            UnitFailure: the unit does not accept them.
         """
         self.gather(unit, t)
         if self.extrapolated_inputs is not None and dt is not None:
@@ -143,25 +141,25 @@ class Ensemble:
         return self._feedings[unit]
 
     def feed_known(self, unit: str, known: Collection[str]) -> None:
-        """Set only the inputs whose sources are units that are known; the others keep what they have.
+        """Set only the inputs whose sources are among the known units; the others keep their values.
 
         Raises:
-            UnitFailure: the unit does not take them.
+            UnitFailure: the unit does not accept them.
         """
         self.gather(unit, 0.0)
         self.set_known(unit, known)
 
     def set_known(self, unit: str, known: Collection[str]) -> None:
-        """Hand over, of the inputs that were gathered, only those whose sources are units that are known.
+        """Set, of the inputs that were gathered, only those whose sources are among the known units.
 
         Raises:
-            UnitFailure: the unit does not take them.
+            UnitFailure: the unit does not accept them.
         """
         sources = self.system.sources_of(unit)
         self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
 
     def gather(self, unit: str, t: float) -> None:
-        """Copy to a unit's buffers what its sources give; it is told by `set_inputs`.
+        """Copy to a unit's buffers what its sources give; `set_inputs` then passes it to the unit.
 
         Raises:
             UnitFailure: a number does not fit its input.
@@ -169,7 +167,7 @@ class Ensemble:
         self._feedings[unit].transfer(t)
 
     def step(self, unit: str, t: float, dt: float) -> None:
-        """Let a unit go from t to t + dt.
+        """Step a unit from t to t + dt.
 
         Raises:
             UnitFailure: its call failed.
@@ -191,7 +189,7 @@ class Ensemble:
             self.extrapolated_inputs.publish(unit)
 
     def save(self, units: Collection[str]) -> SavedStates:
-        """Save the states of units, of all or none; `restore` goes back to them, `forget` frees them.
+        """Save the states of units, of all or none; `restore` rolls back to them, `forget` frees them.
 
         Raises:
             UnitFailure: a unit does not give its state.
@@ -209,8 +207,8 @@ class Ensemble:
     def saved(self, units: Collection[str]) -> Generator[SavedStates, None, None]:
         """Save the states of units for a while, and free them in the end.
 
-        After a failure, which then counts, those are freed that can be; none by a thread whose units were taken from
-        it.
+        After a failure, that failure is raised and the states are freed as far as possible; a thread whose units were
+        taken from it frees none.
 
         Raises:
             UnitFailure: a unit does not give its state.
@@ -234,7 +232,7 @@ class Ensemble:
             self.publish(name)
 
     def forget(self, states: Mapping[str, State]) -> None:
-        """Free saved states, but of units that must not be called any more."""
+        """Free saved states, except those of units that must not be called any more."""
         corrupt = self._corrupt()
         for name, state in states.items():
             if self.system.units[name].description.path not in corrupt:
@@ -246,7 +244,7 @@ class Ensemble:
 
     @contextlib.contextmanager
     def stopwatch(self) -> Generator[Callable[[str], None], None, None]:
-        """Give a function that charges the CPU time since it was last called, or since the start, to a unit."""
+        """Yield a function that charges a unit with the CPU time since its last call, or since the start."""
         began = time.process_time() if self.measures_cpu else 0.0
 
         def charge(unit: str) -> None:
@@ -284,7 +282,7 @@ class Ensemble:
 
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:
-            with contextlib.suppress(CosimError):  # freeing follows whether or not the unit agrees to end
+            with contextlib.suppress(CosimError):  # the unit is freed next, whether or not it terminates properly
                 if not self.is_corrupt(instance):
                     instance.end()
 
@@ -295,7 +293,7 @@ class Ensemble:
             instance.free()
 
     def is_corrupt(self, instance: Instance) -> bool:
-        """Return whether an instance of the same FMU answered Fatal: the standards then forbid calls of all of them."""
+        """Return whether an instance of the same FMU returned Fatal: the standards then forbid calls of all of them."""
         return instance.description.path in self._corrupt()
 
     def _corrupt(self) -> set[Path]:

@@ -1,4 +1,4 @@
-"""Units of which some have events: their steps may end early, and can be taken back."""
+"""Units of which some have events: their steps may end early, be discarded, and be rolled back."""
 
 import contextlib
 import logging
@@ -18,11 +18,11 @@ from handover.cosim.system.system import PlacedUnit, System
 _log = logging.getLogger(__name__)
 
 _MIN_STEP = 2.0**-10
-"""How much of a discarded step the shortest is that is tried."""
+"""The shortest step that is tried, as a part of the discarded one."""
 
 
 class EventEnsemble(Ensemble):
-    """Loads the units that have events in event mode, and keeps of each step what is needed to go back to its begin.
+    """Loads the units that have events in event mode, and saves states at the beginning of steps to roll back to.
 
     Attributes:
         ends: how the last step of each unit ended.
@@ -37,9 +37,9 @@ class EventEnsemble(Ensemble):
         self._staying = [u.name for u in system.units.values() if not u.sampled and not can_roll_back(u)]
         self._warned: set[str] = set()
 
-    def initialize(self, slots: Sequence[Slot], work_out: Callable[[], None]) -> None:
+    def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:
         """Take all units through initialisation mode; those with events are in event mode after that."""
-        super().initialize(slots, work_out)
+        super().initialize(slots, compute_values)
         self._cleanups.add(self._forget_begins)
 
     @property
@@ -48,7 +48,7 @@ class EventEnsemble(Ensemble):
         return {n: i for n, i in self.instances.items() if isinstance(i, EventInstance)}
 
     def step(self, unit: str, t: float, dt: float) -> None:
-        """Let a unit go from t to t + dt, or as far as it goes; `ends` tells.
+        """Step a unit from t to t + dt, or as far as it comes; see `ends`.
 
         Raises:
             UnitFailure: its call failed, or it discards the step and that cannot be repeated shorter.
@@ -63,9 +63,9 @@ class EventEnsemble(Ensemble):
         self.ends[unit] = self._repeat(instance, t, dt, end) if end.discarded else end
 
     def bring(self, unit: str, t: float, dt: float) -> bool:
-        """Take a unit back to the begin of its step, and let it go only by dt, to t; return False if it cannot.
+        """Roll a unit back to the beginning of its step, and step it by dt only, to t; return False if it cannot.
 
-        It keeps the inputs that it had: they are part of its state.
+        Its inputs are those of the step before: they are part of its state.
 
         Raises:
             UnitFailure: its call failed, or it does not come as far as before.
@@ -86,7 +86,7 @@ class EventEnsemble(Ensemble):
         return True
 
     def get_begins(self, units: Iterable[str]) -> dict[str, tuple[float, str]]:
-        """Return where the steps of units began, and their serialised states there; of units that can roll back."""
+        """Return when the steps of units that can roll back began, and their serialised states there."""
         begins: dict[str, tuple[float, str]] = {}
         for unit in units:
             if unit in self._begun:
@@ -96,17 +96,17 @@ class EventEnsemble(Ensemble):
         return begins
 
     def set_begins(self, begins: Mapping[str, tuple[float, str]]) -> None:
-        """Take over what `get_begins` gave."""
+        """Restore what `get_begins` returned."""
         for unit, (begin, state) in begins.items():
             with self._at(unit, lambda i, state=state: i.deserialise_state(bytes.fromhex(state))):
                 self._keep_begin(unit, begin)
 
     @contextlib.contextmanager
-    def _at(self, unit: str, go: Callable[[Instance], None]) -> Generator[Instance, None, None]:
-        """Let a unit be in another state for a while."""
+    def _at(self, unit: str, set_state: Callable[[Instance], None]) -> Generator[Instance, None, None]:
+        """Put a unit into another state for a while."""
         instance = self.instances[unit]
         with self.saved([unit]) as here:
-            go(instance)
+            set_state(instance)
             yield instance
             instance.restore_state(here[unit])
 
@@ -133,7 +133,7 @@ class EventEnsemble(Ensemble):
 
     def _forget_begins(self) -> None:
         for unit in list(self._begun):
-            with contextlib.suppress(CosimError):  # ending goes on whether or not the unit agrees
+            with contextlib.suppress(CosimError):  # termination continues, whether or not the unit accepts this
                 self._forget_begin(unit)
 
     def _forget_begin(self, unit: str) -> None:
@@ -148,12 +148,12 @@ class EventEnsemble(Ensemble):
 
 
 def can_roll_back(unit: PlacedUnit) -> bool:
-    """Whether a unit's step can be taken back and repeated shorter."""
+    """Return whether a unit's step can be rolled back and repeated shorter."""
     return unit.description.capabilities.saves_state and unit.description.capabilities.varies_step
 
 
 def _unable(units: Iterable[str]) -> str:
-    text = ", ".join(units)
+    names = ", ".join(units)
     return (
-        f"{text} cannot save its state or vary its step (canGetAndSetFMUstate, canHandleVariableCommunicationStepSize)"
+        f"{names} cannot save its state or vary its step (canGetAndSetFMUstate, canHandleVariableCommunicationStepSize)"
     )

@@ -1,4 +1,4 @@
-"""The event iteration: units in event mode, at one instant, until none changes any more. FMI 3.0, sec. 2.2.10."""
+"""The event iteration: units in event mode exchange values, at one instant, until none changes. FMI 3.0, 2.2.10."""
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
@@ -9,15 +9,15 @@ from handover.cosim.fmu.failures import UnsettledEvents
 from handover.cosim.stepping.event_ensemble import EventEnsemble
 
 MAX_ITERATIONS = 100
-"""Most iterations at one instant, and most rounds of values within one."""
+"""Limit of iterations at one instant, and of exchanges of values within one."""
 
 
 class EventIteration:
     """Settles what happens at one instant.
 
-    In an iteration values go round between the units in event mode, in the schedule's order, until none changes; then
-    all update their discrete states, which ends the ticks of clocks. A unit joins when it has an event, when a clock of
-    its own is due, when an output clock lets one of its clocks tick, or when a discrete input changes.
+    In an iteration the units in event mode exchange values, in the schedule's order, until none changes; then all
+    update their discrete states, which ends the ticks of clocks. A unit joins when it has an event, when a clock of its
+    own is due, when an output clock makes one of its clocks tick, or when a discrete input changes.
     """
 
     def __init__(self, ensemble: EventEnsemble, order: Sequence[str]) -> None:
@@ -29,13 +29,13 @@ class EventIteration:
             self._triggers[c.source.unit, c.source.port].append((c.target.unit, c.target.port))
 
     def settle(self, t: float, flagged: Collection[str], present: Collection[str]) -> set[str]:
-        """Settle the instant t, beginning with units that have an event; `present` are those that stand at t.
+        """Settle the instant t, beginning with units that have an event; `present` are those that are at t.
 
         Returns:
             The units that were in event mode; all are in step mode again.
 
         Raises:
-            UnsettledEvents: there is no end. UnitTerminated: a unit wants the simulation to end.
+            UnsettledEvents: the iteration does not end. UnitTerminated: a unit terminates the simulation.
             UnitFailure: a call failed, or a unit would have to tick that is not at t.
         """
         inside = {n for n in self._units if self._units[n].in_event_mode}
@@ -68,15 +68,15 @@ class EventIteration:
         return [timer.clock.name for timer in timers if timer.is_due(t)]
 
     def _exchange(self, t: float, present: Collection[str], inside: set[str]) -> None:
-        """Let values and ticks go round until none changes."""
-        pending, entries = set(inside), set[tuple[str, str]]()
+        """Exchange values and ticks until none changes."""
+        pending, ticked = set(inside), set[tuple[str, str]]()
         changed = set[str]()
         for _ in range(MAX_ITERATIONS):
             joining = self._disturbed(t, present) - inside
             for unit in self._ordered(joining):
                 self._enter(unit, inside)
             pending |= joining
-            changed = {n for n in self._ordered(inside) if self._pass_on(t, n, pending, entries, present, inside)}
+            changed = {n for n in self._ordered(inside) if self._pass_on(t, n, pending, ticked, present, inside)}
             if not changed:
                 return
         raise UnsettledEvents(self._ordered(changed), t, MAX_ITERATIONS, "the exchange in event mode")
@@ -86,11 +86,11 @@ class EventIteration:
         t: float,
         unit: str,
         pending: set[str],
-        entries: set[tuple[str, str]],
+        ticked: set[tuple[str, str]],
         present: Collection[str],
         inside: set[str],
     ) -> bool:
-        """Give a unit its inputs and fetch what comes of them; return False where nothing has changed."""
+        """Set a unit's inputs and fetch the outputs that follow; return False where nothing has changed."""
         instance = self._units[unit]
         self._ensemble.gather(unit, t)
         if instance.has_other_inputs():
@@ -99,7 +99,7 @@ class EventIteration:
             return False
         pending.discard(unit)
         self._ensemble.publish(unit)
-        ticks = {(unit, clock) for clock in instance.ticking()} - entries
+        ticks = {(unit, clock) for clock in instance.ticking()} - ticked
         if ticks:
             self._ensemble.publish(unit)  # once more, for what can be reached while the clock ticks
         for target, clock in (end for tick in sorted(ticks) for end in self._triggers[tick]):
@@ -107,23 +107,23 @@ class EventIteration:
             self._enter(target, inside)
             self._units[target].tick([clock])
             pending.add(target)
-        entries |= ticks
+        ticked |= ticks
         return True
 
     def _check_present(self, t: float, unit: str, clock: str, present: Collection[str]) -> None:
         if unit not in present:
             at = self._ensemble.instances[unit].time
-            entries = f"that its clock {clock} ticks while it is at t = {at:.9g} s, and it cannot roll back"
-            raise UnitFailure(unit, "fmi3SetClock", t, entries)
+            fault = f"that its clock {clock} ticks while it is at t = {at:.9g} s, and it cannot roll back"
+            raise UnitFailure(unit, "fmi3SetClock", t, fault)
 
     def _disturbed(self, t: float, present: Collection[str]) -> set[str]:
         """Return the units at t whose discrete inputs have changed."""
-        found: set[str] = set()
+        disturbed: set[str] = set()
         for unit in self._ordered(present):
             self._ensemble.gather(unit, t)
             if self._units[unit].wants_inputs():
-                found.add(unit)
-        return found
+                disturbed.add(unit)
+        return disturbed
 
     def _ordered(self, units: Collection[str]) -> list[str]:
         return [n for n in self._units if n in units]

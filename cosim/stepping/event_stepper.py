@@ -1,7 +1,4 @@
-"""Steps that end at events too: the schedule's grid, and between its points the instants at which something happens.
-
-What does not go together with steps that may end anywhere.
-"""
+"""Steps that end at events too: communication points are those of the schedule's grid and the instants of events."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from handover.cosim.exceptions import ScheduleError
+from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.failures import UnsettledEvents
 from handover.cosim.stepping.event_ensemble import EventEnsemble
 from handover.cosim.stepping.event_iteration import MAX_ITERATIONS, EventIteration
@@ -21,7 +19,7 @@ from handover.cosim.system.system import System
 
 @dataclass
 class Course:
-    """How far a continuous unit has come: the step that it took last, from `begun` to `reached`, in seconds."""
+    """The last step of a continuous unit, from `begun` to `reached`, in seconds, and whether it ended at an event."""
 
     period: Fraction
     begun: Fraction = Fraction(0)
@@ -30,19 +28,20 @@ class Course:
 
 
 class EventStepper:
-    """Communication points are the schedule's, and every instant at which a unit that has events wants one.
+    """Communication points are the schedule's, and every instant at which a unit has an event.
 
     - A step ends at the next multiple of the unit's period, or before it at an event that is known: a tick of a clock
       or a `nextEventTime`, of any unit where the unit can vary its step, else of its own.
-    - Where a unit returns early, all that can roll back (they save states and vary their steps) are taken back to the
-      begin of their steps and come to the instant too, with the inputs they had; the others stay at the ends of their
-      steps, which the log says once. Sampled units hold between their instants anyway.
+    - Where a unit returns early, all that can roll back (they save states and vary their steps) are rolled back to the
+      beginning of their steps and step to the instant too, with the inputs they had; the others stay at the ends of
+      their steps, which is logged once. Sampled units hold their outputs between their instants anyway.
     - At such an instant the event iteration settles what changes, then sampled units act on that, and what they change
       in turn is settled; observers see the instant once, after all of it.
-    - A unit that returns at once, without getting on, has its event settled by itself, after observers saw the instant.
+    - A unit that returns early where its step began has its event settled by itself, after observers saw the instant.
     - A step that is discarded and repeated shorter is like an early return without an event.
 
-    Times are exact: whole periods and clocks' intervals are fractions that are added up, events are the units' floats.
+    Times are exact: periods and clocks' intervals are fractions that are added up, events are the units' floats. Two
+    times count as the same instant when they are the same double, as this is what units get.
     """
 
     def __init__(self, schedule: Schedule, ensemble: EventEnsemble, coupling: Coupling) -> None:
@@ -65,7 +64,7 @@ class EventStepper:
         self.time = float(self._now)
         flagged = self._flagged()
         if flagged or self._is_between():
-            self._bring_back()
+            self._roll_back()
         present = self._present()
         self._coupling.arrive(self.time, [], self._continuous())
         self._iteration.settle(self.time, flagged, present)
@@ -81,7 +80,7 @@ class EventStepper:
         """Step what is due.
 
         Raises:
-            UnsettledEvents: units return early again and again without getting on. UnitFailure: a call failed.
+            UnsettledEvents: units return early again and again without advancing. UnitFailure: a call failed.
         """
         sampled = self._sampled()
         self._step(sampled, self._continuous())
@@ -107,7 +106,7 @@ class EventStepper:
             course.reached = Fraction(end.reached) if end.early and end.reached < float(target) else target
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return times, what the coupling keeps, and states to which units ahead may have to go back; see `Stepper`."""
+        """Return times, the coupling's state, and states to which units ahead may have to roll back; see `Stepper`."""
         ahead = [n for n, c in self._courses.items() if float(c.reached) > self.time]
         return {
             "coupling": self._coupling.get_state(),
@@ -120,7 +119,7 @@ class EventStepper:
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to times that `get_state` gave."""
+        """Restore the times that `get_state` returned."""
         self._now = Fraction(state["now"])
         self.time = float(self._now)
         self._due = {n: Fraction(t) for n, t in state["due"].items()}
@@ -143,7 +142,7 @@ class EventStepper:
         return [s for s in self._schedule.sampled if float(self._due[s.unit]) == self.time]
 
     def _flagged(self) -> list[str]:
-        """Return the units at this point that have an event: in step mode they told, or they told beforehand."""
+        """Return the units at this point that have an event: reported by the step that ended here or announced."""
         units = self._ensemble.event_units
         return [
             n
@@ -158,8 +157,8 @@ class EventStepper:
         """Whether a unit at this point is there before its period has passed."""
         return any(float(c.reached) == self.time and c.reached % c.period for c in self._courses.values())
 
-    def _bring_back(self) -> None:
-        """Bring the units that are ahead to this point, where they can roll back."""
+    def _roll_back(self) -> None:
+        """Roll back the units that are ahead and step them to this point, where they can."""
         for unit, course in self._courses.items():
             if float(course.reached) <= self.time:
                 continue
@@ -167,34 +166,33 @@ class EventStepper:
                 course.reached, course.event = self._now, self._ensemble.ends[unit].event
 
     def _target(self, unit: str) -> Fraction:
-        """Return where a step from here ends: after the period, or at an event known before."""
+        """Return when a step from here ends: after the period, or at an event that is known before."""
         period = self._courses[unit].period
         target = (math.floor(self._now / period) + 1) * period
         while float(target) <= self.time:
             target += period
-        known = self._known(self._ensemble.event_units if unit in self._adapting else [unit])
-        return min((k for k in known if self.time < float(k) < float(target)), default=target)
+        event_units = self._ensemble.event_units
+        watched = event_units if unit in self._adapting else event_units.keys() & {unit}
+        times = (t for name in watched for t in _announced(event_units[name]))
+        return min((t for t in times if self.time < float(t) < float(target)), default=target)
 
-    def _known(self, units: Sequence[str] | Mapping[str, Any]) -> list[Fraction]:
-        """Return when the units have events that they know."""
-        found: list[Fraction] = []
-        for instance in (self._ensemble.event_units[n] for n in units if n in self._ensemble.event_units):
-            found += [t.next for t in instance.timers if t.next is not None]
-            if instance.next_event is not None:
-                found.append(Fraction(instance.next_event))
-        return found
+
+def _announced(instance: EventInstance) -> list[Fraction]:
+    """Return the times of events that a unit has announced: ticks of its clocks, and its `nextEventTime`."""
+    times = [timer.next for timer in instance.timers if timer.next is not None]
+    return times if instance.next_event is None else [*times, Fraction(instance.next_event)]
 
 
 def has_events(system: System, options: MasterOptions) -> bool:
-    """Whether steps may end off the grid at events, or where one is discarded; an adaptive step repeats by itself."""
+    """Return whether steps may end off the grid, at events or discarded; an adaptive stepper repeats steps itself."""
     return system.has_events or (options.repeat_discarded and options.adaptive is None)
 
 
 def check_off_grid(system: System, options: MasterOptions) -> None:
-    """Refuse what is defined for steps on a grid only; `check_control` refuses events where the step follows the error.
+    """Reject options that need all steps on a grid; `check_control` rejects events where the step follows the error.
 
     Raises:
-        ScheduleError: inputs are to be extrapolated, though steps may end anywhere.
+        ScheduleError: inputs are to be extrapolated, although steps may end anywhere.
     """
     if not has_events(system, options):
         return

@@ -1,7 +1,4 @@
-"""Inputs that follow the lines through the last two points of their sources.
-
-An output at its last two communication points.
-"""
+"""Linear extrapolation of inputs: each follows the line through its source's values at the last two points."""
 
 from collections import defaultdict
 from collections.abc import Collection, Mapping
@@ -19,11 +16,16 @@ from handover.cosim.system.system import Connection, PortName, System
 Moments = tuple[int, NDArray[np.float64], int, NDArray[np.float64]]
 """Tick and values before, tick and values last; the arrays are not written to again."""
 
+Memory = Mapping[str, Any]
+"""What is remembered of one unit: the tick at which it is, and its outputs' moments by port."""
+
+_NONE: Mapping[str, NDArray[np.float64]] = {}
+
 
 class SampleHistory:
-    """The line through an output's last two points; level while there is one point only.
+    """An output at its last two communication points, and the line through them; level while there is only one.
 
-    `values` is where the output's values live.
+    `values` is the array that the output's values are fetched to.
     """
 
     def __init__(self, values: NDArray[Any]) -> None:
@@ -37,7 +39,7 @@ class SampleHistory:
         return self.moments[3]
 
     def record(self, tick: int) -> None:
-        """Take the values as those of a tick: of the last one once more, or of a later one."""
+        """Record the present values as those of a tick: the last one again, or a later one."""
         before, was, last, is_ = self.moments
         here = np.array(self._values, dtype=np.float64)
         self.moments = (last, is_, tick, here) if tick > last else (before, was, last, here)
@@ -60,20 +62,14 @@ class SampleHistory:
         return [before, was.tolist(), last, is_.tolist()]
 
     def set_state(self, state: list[Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         before, was, last, is_ = state
         self.moments = (before, np.array(was, dtype=np.float64), last, np.array(is_, dtype=np.float64))
 
 
-Memory = Mapping[str, Any]
-"""What is remembered of one unit: the tick at which it is, and its outputs' moments by port."""
-
-_NONE: Mapping[str, NDArray[np.float64]] = {}
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Line:
-    """An input, the trace of its source, and where in the step the input is evaluated, in halves of the step."""
+    """An input, the history of its source, and where in the step the input is evaluated, in halves of the step."""
 
     port: str
     history: SampleHistory
@@ -96,25 +92,23 @@ class _Line:
 
 
 class LinearExtrapolation:
-    """Sets inputs on the lines through what their sources gave at their last two communication points.
+    """Sets inputs on the lines through the values that their sources had at their last two communication points.
 
-    The line is drawn on where the source is not yet as far as the unit, and lies between two values of the source where
-    that has stepped already (Gauss-Seidel) or is slower than the unit. A line begins level. The places on it are ratios
-    of whole ticks.
+    A line is extrapolated where the source is not yet as far as the unit, and interpolated between two values of the
+    source where that has stepped already (Gauss-Seidel) or is slower than the unit. At the start it is level. Times on
+    it are counted in whole and half ticks.
 
     A unit of FMI 2 that interpolates inputs gets the value at the begin of its step, and the slope. Any other holds an
     input over its step, so one value must stand for the step:
-    - the one in its middle. The integral of a line over the step is the length times this value, so that states come
-      out to second order in the step.
+    - the one in its middle. The integral of a line over the step is the length times this value, so that states are
+      exact to second order in the step.
     - the one at its end, for an input that is declared to have direct feedthrough to an output that feeds another unit:
-    the output
-      counts for the end of the step, and so must what it follows. States of such a unit come out to first order.
+      the output counts for the end of the step, and so must the input. States of such a unit are exact to first order.
 
-    Where units iterate, an input that leads back in a cycle follows the line from what its source gave last to what
-    it is presumed to be at the end of the step.
+    Where units iterate, an input that leads back in a cycle follows the line from its source's last value to the value
+    that the iteration presumes at the end of the step.
 
-    Only real values that change between instants follow lines. What is discrete, or comes from or goes to a unit that
-    acts at instants, is held.
+    Only continuous real values are extrapolated. Discrete ones, and those from or to a sampled unit, are held.
     """
 
     def __init__(self, system: System, instances: Mapping[str, Instance], tick: Fraction) -> None:
@@ -130,12 +124,12 @@ class LinearExtrapolation:
         for name, fed in ports.items():
             if instances[name].description.capabilities.interpolates_inputs:
                 instances[name].interpolate(fed)
-        at_once = _feedthrough_inputs(system)
+        feedthrough = _feedthrough_inputs(system)
         for c in followed:
-            self._lines[c.target.unit].append(self._line(system, c, at_once=c.target in at_once))
+            self._lines[c.target.unit].append(self._line(system, c, feedthrough=c.target in feedthrough))
 
     def feed(self, unit: str, t: float, dt: float, ends: Mapping[str, NDArray[np.float64]] = _NONE) -> None:
-        """Write the inputs that follow lines, for a step from t to t + dt; `ends` are presumed values, by port."""
+        """Write the extrapolated inputs for a step from t to t + dt; `ends` are presumed values at its end, by port."""
         at, long = 2 * self._ticks(t), self._ticks(dt)
         for line in self._lines[unit]:
             if line.port in ends:
@@ -144,20 +138,20 @@ class LinearExtrapolation:
                 line.follow(at + line.halves * long, self._tick)
 
     def step(self, unit: str) -> None:
-        """Take note that a unit has gone on."""
+        """Record that a unit has stepped."""
         self._at[unit] = self._ticks(self._instances[unit].time)
 
     def publish(self, unit: str) -> None:
-        """Take note of a unit's outputs where it is."""
+        """Record a unit's outputs at its present tick."""
         for history in self._histories[unit].values():
             history.record(self._at[unit])
 
     def save(self, units: Collection[str]) -> dict[str, Memory]:
-        """Return what is remembered of units, for `restore`."""
+        """Return the histories of units, for `restore`."""
         return {u: {"at": self._at[u], "moments": {p: t.moments for p, t in self._histories[u].items()}} for u in units}
 
     def restore(self, memories: Mapping[str, Memory]) -> None:
-        """Go back to what `save` gave."""
+        """Restore what `save` returned."""
         for unit, memory in memories.items():
             self._at[unit] = memory["at"]
             moments: Mapping[str, Moments] = memory["moments"]
@@ -165,18 +159,18 @@ class LinearExtrapolation:
                 self._histories[unit][port].moments = then
 
     def get_state(self) -> dict[str, Any]:
-        """Return all that is remembered as JSON can hold it."""
+        """Return all histories as JSON can hold them."""
         histories = {u: {p: t.get_state() for p, t in ts.items()} for u, ts in self._histories.items()}
         return {"at": dict(self._at), "traces": histories}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._at = dict(state["at"])
         for unit, histories in self._histories.items():
             for port, history in histories.items():
                 history.set_state(state["traces"][unit][port])
 
-    def _line(self, system: System, c: Connection, *, at_once: bool) -> _Line:
+    def _line(self, system: System, c: Connection, *, feedthrough: bool) -> _Line:
         target, histories = self._instances[c.target.unit], self._histories[c.source.unit]
         values = self._instances[c.source.unit].y[c.source.port][0]
         rate = target.du.get(c.target.port)
@@ -185,7 +179,7 @@ class LinearExtrapolation:
             history=histories.setdefault(c.source.port, SampleHistory(values)),
             target=target.u[c.target.port][0],
             change=system.change_by(c) or LinearTransformation(),
-            halves=0 if rate else 2 if at_once else 1,
+            halves=0 if rate else 2 if feedthrough else 1,
             rate=rate[0] if rate else None,
         )
 

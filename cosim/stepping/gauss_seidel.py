@@ -1,7 +1,4 @@
-"""Units step one after another, each from the newest values.
-
-Steps groups of units one after another; the units of a circle until they agree.
-"""
+"""Gauss-Seidel coupling: units step one after another, each from the newest values; those of a cycle iterate."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -19,13 +16,13 @@ MakeSolver = Callable[[Interface], InterfaceSolver]
 
 
 class GroupStepping:
-    """Takes groups in the order given. Of a circle whose units have several rates, those iterate that are due.
+    """Steps groups in the order given. Of a cycle whose units have several rates, those that are due iterate.
 
     Args:
         ensemble: the units.
         groups: all units that may be due.
-        make_solver: gives each circle a solver of its own.
-        count: is told of iterated steps.
+        make_solver: makes a solver for each cycle.
+        count: counts the iterated steps.
     """
 
     def __init__(
@@ -45,7 +42,7 @@ class GroupStepping:
         """Step units that are due.
 
         Raises:
-            UnitFailure: a unit's call failed. NotConverged: a circle did not come to agree.
+            UnitFailure: a unit's call failed. NotConverged: a cycle did not converge.
         """
         in_order = sorted(due, key=lambda slot: self._place[slot.unit])
         for cycle, members in itertools.groupby(in_order, key=self._cycle_index):
@@ -57,20 +54,20 @@ class GroupStepping:
                 iterated.step(t, slots)
 
     def get_state(self) -> list[Any]:
-        """Return, by units that iterate together, what their solver has learnt; JSON can hold it."""
+        """Return the state of each solver with the units that iterate with it, as JSON can hold it."""
         return [[list(units), step.solver.get_state()] for units, step in self._iterated.items() if step is not None]
 
     def set_state(self, state: list[Any]) -> None:
-        """Go back to where `get_state` was called."""
+        """Restore what `get_state` returned."""
         self._iterated.clear()
-        for units, learnt in state:
+        for units, solver_state in state:
             step = self._make(self._groups[self._place[units[0]][0]], units)
             if step is not None:
-                step.solver.set_state(learnt)
+                step.solver.set_state(solver_state)
             self._iterated[tuple(units)] = step
 
     def _cycle_index(self, slot: Slot) -> int | None:
-        """Return the place of the group that a unit iterates with; None for those that step by themselves."""
+        """Return the index of the group that a unit iterates with; None for one that steps by itself."""
         i, _ = self._place[slot.unit]
         return i if self._groups[i].cycle else None
 
@@ -96,11 +93,11 @@ class GroupStepping:
 
 
 class GaussSeidel:
-    """At t, sampled units act on the values at t, then observers see all signals, then the others go on from t.
+    """At t, sampled units act on the values at t, then observers see all signals, then the others step from t.
 
     Units of a group with a cycle are iterated until they converge, see `IteratedStep`. With groups that hold the
     algebraic loops only, this solves those and is Gauss-Seidel for the rest; with groups of all units whose data flow
-    in a circle, it is the iterated (strong, implicit) coupling.
+    is cyclic, it is the iterated (strong, implicit) coupling.
 
     Source: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49; the iterated coupling R. Kuebler,
     W. Schiehlen, Two methods of simulator coupling, Math. Comput. Model. Dyn. Syst. 6 (2000) 93-113.
@@ -108,7 +105,7 @@ class GaussSeidel:
     Args:
         ensemble: the units.
         sampled, continuous: groups of all units, each in the order in which they step.
-        make_solver: gives a circle its solver.
+        make_solver: makes a solver for each cycle.
     """
 
     def __init__(
@@ -119,22 +116,22 @@ class GaussSeidel:
         self._continuous = GroupStepping(ensemble, continuous, make_solver, self.count)
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
-        """Let sampled units turn the values at t into further values at t."""
+        """Step the sampled units, whose outputs count at t itself."""
         self._sampled.step(t, sampled)
 
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
-        """Step the others; what they give counts for those that follow."""
+        """Step the others, each with the outputs of those before it at the end of the step."""
         self._continuous.step(t, continuous)
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return what was learnt and counted, nothing where no unit iterates; see `Coupling`."""
+        """Return the solvers' states and the counts, nothing where no unit iterates; see `Coupling`."""
         if not self.count.steps:
             return {}
         sampled, continuous = self._sampled.get_state(), self._continuous.get_state()
         return {"sampled": sampled, "continuous": continuous, "count": self.count.get_state()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._sampled.set_state(state.get("sampled", []))
         self._continuous.set_state(state.get("continuous", []))
         self.count.set_state(state.get("count", IterationCount().get_state()))

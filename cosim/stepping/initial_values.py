@@ -1,7 +1,4 @@
-"""Works out the values of all signals at the start, algebraic loops included.
-
-Derivatives of a circle of units at an instant, from what each unit says of its own.
-"""
+"""Computes consistent values of all signals at the start; algebraic loops are solved, with derivatives if possible."""
 
 from collections.abc import Sequence
 
@@ -19,11 +16,11 @@ from handover.cosim.system.system import Connection
 
 
 class ChainedDerivatives:
-    """dg/dx, where x are the inputs that lead back and g what comes out for them when units act one after another.
+    """dg/dx, where x are the inputs that lead back in a cycle, and g(x) their sources after all units are evaluated.
 
-    A direction goes through the circle as values do: through each unit by its directional derivative, along each
-    connection by the factor of its conversion. It holds at an instant, with the units' states as they are; how a step's
-    end depends on inputs that are held over it is another matter, which units do not tell.
+    By the chain rule, a direction passes the cycle as values do: each unit by its directional derivative, each
+    connection by the factor of its conversion. It holds at an instant, with the units' states as they are. How outputs
+    at the end of a step depend on inputs that are held over it is another derivative, which FMI does not give.
     """
 
     def __init__(self, ensemble: Ensemble, group: Group, interface: Interface) -> None:
@@ -44,7 +41,7 @@ class ChainedDerivatives:
 
     @property
     def are_given(self) -> bool:
-        """Whether all units say that they give directional derivatives."""
+        """Whether all units declare that they give directional derivatives."""
         units = self._ensemble.system.units
         return all(units[name].description.capabilities.directional_derivatives for name in self._units)
 
@@ -80,17 +77,17 @@ class ChainedDerivatives:
 
 
 class InitialValues:
-    """Goes through units in initialisation mode, where inputs may be set and outputs fetched as often as one likes.
+    """Evaluates units in initialisation mode, where inputs may be set and outputs fetched as often as one likes.
 
     Each unit gets the outputs of those before it; inputs whose source is not known yet keep their start values. The
-    units of an algebraic loop are gone over until they agree, from the values that start values lead to; with
-    directional derivatives where all of them give those.
+    units of an algebraic loop are evaluated until their values converge, from those that the start values lead to;
+    with directional derivatives where all of them give those.
 
     Args:
         ensemble: the units, to be in initialisation mode when this is called.
-        groups: all units, those of loops together, in an order in which values can be worked out.
-        passes: how often to go through them.
-        make_solver: gives a loop its solver.
+        groups: all units, those of a loop together, in the order of evaluation.
+        passes: how often to go through the groups.
+        make_solver: makes a solver for each loop.
     """
 
     def __init__(self, ensemble: Ensemble, groups: Sequence[Group], passes: int, make_solver: MakeSolver) -> None:

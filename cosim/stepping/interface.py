@@ -1,7 +1,4 @@
-"""The inputs that lead back in a cycle of units, as one vector of numbers.
-
-When signals of unlike size count as settled.
-"""
+"""The inputs that lead back in a cycle of units, as one vector, and when its numbers of unlike size have converged."""
 
 from collections.abc import Sequence
 
@@ -17,14 +14,14 @@ from handover.cosim.system.system import Connection
 class Magnitudes:
     """Measures differences of signals against how large each signal is.
 
-    A signal counts as large as the largest value that it has had in a solution, and at least as large as its floor:
-    what it is nominally, or a small number, so that a signal that rests at zero converges. Differences divided by these
-    magnitudes have no unit and can be compared.
+    A signal's magnitude is the largest value that it has had in a solution, but at least its floor: its nominal value,
+    or a small number, so that a signal that rests at zero converges. Differences divided by magnitudes have no unit and
+    can be compared.
 
     Args:
         tolerance: the largest difference, relative to a signal's magnitude, at which it counts as converged.
-        floors: least magnitude of each signal, in its unit.
-        perturbations: by which part of its magnitude each signal is moved to see what it acts on.
+        floors: smallest magnitude of each signal, in its unit.
+        perturbations: by which part of its magnitude each signal is perturbed for differences.
     """
 
     def __init__(self, tolerance: float, floors: Floats, perturbations: Floats) -> None:
@@ -37,24 +34,24 @@ class Magnitudes:
         return np.maximum(self._largest, np.abs(x))
 
     def perturbations(self, x: Floats) -> Floats:
-        """Return by how much to move each signal from x to see what it acts on."""
+        """Return by how much to perturb each signal from x for forward differences."""
         return self._perturbations * self.of(x)
 
     def moving(self, x: Floats, residual: Floats) -> NDArray[np.bool_]:
-        """Tell which signals have not converged; what is not a number has not."""
+        """Return which signals have not converged; NaN has not."""
         return ~(np.abs(residual) <= self.tolerance * self.of(x))
 
     def length(self, x: Floats, residual: Floats) -> float:
-        """Return the length of a difference of signals that have the values x."""
+        """Return the norm of a difference relative to the magnitudes of signals that have the values x."""
         return float(np.linalg.norm(self.shares(x, residual)))
 
     def shares(self, x: Floats, residual: Floats) -> Floats:
-        """Return the parts that differences make of the magnitudes of signals that have the values x."""
-        parts: Floats = np.abs(residual) / self.of(x)
-        return np.nan_to_num(parts, nan=np.inf)
+        """Return differences relative to the magnitudes of signals that have the values x."""
+        shares: Floats = np.abs(residual) / self.of(x)
+        return np.nan_to_num(shares, nan=np.inf)
 
     def learn(self, x: Floats) -> None:
-        """Remember how large the signals of a solution are."""
+        """Raise the magnitudes to those of a solution."""
         self._largest = self.of(x)
 
     def get_state(self) -> list[float]:
@@ -62,14 +59,14 @@ class Magnitudes:
         return self._largest.tolist()
 
     def set_state(self, state: list[float]) -> None:
-        """Go back to magnitudes that `get_state` gave."""
+        """Restore the magnitudes that `get_state` returned."""
         self._largest = np.array(state)
 
 
 _SMALL = 1e-3
-"""The least magnitude of a signal of which neither its nominal one nor any other value is known."""
+"""Smallest magnitude of a signal that has no nominal value."""
 _PERTURBATION = {Width.FLOAT64: 1e-6, Width.FLOAT32: 1e-3}
-"""Parts of a signal's magnitude that lie between its curvature and its rounding."""
+"""Relative perturbations: large against rounding, small against the range in which g is linear."""
 
 
 class Interface:
@@ -111,7 +108,7 @@ class Interface:
         return {port: x[place] for port, place, _ in self._places.get(unit, ())}
 
     def magnitudes(self, tolerance: float) -> Magnitudes:
-        """Return what measures the numbers, before any values are known."""
+        """Return the magnitudes of the numbers, before any values are known."""
         return Magnitudes(tolerance, np.array(self._floors), np.array(self._perturbations))
 
     def _add(self, c: Connection) -> None:

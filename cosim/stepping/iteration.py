@@ -1,9 +1,4 @@
-"""One step of units that act on each other in a cycle, iterated until they converge.
-
-How much work iterating was.
-
-What a run ends with when units do not come to agree.
-"""
+"""One step of units that act on each other in a cycle, iterated until they converge, or the failure to do so."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -23,13 +18,13 @@ from handover.cosim.system.schedule import Slot
 
 @dataclass
 class IterationCount:
-    """Counts of a run so far, at its start not included.
+    """Counts of a run so far, those of its initialisation not included.
 
     Attributes:
         steps: steps that were iterated; units that act on each other in a cycle make one together.
-        iterations: how often all units of a circle stepped to see whether they agree.
-        rollbacks: how often they went back to the beginning of a step, for that or to see what acts on what.
-        most: the most iterations of a step.
+        iterations: how often all units of a cycle stepped to see whether they have converged.
+        rollbacks: how often they rolled back to the beginning of a step, to iterate or to take differences.
+        most: the maximum of iterations of a step.
     """
 
     steps: int = 0
@@ -49,7 +44,7 @@ class IterationCount:
         return asdict(self)
 
     def set_state(self, state: Mapping[str, int]) -> None:
-        """Go back to counts that `get_state` gave."""
+        """Restore the counts that `get_state` returned."""
         for name, count in state.items():
             setattr(self, name, count)
 
@@ -64,18 +59,18 @@ class IterationCount:
 
 
 class NotConverged(UnitFailure):
-    """Units that act on each other in a cycle did not come to agree at a time.
+    """The iteration of units that act on each other in a cycle did not converge at a time.
 
     Attributes:
         units: their names.
         loop: the algebraic loop spelled out where it is one, or an empty text.
-        why: what the solver says.
-        iterations: how often it tried.
-        moving: the signals that still move, those that move most first; how far each is from what its source gives.
+        why: the reason that the solver gives.
+        iterations: how many it made.
+        moving: the signals that have not converged, the worst first, each with its distance from its source's value.
     """
 
     kind: ClassVar[str] = "not_converged"
-    verdict: ClassVar[str] = "units did not come to agree"
+    verdict: ClassVar[str] = "coupled units did not converge"
 
     def __init__(
         self,
@@ -95,7 +90,7 @@ class NotConverged(UnitFailure):
     def what(self) -> str:
         """What happened, to be read after the call."""
         count = f"{self.iterations} iteration{'s' if self.iterations > 1 else ''}"
-        return f"came to no solution in {count}: {self.why}"
+        return f"found no solution in {count}: {self.why}"
 
     @property
     def message(self) -> str:
@@ -119,19 +114,19 @@ def not_converged(
 
 
 class IteratedStep:
-    """Lets units step one after another until the inputs that lead back have the values that come out at the end.
+    """Steps units one after another until the inputs that lead back equal their sources at the end of the step.
 
-    Each goes from t with its inputs held at the values of the end of the step, or where inputs are extrapolated with
-    inputs that lie on the line from the values of t to those. States are saved before and restored for each further
-    iteration. Inputs that lead back but are not real keep the values of t. FMI leaves no other way to outputs for other
-    inputs: after a step, outputs may not be fetched again once inputs are set.
+    Each steps from t with its inputs held at the values of the end of the step, or where inputs are extrapolated, with
+    inputs on the line from the values at t to those. States are saved before and restored for each further iteration:
+    FMI knows no other way to the outputs for other inputs, as after a step outputs may not be fetched again once inputs
+    are set. Inputs that lead back but are not real keep the values at t.
 
     Args:
         ensemble: the units.
         interface: the inputs that lead back.
-        solver: finds their values; it keeps what it learns from step to step.
-        count: is told of each step.
-        loop: the algebraic loop spelled out where they are in one.
+        solver: finds their values; it keeps its state from step to step.
+        count: counts the steps.
+        loop: the algebraic loop spelled out, if they are in one.
     """
 
     def __init__(
@@ -147,7 +142,7 @@ class IteratedStep:
         """Step the units, in the order given.
 
         Raises:
-            UnitFailure: a unit's call failed. NotConverged: they do not agree.
+            UnitFailure: a unit's call failed. NotConverged: they do not converge.
         """
         with self._ensemble.saved([s.unit for s in slots]) as states:
             self._iterate(t, slots, states)

@@ -1,4 +1,4 @@
-"""All units step at once from the values at a communication point."""
+"""Jacobi coupling: all units step from the values at a communication point, as if in parallel."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from handover.cosim.system.schedule import Slot
 class Jacobi:
     """A step's results count from the time where it ends, for sampled units too.
 
-    Whatever acts at once acts a step later here, so there is no algebraic loop to solve but at the start.
+    Direct feedthrough takes effect a step later here, so there is no algebraic loop to solve but at the start.
     Also called the parallel scheme: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49.
     """
 

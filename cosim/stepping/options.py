@@ -1,8 +1,7 @@
-"""How a master couples its units.
+"""Options of a master: the algorithm that couples units, how inputs are extrapolated, how the step is controlled.
 
-How the step is controlled where it is to follow the error.
-
-What a unit's inputs are between communication points.
+They are checked when made, and mean the same for every system; what does not go with a system is found by
+`StepperFactory`.
 """
 
 import enum
@@ -16,7 +15,7 @@ from handover.cosim.exceptions import InvalidOptions
 
 @dataclass(frozen=True, kw_only=True)
 class AdaptiveStep:
-    """Tolerances and limits of a step that follows the error; see `AdaptiveStepper`.
+    """Tolerances and limits of a step that is controlled by its error; see `AdaptiveStepper`.
 
     Attributes:
         relative: error tolerated in a step, relative to the largest magnitude that the signal has had.
@@ -25,10 +24,10 @@ class AdaptiveStep:
         smallest, largest: limits of the step in seconds; without a largest one, only instants of sampled units and the
             stop time limit it.
         initial: the first step to try in seconds; by default the shortest step that units would take by themselves.
-        uncontrolled: outputs, `unit.port`, whose error is not looked at: such as noise, which no step makes smooth.
+        uncontrolled: outputs, `unit.port`, whose error is ignored, such as noise, which is rough at every step.
 
     Raises:
-        InvalidOptions: with everything that is wrong.
+        InvalidOptions: with all faults.
     """
 
     relative: float = 1e-4
@@ -49,22 +48,23 @@ class AdaptiveStep:
         if self.smallest <= 0:
             faults.append(f"the smallest step is {float(self.smallest):g} s; it must be above 0 s")
         if self.largest is not None and self.largest < self.smallest:
-            faults.append(f"the largest step, {float(self.largest):g} s, is below the smallest, {self._least}")
+            faults.append(f"the largest step, {float(self.largest):g} s, is below the smallest, {self._smallest}")
         if self.initial is not None and not self.smallest <= self.initial <= (self.largest or self.initial):
             upper = "" if self.largest is None else f" to {float(self.largest):g} s"
-            faults.append(f"the first step, {float(self.initial):g} s, is out of the range from {self._least}{upper}")
+            limits = f"{self._smallest}{upper}"
+            faults.append(f"the first step, {float(self.initial):g} s, is out of the range from {limits}")
         if faults:
             raise InvalidOptions(faults)
 
     @property
-    def _least(self) -> str:
+    def _smallest(self) -> str:
         return f"{float(self.smallest):g} s"
 
 
 class Extrapolation(enum.Enum):
     """What a unit's inputs are during its step.
 
-    HOLD: what their sources gave last. LINEAR: on the line through what their sources gave at their last two
+    HOLD: the last values of their sources. LINEAR: on the line through the values of their sources at the last two
     communication points; see `LinearExtrapolation`.
     """
 
@@ -76,10 +76,10 @@ class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs.
 
     JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values; the units of
-    an algebraic loop go over the step again until they agree. FIXED_POINT and NEWTON: the same for all units that are
-    connected in a cycle (iterated, strong or implicit coupling), with inputs of the end of the step, by relaxed
-    fixed-point iteration or by Newton's method. Sampled units act one after another but in loops. The loops of all but
-    FIXED_POINT, and those at the start, are solved by Newton's method.
+    an algebraic loop repeat the step after a rollback until they converge. FIXED_POINT and NEWTON: the same for all
+    units that are connected in a cycle (iterated, strong or implicit coupling), with inputs of the end of the step, by
+    relaxed fixed-point iteration or by Newton's method. Sampled units act one after another, except in loops.
+    FIXED_POINT solves all loops, also those at the start, by its own iteration, the others by Newton's method.
     """
 
     JACOBI = "jacobi"
@@ -99,11 +99,11 @@ class MasterOptions:
 
     Attributes:
         algorithm: see `Algorithm`.
-        tolerance: the largest difference, relative to a signal's magnitude, at which iterated signals agree.
+        tolerance: the largest difference, relative to a signal's magnitude, at which iterated signals have converged.
         max_iterations: after so many iterations of a step, the run fails.
         extrapolation: what inputs are between communication points; see `Extrapolation`.
         adaptive: how the step follows the error; None for fixed steps.
-        cpu_times: whether `Master.cpu` has the CPU time of every step; to take it costs 0.2 us a step.
+        cpu_times: whether `Master.cpu` has the CPU time of every step; measuring it costs 0.2 us a step.
         compiled: whether a plain system (fixed steps, no events) may run as a compiled plan.
         repeat_discarded: whether a step that a unit discards is repeated shorter, by all units. They then save their
             states at every step; else a discarded step ends the run. Systems with events do so anyway.
@@ -111,7 +111,7 @@ class MasterOptions:
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
 
     Raises:
-        InvalidOptions: with every value that makes no sense.
+        InvalidOptions: with all invalid values.
     """
 
     algorithm: Algorithm = Algorithm.GAUSS_SEIDEL
@@ -127,7 +127,7 @@ class MasterOptions:
 
     def __post_init__(self) -> None:
         given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        right = {
+        checks = {
             "algorithm": (isinstance(given["algorithm"], Algorithm), f"one of {_names(Algorithm)}"),
             "extrapolation": (isinstance(given["extrapolation"], Extrapolation), f"one of {_names(Extrapolation)}"),
             "adaptive": (isinstance(given["adaptive"], AdaptiveStep | None), "None, or such as AdaptiveStep()"),
@@ -136,12 +136,12 @@ class MasterOptions:
             "call_limit": (_is_above_0(given["call_limit"], int | float, None), "None, or a finite number above 0"),
             "pace": (_is_above_0(given["pace"], int | float, None), "None, or a finite number above 0"),
         }
-        faults = [f"{name} = {given[name]!r}: {found} is right" for name, (fits, found) in right.items() if not fits]
+        faults = [f"{name} = {given[name]!r}: {valid} is right" for name, (fits, valid) in checks.items() if not fits]
         if faults:
             raise InvalidOptions(faults)
 
     def as_data(self) -> dict[str, Any]:
-        """Return what decides on a run's signals, as JSON can hold it; exact numbers of seconds are texts."""
+        """Return the options that affect a run's signals, as JSON can hold them; exact seconds are texts."""
         control = None if self.adaptive is None else asdict(self.adaptive)
         if control is not None:
             control = {name: str(value) if isinstance(value, Fraction) else value for name, value in control.items()}
@@ -156,7 +156,7 @@ class MasterOptions:
 
     @property
     def order(self) -> int:
-        """The power of the step with which the error of a run goes: see `Extrapolation`."""
+        """Order of the error of a run in the step: see `Extrapolation`."""
         return 2 if self.extrapolation is Extrapolation.LINEAR else 1
 
 

@@ -1,8 +1,6 @@
-"""Equations x = g(x) between coupled units: what a solver of them is, and when x is good enough.
+"""Solvers of x = g(x), the equations of coupled units: relaxed fixed-point iteration and Newton's method.
 
-Fixed-point iteration with Aitken's relaxation.
-
-Newton's method on the signals between units.
+x are the signals that lead back in a cycle, and g evaluates the units of it once, which is the dear part.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,7 +13,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.stepping.interface import Magnitudes
 
 Map = Callable[[Floats], Floats]
-"""g: takes the values that go into units and gives back the values that come out; n numbers to n numbers."""
+"""g: from the n values that go into the units to the n values that come out of them."""
 
 Jacobian = Callable[[], Floats | None]
 """Gives dg/dx (n by n) at the x that g was last called with, or None where it is not known."""
@@ -23,7 +21,7 @@ Jacobian = Callable[[], Floats | None]
 
 @dataclass(frozen=True)
 class Solution:
-    """Values x with g(x) = x to the tolerance. g was called with x last."""
+    """Values x with g(x) = x within the tolerance. x is what g was called with last."""
 
     x: Floats
     iterations: int
@@ -38,7 +36,7 @@ class Unsolved(Exception):
 
 
 class InterfaceSolver(Protocol):
-    """Solves x = g(x), again and again for one g that changes slowly; what it learns it keeps for the next time."""
+    """Solves x = g(x), again and again for a g that changes slowly; it keeps its state for the next solution."""
 
     magnitudes: Magnitudes
 
@@ -51,11 +49,11 @@ class InterfaceSolver(Protocol):
         ...
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return what it has learnt; JSON can hold it."""
+        """Return its state as JSON can hold it."""
         ...
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to where `get_state` was called."""
+        """Restore what `get_state` returned."""
         ...
 
 
@@ -67,14 +65,14 @@ def residual_of(g: Map, x: Floats, iterations: int) -> Floats:
     """
     residual = g(x) - x
     if not np.all(np.isfinite(residual)):
-        raise Unsolved("values leave all bounds", iterations, x, residual)
+        raise Unsolved("values diverge beyond all bounds", iterations, x, residual)
     return residual
 
 
 class FixedPoint:
     """x <- x + w r with r = g(x) - x and w <- -w r'.(r - r') / |r - r'|^2, where r' is the residual before.
 
-    The relaxation w begins at 1, which is plain iteration, and adapts to how r answers; for a single signal this is
+    The relaxation w begins at 1, which is plain iteration, and adapts to the change of r; for a single signal this is
     the secant method, which also converges where plain iteration diverges. Residuals are divided by the signals'
     magnitudes. [Kuettler2008] Fixed-point fluid-structure interaction solvers with dynamic relaxation, eq. (44);
     after Irons and Tuck (1969).
@@ -103,7 +101,7 @@ class FixedPoint:
             x, before = x + weight * residual, residual
             residual = residual_of(g, x, iteration + 1)
         if np.any(self.magnitudes.moving(x, residual)):
-            raise Unsolved("values have not settled", self._max_iterations, x, residual)
+            raise Unsolved("values have not converged", self._max_iterations, x, residual)
         self.magnitudes.learn(x)
         return Solution(x, self._max_iterations)
 
@@ -112,7 +110,7 @@ class FixedPoint:
         return {"magnitudes": self.magnitudes.get_state()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self.magnitudes.set_state(state["magnitudes"])
 
 
@@ -123,17 +121,17 @@ def _relaxation(weight: float, before: Floats, residual: Floats) -> float:
 
 
 _SINGULAR = 1e-7
-"""Least singular value of I - dg/dx, in magnitudes, at which differences of g still tell a solution from none."""
+"""Below this singular value of I - dg/dx, in magnitudes, differences of g cannot tell a solution from none."""
 _NO_SOLUTION = "the equations are singular: signals act on themselves with a gain of 1"
 _SLOW = 0.5
-"""A step that leaves more than this part of the residual shows that the Jacobian is out of date."""
+"""An iteration that leaves more than this part of the residual shows that the Jacobian is out of date."""
 
 
 class InterfaceNewton:
     """x <- x + (I - J)^-1 (g(x) - x), where J is dg/dx.
 
-    J is what units say of their derivatives, or differences of g. It is corrected by Broyden's update at each
-    iteration, kept for the next solution and taken anew when an iteration does not halve the residual: as g is a whole
+    J is from the units' directional derivatives, or differences of g. It is corrected by Broyden's update at each
+    iteration, kept for the next solution and renewed when an iteration does not halve the residual: as g is a whole
     step of units, differences cost far more than iterations. [Sicklinger2014] Interface Jacobian-based co-simulation;
     [Broyden1965] A class of methods for solving nonlinear simultaneous equations.
 
@@ -168,7 +166,7 @@ class InterfaceNewton:
             x, residual, fresh = moved, after, False
         if np.any(self.magnitudes.moving(x, residual)):
             self._kept = None
-            raise Unsolved("values have not settled", self._max_iterations, x, residual)
+            raise Unsolved("values have not converged", self._max_iterations, x, residual)
         return self._solved(x, self._max_iterations)
 
     def get_state(self) -> Mapping[str, Any]:
@@ -177,7 +175,7 @@ class InterfaceNewton:
         return {"magnitudes": self.magnitudes.get_state(), "jacobian": kept}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self.magnitudes.set_state(state["magnitudes"])
         kept = state["jacobian"]
         self._kept = None if kept is None else np.array(kept, dtype=np.float64)
@@ -191,7 +189,7 @@ class InterfaceNewton:
         return differences(g, x, x + residual, self.magnitudes.perturbations(x)) if given is None else given
 
     def _step(self, x: Floats, residual: Floats) -> Floats | None:
-        """Return (I - J)^-1 r, worked out in magnitudes, or None where J is singular or not known."""
+        """Return (I - J)^-1 r, computed in magnitudes, or None where I - J is singular or J not known."""
         if self._kept is None:
             return None
         scale = self.magnitudes.of(x)
@@ -202,9 +200,9 @@ class InterfaceNewton:
 
     def _updated(self, kept: Floats, dx: Floats, dy: Floats, x: Floats) -> Floats:
         """Return J with the least change, in magnitudes, that makes J dx = dy."""
-        weighed = dx / self.magnitudes.of(x) ** 2
-        length = float(dx @ weighed)
-        return kept if length == 0.0 else kept + np.outer(dy - kept @ dx, weighed) / length
+        weighted = dx / self.magnitudes.of(x) ** 2
+        length = float(dx @ weighted)
+        return kept if length == 0.0 else kept + np.outer(dy - kept @ dx, weighted) / length
 
 
 def differences(g: Map, x: Floats, y: Floats, perturbations: Floats) -> Floats:

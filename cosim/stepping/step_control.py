@@ -1,9 +1,4 @@
-"""Chooses the size of steps from the errors of earlier ones.
-
-How far a step of an ensemble is from two steps of half the length.
-
-What became of the steps of a run.
-"""
+"""Control of an adaptive step: the error of a step by doubling, the next length by a PI controller, and statistics."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -17,20 +12,22 @@ from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.options import AdaptiveStep
 from handover.cosim.system.signals import Column
 
+Values = NDArray[np.float64]
+
 _K_I, _K_P = 0.3, 0.4
 _SAFETY = 0.9
 _MIN_FACTOR, _MAX_FACTOR = 0.2, 5.0
-"""How much a step may shrink or grow at once."""
+"""How much a step may shrink or grow from one to the next."""
 _FLOOR = 1e-10
 """An error of 0 would ask for an infinite step."""
 
 
 class PiController:
-    """Proportional-integral control of the step, which is smoother than to follow the last error alone.
+    """Proportional-integral control of the step, which is smoother than following the last error alone.
 
     After a step with the error r, in units of what is tolerated, the next one is longer by
-    s (1/r)^(k_I/k) (r_before/r)^(k_P/k), k_I = 0.3, k_P = 0.4, for an error that goes with the k-th power of the step;
-    s is a margin. After a rejected step, and in the first step after that, the error alone counts: s (1/r)^(1/k).
+    s (1/r)^(k_I/k) (r_before/r)^(k_P/k), k_I = 0.3, k_P = 0.4, for an error of order k in the step; s is a safety
+    factor. After a rejected step, and in the first step after that, the error alone counts: s (1/r)^(1/k).
 
     Source: K. Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods, ACM
     Trans. Math. Softw. 17 (1991) 533-554.
@@ -41,7 +38,7 @@ class PiController:
         self._before: float | None = None
 
     def after_acceptance(self, error: float) -> float:
-        """Return the next step's length over that of an accepted one, which was this erroneous."""
+        """Return the ratio of the next step's length to that of an accepted one with this error."""
         r = max(error, _FLOOR)
         if self._before is None:
             change = _SAFETY * r ** (-1 / self._power)
@@ -51,7 +48,7 @@ class PiController:
         return min(max(change, _MIN_FACTOR), _MAX_FACTOR)
 
     def after_rejection(self, error: float) -> float:
-        """Return the next attempt's length over that of a rejected step, which was this erroneous."""
+        """Return the ratio of the next attempt's length to that of a rejected step with this error."""
         self._before = None
         change = _SAFETY * error ** (-1 / self._power) if error < float("inf") else _MIN_FACTOR
         return min(max(change, _MIN_FACTOR), _SAFETY)
@@ -61,16 +58,13 @@ class PiController:
         return {"before": self._before}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._before = state["before"]
-
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class WorstSignal:
-    """The scalar output with the largest error, in units of what is tolerated; infinite where it is not a number."""
+    """The scalar output with the largest error, in units of what is tolerated; infinite where it is NaN."""
 
     unit: str
     name: str
@@ -82,9 +76,9 @@ class StepError:
 
     Outputs that are not to be controlled are left out.
 
-    Richardson's estimate: if the error of one step goes with its length to the power of order + 1, two steps of half
-    the length are off by |y_halves - y_whole| / (2^order - 1). It is tolerated relative to the largest magnitude that
-    the signal has had, so that passing through zero asks for no more than the rest of its course.
+    Richardson's estimate: if the error of a step is proportional to its length to the power of order + 1, that of two
+    steps of half the length is |y_halves - y_whole| / (2^order - 1). It is tolerated relative to the largest magnitude
+    that the signal has had, so that it does not need shorter steps where it passes through zero.
 
     Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, sec. II.4; for coupled units
     T. Schierz, M. Arnold, C. Clauss, Co-simulation with communication step size control in an FMI compatible master
@@ -103,7 +97,7 @@ class StepError:
         return np.array([c.values[c.index] for _, c in self._columns], dtype=np.float64)
 
     def accept(self) -> None:
-        """Take note of the outputs' magnitudes."""
+        """Raise the magnitudes to those of the present outputs."""
         self._largest = np.maximum(self._largest, np.abs(self.values()))
 
     def worst(self, whole: Values, halves: Values) -> WorstSignal:
@@ -124,7 +118,7 @@ class StepError:
         return self._largest.tolist()
 
     def set_state(self, state: list[float]) -> None:
-        """Go back to what `get_state` gave."""
+        """Restore what `get_state` returned."""
         self._largest = np.array(state, dtype=np.float64)
 
 

@@ -1,8 +1,7 @@
-"""How a run gets from one communication point to the next.
+"""Protocols of a run's progress, `Stepper` through time and `Coupling` at a communication point, and fixed steps.
 
-What an algorithm does to the units that are due at a communication point.
-
-Fixed steps, each unit at its own rate, on one exact grid.
+A stepper decides when communication points are and which units are due there; its coupling decides in which order
+these get inputs, step and give outputs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,7 @@ from handover.cosim.system.schedule import Schedule, Slot
 
 
 class Stepper(Protocol):
-    """Moves an ensemble through time."""
+    """Advances an ensemble through time."""
 
     @property
     def time(self) -> float:
@@ -29,11 +28,11 @@ class Stepper(Protocol):
         ...
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return what a run that goes on from here must know besides the units' states; JSON can hold it."""
+        """Return what a run that resumes from here needs besides the units' states, as JSON can hold it."""
         ...
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to where `get_state` was called."""
+        """Restore what `get_state` returned."""
         ...
 
 
@@ -53,18 +52,18 @@ class Coupling(Protocol):
         ...
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return what a run that goes on from here must know besides the units' states; JSON can hold it."""
+        """Return what a run that resumes from here needs besides the units' states, as JSON can hold it."""
         ...
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to where `get_state` was called."""
+        """Restore what `get_state` returned."""
         ...
 
 
 class GridStepper:
     """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
 
-    `lines` is what extrapolated inputs follow, if any are.
+    `extrapolated_inputs` is what keeps the histories of their sources, None where inputs are held.
     """
 
     def __init__(
@@ -98,7 +97,7 @@ class GridStepper:
             self._due[slot.unit] += slot.every
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return the ticks, what the coupling keeps and what inputs follow; see `Stepper`."""
+        """Return the ticks, the coupling's state and that of extrapolated inputs; see `Stepper`."""
         extrapolated_inputs = (
             {} if self._extrapolated_inputs is None else {"lines": self._extrapolated_inputs.get_state()}
         )
@@ -106,7 +105,7 @@ class GridStepper:
         return {**ticks, "coupling": self._coupling.get_state(), **extrapolated_inputs}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go back to ticks that `get_state` gave."""
+        """Restore the ticks that `get_state` returned."""
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self._coupling.set_state(state["coupling"])

@@ -1,10 +1,7 @@
-"""How values get from the outputs of loaded units to the inputs that they feed.
+"""Transfers of values from outputs of loaded units to the inputs that they feed: checks, copies, linear conversions.
 
-Connections whose input has fewer bits than the output that feeds it.
-
-Copies of a connection that changes its values linearly.
-
-Finds NaN and infinity in the outputs of a unit that feed others.
+Before a unit's inputs are set, its `Feeding` fills its buffers; after its outputs are fetched, its `FiniteCheck` finds
+NaN and infinity in those that feed others.
 """
 
 import logging
@@ -25,6 +22,8 @@ from handover.cosim.fmu.instance import Instance
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
 
+_log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
 class Narrowing:
@@ -43,7 +42,7 @@ class Narrowing:
     values: NDArray[Any]
 
     def check(self, t: float) -> None:
-        """Let only numbers through that fit.
+        """Check that all values fit the input.
 
         Raises:
             UnitFailure: one does not.
@@ -55,7 +54,7 @@ class Narrowing:
 
 
 def narrows(output: FmuPort, target: FmuPort) -> bool:
-    """Tell whether an integer output has numbers that the input which it feeds cannot take."""
+    """Return whether an integer output can have values that do not fit the input which it feeds."""
     a, b = output.width, target.width
     return (
         output.kind is Kind.INTEGER
@@ -115,7 +114,7 @@ class FiniteCheck:
                     raise failure
 
     def failure(self, t: float, log: Sequence[str] = ()) -> UnitFailure | None:
-        """Return the failure that the values are, None if all are finite."""
+        """Return the failure for the first value that is not finite, None if all are."""
         for port, values, readers in self._ports:
             wrong = np.flatnonzero(~np.isfinite(values))
             if len(wrong):
@@ -123,9 +122,6 @@ class FiniteCheck:
                 index, call = list(indices_of(port.shape))[at], f"fmi{self._fmi}Get{port.fmi_type}"
                 return NotFinite(self._unit, call, t, port.name, index, float(values[at]), readers=readers, log=log)
         return None
-
-
-_log = logging.getLogger(__name__)
 
 
 class Feeding(NamedTuple):
@@ -150,7 +146,7 @@ class Feeding(NamedTuple):
 
 
 def feedings(system: System, instances: Mapping[str, Instance]) -> dict[str, Feeding]:
-    """Return how each unit is fed; conversions of units of measure are told in the log."""
+    """Return how each unit is fed; conversions of units of measure are logged."""
     changes = {c.target: change for c in system.connections if (change := system.change_by(c))}
     return {name: _feeding(system, instances, name, changes) for name in instances}
 

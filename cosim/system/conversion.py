@@ -1,6 +1,6 @@
-"""What converts a value from one unit into another of the same dimension.
+"""Linear transformations of a signal between an output and an input, and those that convert between units.
 
-A linear change of a signal's value on its way from an output to an input.
+A connection's transformation is either given by the user, as in an SSP file, or follows from the two ports' units.
 """
 
 import math
@@ -19,12 +19,12 @@ class LinearTransformation:
 
     @property
     def is_identity(self) -> bool:
-        """Whether it changes nothing."""
+        """Whether it leaves every value as it is."""
         return self == LinearTransformation()
 
     @property
     def fault(self) -> str | None:
-        """What is wrong with it, saying what would be right, or None."""
+        """What is wrong with it, and what would be valid, or None."""
         if math.isfinite(self.factor) and math.isfinite(self.offset):
             return None
         return f"factor {self.factor!r} and offset {self.offset!r} must be finite numbers"
@@ -36,37 +36,35 @@ class LinearTransformation:
 
 
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
-_LONG = 10**13
-"""A decimal fraction of more digits than this has was cut off or rounded somewhere."""
+_MAX_EXACT = 10**13  # a decimal fraction of more digits than this was cut off or rounded by the tool that wrote it
 _MAX_DIVISOR = 1000
-_ROUNDING = Fraction(1, 10**14)
-"""Tools write factors with 15 digits or more."""
+_ROUNDING = Fraction(1, 10**14)  # relative; tools write factors with 15 digits or more
 
 
 def conversion(source: Unit, target: Unit) -> LinearTransformation:
-    """Return what converts a value from a unit into another, each of its two numbers rounded once.
+    """Return the transformation that converts a value from a unit into another, each of its two numbers rounded once.
 
-    From SI = f_s v + o_s = f_t w + o_t follows w = (f_s / f_t) v + (o_s - o_t) / f_t. The units' own numbers are taken
-    as they are meant, not as they are rounded: see `meant_by`. So degrees in radians are multiplied by the double
-    nearest to pi/180, and radians in degrees by that nearest to 180/pi.
+    From SI = f_s v + o_s = f_t w + o_t follows w = (f_s / f_t) v + (o_s - o_t) / f_t. Factors and offsets stand for the
+    exact numbers that tools rounded, see `meant_by`: the factor from degrees to radians is the double nearest to
+    pi/180, that from radians to degrees the one nearest to 180/pi.
     """
     f_s, o_s, f_t, o_t = (meant_by(x) for x in (source.factor, source.offset, target.factor, target.offset))
     return LinearTransformation(float(f_s / f_t), float((o_s - o_t) / f_t))
 
 
 def pass_as_they_are(a: Unit, b: Unit) -> bool:
-    """Tell whether numbers need no conversion as far as is known: a unit is not told, or the same name not defined."""
+    """Return whether values pass unconverted: a unit is unknown, or both have one name and one is not defined."""
     return UNKNOWN in (a, b) or (a.symbol == b.symbol and not (a.defined and b.defined))
 
 
 def meant_by(number: float) -> Fraction:
     """Return the exact number behind a rounded one, to 60 digits where it is a multiple of pi.
 
-    A number of few digits is that decimal fraction (0.001). One of many digits that lies within rounding of p/q or
-    pi p/q, with q up to 1000, is that: 0.277777777777778 is 5/18, 0.0174532925199433 is pi/180.
+    A number of few digits is taken as that decimal fraction (0.001). One of many digits that is within rounding of p/q
+    or pi p/q, with q up to 1000, is taken as that: 0.277777777777778 as 5/18, 0.0174532925199433 as pi/180.
     """
     decimal = Fraction(repr(number))
-    if max(abs(decimal.numerator), decimal.denominator) < _LONG:
+    if max(abs(decimal.numerator), decimal.denominator) < _MAX_EXACT:
         return decimal
     for scale in (Fraction(1), _PI):
         near = (decimal / scale).limit_denominator(_MAX_DIVISOR) * scale

@@ -1,4 +1,7 @@
-"""Puts things in an order in which each comes after those that it needs, and finds those that need each other."""
+"""Graph algorithms of the schedule: topological order, and strongly connected components.
+
+They work on units, on ports and on groups of units alike, which are called items here.
+"""
 
 import heapq
 from collections import defaultdict
@@ -12,33 +15,33 @@ from scipy.sparse.csgraph import connected_components
 T = TypeVar("T", bound=Hashable)
 
 Needs = Mapping[T, Collection[T]]
-"""What each thing needs; things that are no keys are left out of account."""
+"""The items that each item needs; needed items that are no keys are ignored."""
 
 DescribeWait = Callable[[T, set[T]], None]
-"""Told of a thing that is placed before others that it needs."""
+"""Called for an item that is placed before others that it needs, with those others."""
 
 
 def strongly_connected(needs: Needs[T]) -> list[list[T]]:
-    """Return the sets of things that need each other, directly or through others; each set in the order given."""
+    """Return the strongly connected components: sets of items that need each other; each in the order given."""
     names = list(needs)
     if not names:
         return []
-    place = {name: i for i, name in enumerate(names)}
-    pairs = [(place[b], place[a]) for a, others in needs.items() for b in others if b in place]
-    ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    graph = csr_array((np.ones(len(pairs)), (ends[:, 0], ends[:, 1])), shape=(len(names), len(names)))
+    position = {name: i for i, name in enumerate(names)}
+    pairs = [(position[b], position[a]) for a, others in needs.items() for b in others if b in position]
+    edges = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    graph = csr_array((np.ones(len(pairs)), (edges[:, 0], edges[:, 1])), shape=(len(names), len(names)))
     _, labels = connected_components(graph, directed=True, connection="strong")
-    sets: dict[int, list[T]] = defaultdict(list)
+    components: dict[int, list[T]] = defaultdict(list)
     for name, label in zip(names, labels.tolist(), strict=True):
-        sets[label].append(name)
-    return list(sets.values())
+        components[label].append(name)
+    return list(components.values())
 
 
 def ordered(firm: Needs[T], soft: Needs[T], describe_soft: DescribeWait[T], describe_firm: DescribeWait[T]) -> list[T]:
-    """Order the keys of `firm` so that each follows those that it needs; as given where nothing is said.
+    """Order the keys of `firm` so that each follows those that it needs; otherwise in the order given.
 
-    Where needs close a circle, a soft one is passed over first, then a firm one of a circle that nothing outside it
-    holds up.
+    Where needs form a cycle, it is broken at a soft need if there is one, else at a firm need of a cycle that does not
+    wait for anything outside of it. The callbacks are called for each item at which a cycle was broken.
     """
     rank = {name: i for i, name in enumerate(firm)}
     waits_firm = {n: {m for m in firm[n] if m in rank} for n in rank}

@@ -1,4 +1,4 @@
-"""When each unit steps and in which order: whole ticks of one exact grid, what is sampled before what goes on."""
+"""When each unit steps, and in which order: whole ticks of one exact time grid, units ordered by direct feedthrough."""
 
 import logging
 import math
@@ -12,8 +12,7 @@ from handover.cosim.system.system import PlacedUnit, System
 
 _log = logging.getLogger(__name__)
 
-_MAX_TICKS_PER_STEP = 10_000
-"""How many ticks the shortest period may have; more means that the periods do not fit each other."""
+_MAX_TICKS_PER_STEP = 10_000  # of the shortest period; more means that the periods have no sensible common divisor
 
 
 @dataclass(frozen=True)
@@ -26,22 +25,21 @@ class Slot:
 
 
 class Schedule:
-    """The grid, and the units in the order in which they step at one communication point.
+    """The time grid, and the units in the order in which they step at one communication point.
 
-    A tick is the greatest common divisor of the units' periods; times are tick counts, so they do not drift. Sampled
-    units stand in `sampled`: at a communication point t they turn the values at t into further values at t. The others
-    stand in `continuous`: they go from t to t + period. A command therefore acts in the step that follows the picture
-    it was made from.
+    A tick is the greatest common divisor of the units' periods; times are tick counts, so they do not drift. The units
+    in `sampled` compute, at a communication point t, outputs at t from inputs at t. Those in `continuous` step from t
+    to t + period. So a camera's picture at t becomes a command at t, which acts in the step that begins at t.
 
-    Within each of the two a unit comes after those whose outputs have direct feedthrough to its own, else
-    units keep the order in which they were added. Units in an algebraic loop make a `Group` and stand side by side; an
-    algorithm may solve it. Feedthrough that an FMU does not declare is presumed, but where presumed feedthrough would
-    close a loop it is left out of account. Units may need each other's outputs in a cycle that is no loop, as each
-    output can be worked out after others: one of them then gets former values. Both are told in the log.
+    Within each of the two, a unit comes after those whose outputs feed its inputs with direct feedthrough; otherwise
+    units keep the order in which they were added. Units in an algebraic loop are a `Group` and stand side by side; an
+    algorithm may solve it. Feedthrough that an FMU does not declare is presumed, but ignored where it would close a
+    loop. Units may need each other's outputs in a cycle that is no algebraic loop, because each single output can be
+    computed after others: one of the units then gets values of the previous step. Both cases are logged.
 
     Attributes:
         loops: the algebraic loops.
-        initial_passes: how often to go through all units in order until all values at the start are worked out.
+        initial_passes: how often to go through all units in order until all values at the start are computed.
 
     Raises:
         ScheduleError: periods have no common communication step.
@@ -64,7 +62,7 @@ class Schedule:
 
     @property
     def slots(self) -> tuple[Slot, ...]:
-        """All units in an order in which their outputs can be worked out at the start."""
+        """All units in an order in which their outputs can be computed at the start."""
         return self.continuous + self.sampled
 
     def time(self, ticks: int) -> float:
@@ -90,7 +88,7 @@ class Schedule:
 
         def log_presumed(group: int, waits: set[int]) -> None:
             names, others = ", ".join(groups[group].units), units_of(waits, presumed, group)
-            _log.warning("%s does not declare its direct feedthrough; it gets the former values of %s", names, others)
+            _log.warning("%s does not declare its direct feedthrough; it gets the previous values of %s", names, others)
 
         def log_declared(group: int, waits: set[int]) -> None:
             late = {n for i in waits for n in groups[i].units}
@@ -98,7 +96,7 @@ class Schedule:
             self.initial_passes += sum(sources[n].get(port) in late for n, port in ports)
             names, others = ", ".join(groups[group].units), units_of(waits, declared, group)
             _log.warning(
-                "%s steps first where units wait for each other; it gets the former values of %s", names, others
+                "%s steps first where units wait for each other; it gets the previous values of %s", names, others
             )
 
         return tuple(in_order(groups, declared, presumed, log_presumed, log_declared))
@@ -114,8 +112,8 @@ def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:
     denominator = math.lcm(*(u.period.denominator for u in units))
     tick = Fraction(math.gcd(*(int(u.period * denominator) for u in units)), denominator)
     if tick * _MAX_TICKS_PER_STEP < min(u.period for u in units):
-        text = ", ".join(f"{u.name} {u.period} s" for u in units)
-        raise ScheduleError(f"the communication steps of these units have no common communication step: {text}")
+        steps = ", ".join(f"{u.name} {u.period} s" for u in units)
+        raise ScheduleError(f"these units have no common communication step: {steps}")
     return tick
 
 
@@ -125,5 +123,5 @@ def _feedthrough_ports(unit: PlacedUnit) -> set[str]:
 
 def _feeding_through(sources: Mapping[str, str], feedthrough: Mapping[str, Collection[str]]) -> set[str]:
     """Return the units that feed inputs with direct feedthrough to outputs."""
-    acting = {u for us in feedthrough.values() for u in us}
-    return {unit for port, unit in sources.items() if port in acting}
+    inputs = {u for us in feedthrough.values() for u in us}
+    return {unit for port, unit in sources.items() if port in inputs}

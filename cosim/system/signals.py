@@ -1,8 +1,7 @@
-"""The outputs of a running system by name: `signals["arm.p_WG"]`, or flattened to scalars for a record.
+"""The outputs of a running system by name, `signals["arm.p_WG"]`, and the observers that see them.
 
-Who looks on while a run goes on.
-
-Observers of a run that goes on from where another process left it.
+Flattened to scalars, outputs are the columns of a record. An observer is called at every communication point; one of a
+run that resumes from a checkpoint has seen the first of them already, see `ObserveAfter`.
 """
 
 import ctypes
@@ -30,12 +29,12 @@ class Column:
 
 
 class Signals:
-    """Live values of all outputs; they change as the system steps, so copy what is kept."""
+    """Live values of all outputs; `columns` are views that change as the system steps, so copy what is kept."""
 
     def __init__(
         self, outputs: Mapping[str, Mapping[str, Views]], ports: Mapping[str, Mapping[str, FmuPort]], owner: object
     ) -> None:
-        self._owner = owner  # keeps the memory alive that the addresses of pictures and strings point to
+        self._owner = owner  # keeps the memory alive to which the addresses of pictures and strings point
         self._views = {f"{unit}.{port}": views for unit, ys in outputs.items() for port, views in ys.items()}
         self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
 
@@ -55,7 +54,7 @@ class Signals:
         return np.array(views[0]).reshape(port.shape)
 
     def text(self, name: str) -> str:
-        """Return a string signal, or the item's name of an enumeration."""
+        """Return a string signal's text, or the name of an enumeration signal's item."""
         views, port = self._views[name], self._ports[name]
         if port.kind is Kind.STRING:
             return ctypes.string_at(int(views[0][0])).decode() if views[0][0] else ""
@@ -63,15 +62,15 @@ class Signals:
 
     def columns(self) -> list[Column]:
         """Return all real, integer, boolean and enumeration outputs as scalars."""
-        made: list[Column] = []
+        columns: list[Column] = []
         for name, port in self._ports.items():
             if port.kind in (Kind.BINARY, Kind.STRING):
                 continue
             values = self._views[name][0]
             for i, index in enumerate(indices_of(port.shape)):
                 subscript = f"[{','.join(map(str, index))}]" if index else ""
-                made.append(Column(name + subscript, port, values, i))
-        return made
+                columns.append(Column(name + subscript, port, values, i))
+        return columns
 
 
 Observer = Callable[[float, Signals], None]
@@ -80,12 +79,12 @@ Observer = Callable[[float, Signals], None]
 
 @dataclass(frozen=True)
 class ObserveAfter:
-    """An observer of a run that goes on from t_0 seconds: `observe` saw that point before, and sees what follows."""
+    """An observer of a run that resumes at t_0 seconds: `observe` saw that point before, and is called from then on."""
 
     t_0: float
-    observe: Callable[[float, Signals], None]
+    observe: Observer
 
     def __call__(self, t: float, signals: Signals) -> None:
-        """Let `observe` look, unless it has seen this point."""
+        """Call `observe`, unless it has seen this point."""
         if t > self.t_0:
             self.observe(t, signals)

@@ -1,6 +1,7 @@
-"""Units, their parameters and the connections between them, checked before anything starts.
+"""Units, their parameters and the connections between them, checked before anything is loaded.
 
-What can be wrong with a system's clocks, and with units of which a process holds one only.
+`System` collects what is wired, and `System.check` reports everything that is wrong with it: names, values, clocks,
+FMUs that a process may instantiate only once, and connections whose ports do not fit each other (see `mismatch`).
 """
 
 from collections import defaultdict
@@ -20,43 +21,6 @@ from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion, pass_as_they_are
 
 
-def clock_mismatch(a: FmuClock | None, b: FmuClock | None) -> str | None:
-    """Return why one end cannot let the other tick, or None; an end that is no clock is None."""
-    if a is None or b is None:
-        return "a clock can be connected with a clock only"
-    if a.is_input or not b.is_input:
-        return "an output clock lets an input clock tick, not the other way round"
-    if not b.is_triggered:
-        return "it ticks at times of its own; a triggered input clock can be connected"
-    return None
-
-
-def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[str]:
-    """Return why a unit's clocks cannot tick as it is placed: clocked ports are reached in event mode only."""
-    d = description
-    clocked = sorted(p.name for p in (*d.inputs.values(), *d.outputs.values()) if p.clocks)
-    if not clocked:
-        return []
-    text = f"{name}: {', '.join(clocked)} can be reached only while a clock ticks, in event mode"
-    if not d.capabilities.event_mode:
-        return [f"{text}, which its FMU does not have (hasEventMode)"]
-    return [f"{text}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
-
-
-def once_faults(units: Iterable[tuple[str, FmuDescription]]) -> list[str]:
-    """Return which units are there more than once though a process may hold one of them only."""
-    placed: Mapping[Path, list[str]] = defaultdict(list)
-    for name, d in units:
-        if d.capabilities.once_per_process:
-            placed[d.path.resolve()].append(name)
-    return [
-        f"{' and '.join(names)} are one FMU, {path.name}, of which a process may hold one instance only "
-        "(canBeInstantiatedOnlyOncePerProcess)"
-        for path, names in placed.items()
-        if len(names) > 1
-    ]
-
-
 @dataclass(frozen=True)
 class PortName:
     """One end of a connection: a port of a unit in a system."""
@@ -69,7 +33,7 @@ class PortName:
 
 
 class PortNames:
-    """Makes port names by attribute: `arm.y.p_WG`. Whether there is such a port is found out by `System.check`."""
+    """Makes port names by attribute: `arm.y.p_WG`. `System.check` checks whether such a port exists."""
 
     def __init__(self, unit: str) -> None:
         self._unit = unit
@@ -82,9 +46,9 @@ class PortNames:
 
 @dataclass(frozen=True)
 class PlacedUnit:
-    """A unit of a system: what its FMU says, the values it starts with, and its communication step in seconds.
+    """A unit of a system: its FMU's description, its start values, and its communication step in seconds.
 
-    A sampled unit acts on the values of the instant at which a step begins.
+    A sampled unit computes its outputs from the inputs at the instant at which a step begins.
     """
 
     name: str
@@ -125,7 +89,7 @@ class Connection:
 
 
 class System:
-    """Units and connections. Nothing is loaded: files are read for what they declare, and wiring is checked on that."""
+    """Units and connections. No FMU is loaded: model descriptions are read, and the wiring is checked by them."""
 
     def __init__(self) -> None:
         self.units: dict[str, PlacedUnit] = {}
@@ -140,11 +104,11 @@ class System:
         """Add a unit under a name, with start values of its parameters and inputs.
 
         `period` is its communication step in seconds, by default the step that its FMU proposes. `sampled` says whether
-        it acts at instants, by default what can be read off its FMU: see `FmuDescription`. What is returned names the
-        unit's ports for `connect`: inputs `unit.u.x`, outputs `unit.y.x`.
+        it computes at instants, by default as its FMU declares: see `FmuDescription`. The returned unit gives port
+        names for `connect`: inputs `unit.u.x`, outputs `unit.y.x`.
 
         Raises:
-            InvalidFmu: the file cannot be used.
+            InvalidFmu: the file is not a valid co-simulation FMU.
             TypeError: the period is not exact.
         """
         path = Path(fmu)
@@ -161,8 +125,8 @@ class System:
     def connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
         """Let an output feed an input.
 
-        Real values are converted to the input's unit where both have the same dimension. A `transformation` takes the
-        place of that, whatever the units; it is for real values only.
+        Real values are converted to the input's unit where both have the same dimension. A `transformation` replaces
+        that conversion, whatever the units; it is for real values only.
 
         Raises:
             TypeError: an end is not a port.
@@ -195,7 +159,7 @@ class System:
 
     @property
     def has_events(self) -> bool:
-        """Whether a unit runs in event mode: then steps may end anywhere, not only on the schedule's grid."""
+        """Whether a unit runs in event mode: then steps may end at any time, not only on the schedule's grid."""
         return any(u.uses_events for u in self.units.values())
 
     def sources_of(self, unit: str) -> dict[str, PortName]:
@@ -205,7 +169,7 @@ class System:
         return {port: source for port, source in sources.items() if port not in clocks}
 
     def clock_connections(self) -> list[Connection]:
-        """Return the connections that let a clock tick with another."""
+        """Return the connections between clocks."""
         return [c for c in self.connections if c.target.port in self.units[c.target.unit].description.clocks]
 
     def _clock(self, end: PortName) -> FmuClock | None:
@@ -213,19 +177,17 @@ class System:
         return unit.description.clocks.get(end.port) if unit else None
 
     def change_by(self, c: Connection) -> LinearTransformation | None:
-        """Return how a connection, one without faults, changes values; None where it copies them, or joins clocks."""
-        change = c.transformation
+        """Return how a valid connection transforms values; None where it copies them, or connects clocks."""
+        transformation = c.transformation
         if self._clock(c.target):
             return None
-        if change is None:
-            a, b = (
-                self.units[c.source.unit].description.outputs[c.source.port],
-                self.units[c.target.unit].description.inputs[c.target.port],
-            )
+        if transformation is None:
+            a = self.units[c.source.unit].description.outputs[c.source.port]
+            b = self.units[c.target.unit].description.inputs[c.target.port]
             if a.kind is not Kind.REAL or a.unit == b.unit or not (a.unit.defined and b.unit.defined):
                 return None
-            change = conversion(a.unit, b.unit)
-        return None if change.is_identity else change
+            transformation = conversion(a.unit, b.unit)
+        return None if transformation.is_identity else transformation
 
     def _period(self, name: str, period: Fraction | None) -> Fraction:
         if period is not None and not isinstance(period, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -233,9 +195,9 @@ class System:
             raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
         if period is not None and period > 0:
             return Fraction(period)
-        text = "its FMU proposes no communication step" if period is None else f"its communication step is {period} s"
-        self._faults.append(f"{name}: {text}; give one that is above 0 s")
-        return Fraction(1, 100)
+        reason = "its FMU proposes no communication step" if period is None else f"its communication step is {period} s"
+        self._faults.append(f"{name}: {reason}; give one that is above 0 s")
+        return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
 
     def _connection_faults(self, c: Connection) -> list[str]:
         clocks = self._clock(c.source), self._clock(c.target)
@@ -256,13 +218,14 @@ class System:
         if unit is None:
             return None, f"there is no unit {end.unit!r}; {nearest(end.unit, self.units)}"
         d = unit.description
-        wanted, other = (d.outputs, d.inputs) if role == "output" else (d.inputs, d.outputs)
-        if end.port in wanted:
-            return wanted[end.port], None
-        if end.port in other or end.port in d.parameters:
-            what = "parameter" if end.port in d.parameters else "input" if role == "output" else "output"
-            return None, f"{end} is an {what}, not an {role}" if what != "parameter" else f"{end} is a parameter"
-        return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, wanted)}"
+        ports, others = (d.outputs, d.inputs) if role == "output" else (d.inputs, d.outputs)
+        if end.port in ports:
+            return ports[end.port], None
+        if end.port in d.parameters:
+            return None, f"{end} is a parameter"
+        if end.port in others:
+            return None, f"{end} is an {'input' if role == 'output' else 'output'}, not an {role}"
+        return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, ports)}"
 
 
 def _value_faults(unit: PlacedUnit) -> list[str]:
@@ -276,6 +239,43 @@ def _value_faults(unit: PlacedUnit) -> list[str]:
         if fault:
             faults.append(f"{unit.name}.{name}: {fault}")
     return faults
+
+
+def clock_mismatch(a: FmuClock | None, b: FmuClock | None) -> str | None:
+    """Return why two clocks cannot be connected, or None if they can; an end that is no clock is None."""
+    if a is None or b is None:
+        return "a clock can be connected with a clock only"
+    if a.is_input or not b.is_input:
+        return "an output clock triggers an input clock, not the other way round"
+    if not b.is_triggered:
+        return "it is time-based; only a triggered input clock can be connected"
+    return None
+
+
+def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[str]:
+    """Return why a unit's clocked ports cannot be accessed as it is placed: that takes event mode."""
+    d = description
+    clocked = sorted(p.name for p in (*d.inputs.values(), *d.outputs.values()) if p.clocks)
+    if not clocked:
+        return []
+    fault = f"{name}: {', '.join(clocked)} can be reached only while a clock ticks, in event mode"
+    if not d.capabilities.event_mode:
+        return [f"{fault}, which its FMU does not have (hasEventMode)"]
+    return [f"{fault}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
+
+
+def once_faults(units: Iterable[tuple[str, FmuDescription]]) -> list[str]:
+    """Return which FMUs are placed more than once though a process may hold only one instance of them."""
+    placed: Mapping[Path, list[str]] = defaultdict(list)
+    for name, d in units:
+        if d.capabilities.once_per_process:
+            placed[d.path.resolve()].append(name)
+    return [
+        f"{' and '.join(names)} are one FMU, {path.name}, of which a process may hold one instance only "
+        "(canBeInstantiatedOnlyOncePerProcess)"
+        for path, names in placed.items()
+        if len(names) > 1
+    ]
 
 
 def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
@@ -296,7 +296,7 @@ def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None
 
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:
-    """Compare what units mean, not how they are written; a variable without a unit fits any."""
+    """Compare units by their definitions, not by their names; a variable without a unit fits any."""
     if pass_as_they_are(a, b):
         return None
     if not (a.defined and b.defined):
@@ -304,14 +304,14 @@ def _unit_mismatch(a: Unit, b: Unit) -> str | None:
         return f"the unit {undefined!r} is not defined in its FMU, so it cannot be compared"
     if a.base != b.base:
         return "their units differ in dimension"
-    wrong = next((u for u in (a, b) if not u.is_usable), None)
-    if wrong is not None and a != b:
-        return f"the unit {wrong.symbol!r} has the factor {wrong.factor!r} and the offset {wrong.offset!r}"
+    unusable = next((u for u in (a, b) if not u.is_usable), None)
+    if unusable is not None and a != b:
+        return f"the unit {unusable.symbol!r} has the factor {unusable.factor!r} and the offset {unusable.offset!r}"
     return None
 
 
 def proposed_step(step: float | None) -> Fraction | None:
-    """Return a step as an exact number; one with its digits cut, as 0.0333333, is taken as the fraction meant."""
+    """Return a step as an exact number; one with few digits, as 0.0333333, is taken as the fraction 1/30."""
     if not step or step < 0:
         return None
     whole = round(1 / step)

@@ -42,7 +42,7 @@ static bool is_refusal(PyObject *error) {
     return is;
 }
 
-/* Logs the exception that is set and clears it; tells whether it is a refusal. */
+/* Logs the exception that is set and clears it; returns whether it rejects the call. */
 static bool log_exception(const Instance *instance, const char *function) {
     PyObject *type = NULL, *error = NULL, *trace = NULL;
     py.PyErr_Fetch(&type, &error, &trace);
@@ -78,7 +78,7 @@ static PyObject *invoke(const Instance *instance, const char *method, PyObject *
 
 #define READY "loader is complete"
 
-/* The global names of a loader of this source: instances share them, or each would leave garbage for the collector. */
+/* The global names of a loader of this source: instances share them, else each would leave garbage for the collector. */
 static PyObject *loader_names(const char *source) {
     uint64_t digest = 0xcbf29ce484222325u; /* FNV-1a */
     for (const char *at = source; *at; at++) digest = (digest ^ (unsigned char)*at) * 0x100000001b3u;

@@ -192,7 +192,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                       sensitivity, n_unknowns);
 }
 
-/* What the standard wants for a status that there is not. */
+/* The standard's return value for a status that does not exist. */
 static fmi2Status discard(const Instance *instance, const char *function, const char *reason) {
     if (!instance) return fmi2Error;
     refuse(instance, function, "there is no such status: %s", reason);

@@ -30,9 +30,9 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance handle, fmi3Boolean on, size_t n, co
     return (fmi3Status)set_logging(handle, __func__, on, n, categories);
 }
 
-/* hasEventMode is for the host to look at. One that asks for event mode where there is none is told at once, not by waiting
- * for events that never come. One that uses it where there is a clock, and never makes the clock tick, is served: the
- * unit then ticks by itself. */
+/* hasEventMode is for the host to look at. One that asks for event mode where there is none gets an error, rather than
+ * wait for events that never come. One that uses it where there is a clock, and never makes the clock tick, is accepted:
+ * the unit then ticks by itself. */
 static bool may_use_event_mode(const Instance *instance, const char *function) {
     if (!instance->event_mode_used || has_clock(instance) || has_events(instance)) return true;
     refuse(instance, function, "eventModeUsed is true, but the unit has no event mode (hasEventMode is false)");

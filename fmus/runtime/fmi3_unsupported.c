@@ -1,4 +1,4 @@
-/* FMI 3.0: what a unit does not offer. The functions are there, so that a host finds every name, and refuse. */
+/* FMI 3.0: functions that a unit does not support. They exist, as hosts look up every name, and return an error. */
 #include "fmi.h"
 #include "log.h"
 

@@ -33,7 +33,7 @@ static bool kept(const Instance *instance, const char *function, uint32_t refere
     return false;
 }
 
-/* The buffer's int64 are within the block's width, but the scalar form may tell of fewer bits. UInt64 keeps its 64. */
+/* The buffer's int64 are within the block's width, but the scalar form may declare fewer bits. UInt64 keeps its 64. */
 #define INTEGER(Name, TYPE)                                                                                            \
     fmi3Status fmi3Get##Name(fmi3Instance handle, References vr, size_t n, fmi3##Name values[], size_t n_values) {     \
         Instance *instance = handle;                                                                                   \
@@ -85,7 +85,7 @@ fmi3Status fmi3SetString(fmi3Instance handle, References vr, size_t n, const fmi
     return (fmi3Status)set_strings(handle, __func__, TYPE_STRING, vr, n, values, n_values);
 }
 
-/* The pointers lead into the instance's own buffers: nothing is copied. */
+/* The pointers are into the instance's own buffers: nothing is copied. */
 fmi3Status fmi3GetBinary(fmi3Instance handle, References vr, size_t n, size_t sizes[], fmi3Binary values[],
                          size_t n_values) {
     Instance *instance = handle;

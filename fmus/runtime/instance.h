@@ -1,7 +1,7 @@
 /* One instance of a unit, whatever the standard: its mode, its variables' buffers, its Python side.
  *
- * fmi2.c and fmi3_*.c translate the standards' functions into calls of these files, each of which calls what stands
- * below it and nothing above:
+ * fmi2.c and fmi3_*.c translate the standards' functions into calls of these files, which are layers: each calls only
+ * those below it.
  *
  *     values.c, derivatives.c   variables, read and written; partial derivatives of outputs by inputs
  *     lifecycle.c, stepping.c   modes from instantiation to the end; steps and event mode
@@ -9,14 +9,14 @@
  *     slave.c                   calls into Python
  *     embedded.c, remote.c      Python in the host's process, or in one of its own
  *     variables.c               the table of variables, checks of their values
- *     log.c                     what the host is told
+ *     log.c                     messages to the host's logger
  *
- * In all of them `function` is the name of the standard's function that the host called; it begins the log line of every
- * refusal.
+ * In all of them `function` is the name of the standard's function that the host called; the log line of every
+ * rejected call begins with it.
  *
- * A refused call (wrong mode, unknown variable, NULL) changes nothing, be it refused here or by a Python exception
+ * A rejected call (wrong mode, unknown variable, NULL) changes nothing, be it rejected here or by a Python exception
  * with a true `is_refusal`. A failure in the block's own code puts the instance into the mode FAILED: it can be reset,
- * set back to a saved state, or freed.
+ * restored to a saved state, or freed.
  */
 #ifndef INSTANCE_H
 #define INSTANCE_H
@@ -80,7 +80,7 @@ typedef struct {
     uint64_t first_input, inputs;               /* where the real inputs lie in `floats` */
     uint64_t first_output, outputs;             /* likewise */
     uint64_t variables, binaries, names;        /* entries and bytes of what follows this structure */
-    uint64_t abilities;                         /* HAS_... of the block, as the host is told */
+    uint64_t abilities;                         /* HAS_... of the block, as in the XML */
     uint64_t period_counter, period_resolution; /* a sampled block's period is counter / resolution seconds; 0: not sampled */
 } TableHeader;
 
@@ -112,7 +112,7 @@ struct Instance {
     Logger *log;
     void (*host_logger)(void); /* the host's own function, called by `log` */
     void *host_environment;
-    unsigned logged; /* the LOG_... that the host wants; errors are always told */
+    unsigned logged; /* the LOG_... that the host wants; errors are always logged */
 
     Mode mode;
     bool event_mode_used, early_return_allowed;

@@ -51,8 +51,8 @@ Status instance_enter_initialisation(Instance *instance, const char *function) {
     return STATUS_OK;
 }
 
-/* Outputs are worked out when they are asked for, as hosts set one variable after another. Between steps they are those
- * of the last step, whatever was set since. */
+/* Outputs are computed when the host gets them, as it sets one variable after another. Between steps they are those of
+ * the last step, whatever was set since. */
 Status instance_refresh_outputs(Instance *instance, const char *function) {
     if (!instance->outputs_stale) return STATUS_OK;
     if (instance->events.clock_active && instance->mode == EVENT) return sampling_evaluate(instance, function);
@@ -78,7 +78,7 @@ Status instance_terminate(Instance *instance, const char *function) {
     return STATUS_OK;
 }
 
-/* From any mode, so it is also the way back after a failure: there may be no interpreter any more. */
+/* Allowed in any mode, as it is also the recovery from a failure: there may be no interpreter any more. */
 Status instance_reset(Instance *instance, const char *function) {
     if (!slave_revive(instance, function) || slave_call(instance, function, "reset") != STATUS_OK) return STATUS_ERROR;
     instance->mode = INSTANTIATED;

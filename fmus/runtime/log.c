@@ -1,5 +1,5 @@
-/* What the host is told. Errors are told always, as the standards recommend; warnings and notes while logging is on and
- * their category is among those that the host has chosen. */
+/* Messages to the host's logger. Errors are always logged, as the standards recommend; warnings and notes while logging
+ * is on and their category is among those that the host has chosen. */
 #include <string.h>
 
 #include "log.h"
@@ -63,7 +63,7 @@ static const char *mode_name(Mode mode) {
 }
 
 bool allowed(const Instance *instance, const char *function, unsigned modes) {
-    if (!instance) return false; /* nobody to tell */
+    if (!instance) return false; /* and so no logger */
     if (modes & instance->mode) return true;
     refuse(instance, function, "not allowed now, the instance is in this state: %s", mode_name(instance->mode));
     return false;

@@ -1,4 +1,4 @@
-/* What the host is told of an instance, and the checks that every function begins with. */
+/* Messages to the host's logger, and the checks with which every function begins. */
 #ifndef LOG_H
 #define LOG_H
 
@@ -16,7 +16,7 @@ void warn(const Instance *instance, const char *function, const char *format, ..
 void note(const Instance *instance, const char *function, const char *format, ...);
 
 Status refuse_unsupported(const Instance *instance, const char *function, const char *reason);
-/* A file of the FMU's sources is not where it is to be. */
+/* Logs that a file of the FMU's sources is missing. */
 void refuse_unreadable(const Instance *instance, const char *function, const char *path);
 
 /* Whether the function may be called now; if not, says so in the log. */

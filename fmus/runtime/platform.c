@@ -126,7 +126,7 @@ char *platform_run(const char *interpreter, const char *script) {
     if (!w || !CreatePipe(&out, &in, &inherited, 0)) return free(w), NULL;
     SetHandleInformation(out, HANDLE_FLAG_INHERIT, 0);
     HANDLE process = start(w, in);
-    CloseHandle(in); /* else the pipe never ends */
+    CloseHandle(in); /* else reading from the pipe never ends */
     free(w);
     char *output = drained(out);
     DWORD status = 1;
@@ -184,7 +184,7 @@ static char *path_of_loaded_libpython(void) {
 void *platform_loaded_python(void) {
     void *process = dlopen(NULL, RTLD_NOW);
     if (process && dlsym(process, "Py_IsInitialized")) return process;
-    char *path = path_of_loaded_libpython(); /* loaded by someone who kept its symbols to himself */
+    char *path = path_of_loaded_libpython(); /* loaded without making its symbols global */
     void *library = path ? dlopen(path, RTLD_NOW | RTLD_NOLOAD | RTLD_GLOBAL) : NULL;
     free(path);
     return library && dlsym(library, "Py_IsInitialized") ? library : NULL;

@@ -1,4 +1,4 @@
-/* What the operating systems do differently. All strings are UTF-8; those returned as `char *` are the caller's. */
+/* What differs between the operating systems. All strings are UTF-8; those returned as `char *` are the caller's. */
 #ifndef PLATFORM_H
 #define PLATFORM_H
 

@@ -21,10 +21,10 @@ typedef enum {
  * On failure returns NULL and adds why to `fault`. */
 Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault);
 
-/* Seconds of a clock that never goes back. */
+/* Seconds of a monotonic clock. */
 double process_clock(void);
 
-/* All of `size` bytes, or what kept them; `deadline` is of the clock above, infinity is none. */
+/* Transfers all of `size` bytes, or says why not; `deadline` is of the clock above, infinity is none. */
 Transfer process_send(Process *process, const void *bytes, size_t size, double deadline);
 Transfer process_receive(Process *process, void *bytes, size_t size, double deadline);
 

@@ -38,7 +38,7 @@ static int locked_file(const char *path) {
     if (file < 0) return -1;
     struct stat ours, there;
     int done = fstat(file, &ours);
-    if (done == 0 && ours.st_uid != geteuid()) { /* of someone who could keep us waiting */
+    if (done == 0 && ours.st_uid != geteuid()) { /* of another user, who could keep us waiting */
         done = -1;
         errno = EACCES;
     }

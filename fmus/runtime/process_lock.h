@@ -1,5 +1,5 @@
 /* A lock that this library shares with all others in the process: each FMU brings its own copy of this code, but a
- * process has one Python, which must not be started by two threads at once. */
+ * process has one Python, which must not be started by two threads at the same time. */
 #ifndef PROCESS_LOCK_H
 #define PROCESS_LOCK_H
 

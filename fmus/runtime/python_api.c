@@ -11,7 +11,7 @@ PythonApi py;
 
 #define OLDEST_MINOR 10
 
-/* What `fmus/interpreter.py` tells of an interpreter; empty strings where it does not know. */
+/* How `fmus/interpreter.py` describes an interpreter; empty strings where it does not know. */
 typedef struct {
     char *executable;
     char *library;
@@ -24,7 +24,7 @@ static void interpreter_clear(Interpreter *found) {
 }
 
 /* Reads lines such as `library = /usr/lib/libpython3.11.so`; changes `lines`. Without strtok, whose place in the text
- * all threads share: the host may start instances in several at once. */
+ * all threads share: the host may start instances in several concurrently. */
 static Interpreter interpreter_of(char *lines) {
     Interpreter found = {0};
     for (char *line = lines; *line;) {
@@ -98,7 +98,7 @@ static void tell_program_name(void *library, const char *executable) {
     if (set && executable) set(py.Py_DecodeLocale(executable, NULL));
 }
 
-/* Sets a variable of Python's that is read when it starts; tells whether this Python has it. */
+/* Sets a variable of Python's that is read when it starts; returns whether this Python has it. */
 static bool set_flag(void *library, const char *name) {
     AnyFunction found = platform_function(library, name);
     if (!found) return false;
@@ -111,7 +111,7 @@ static bool set_flag(void *library, const char *name) {
 /* Paths are UTF-8 whatever the host's locale, which may be C; from Python 3.15 on that is the rule. */
 static void prefer_utf8(void *library) { set_flag(library, "Py_UTF8Mode"); }
 
-/* Python ends the process if it cannot start, so what could keep it from starting is looked at before. Of the
+/* Python ends the process if it cannot start, so what could keep it from starting is checked before. Of the
  * environment it must not take PYTHONHOME and the like, which are for another Python or the host's own. */
 static bool initialise(void *library, const char *from, Text *tried) {
     bool ignored = set_flag(library, "Py_IgnoreEnvironmentFlag");
@@ -179,7 +179,7 @@ static bool use_loaded(void *process, Text *tried) {
     "the shared library of a Python 3.%d or later that has the packages of this unit, such as " \
     "/usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0 (python311.dll, libpython3.11.dylib)."
 
-/* The library that the user chose; what else there is he does not want. */
+/* The library that the user chose; no other is tried. */
 static bool use_library(char *library, Text *tried) {
     Interpreter found = {.library = library};
     bool done = start(&found, "FMU_LIBPYTHON", tried);
@@ -218,7 +218,7 @@ char *python_noted(const char *resources) {
     return executable;
 }
 
-/* The library of the interpreter that the user chose; what else there is he does not want. */
+/* The library of the interpreter that the user chose; no other is tried. */
 static bool use_chosen(const char *interpreter, const char *script, Text *tried) {
     char *lines = platform_run(interpreter, script);
     if (lines && strstr(lines, "executable = ")) return use_description(lines, "FMU_PYTHON", tried);

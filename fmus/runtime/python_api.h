@@ -55,7 +55,7 @@ typedef struct {
 
 extern PythonApi py; /* filled by python_attach */
 
-/* Makes `py` usable and the interpreter run. On failure `tried` says what was tried, and what would cure it. */
+/* Makes `py` usable and the interpreter run. On failure `tried` says what was tried, and the remedy. */
 bool python_attach(const char *resources, Text *tried);
 
 /* The path of the interpreter that resources/python.txt notes, or NULL. */

@@ -1,4 +1,5 @@
-/* An instance's Python side in a process of its own, fmus/server.py: what goes wrong there is not the host's end.
+/* An instance's Python side in a process of its own, fmus/server.py: a failure there does not end
+ * the host.
  *
  * Calls and their answers go through a channel; the variables' buffers lie in shared memory, so setting and getting
  * stay copies in memory. FMU_PYTHON is the path of the interpreter, else that of resources/python.txt is taken, else
@@ -55,7 +56,7 @@ static const Side remote_side;
 
 static Remote *side_of(const Instance *instance) { return instance->python; }
 
-/* A call on its way and back within `limit` seconds. `answer` is given; on TRANSFERRED its bytes are what the method
+/* A call and its answer within `limit` seconds. `answer` is given; on TRANSFERRED its bytes are what the method
  * returned, or why not. */
 static Transfer transfer(const Remote *side, const Question *question, double limit, Outcome *outcome,
                          Answer *answer) {
@@ -124,7 +125,7 @@ static Outcome step(const Instance *instance, const char *function) {
     return ask(instance, function, &question, NULL);
 }
 
-/* Takes over what a slave tells of itself when it starts: a Begun, a warning, the table. */
+/* Reads how a slave describes itself when it starts: a Begun, a warning, the table. */
 static bool take_over(Instance *instance, const char *function, const Answer *answer, Text *fault) {
     SharedMemory *memory = &side_of(instance)->memory;
     Begun begun = {0};
@@ -183,7 +184,7 @@ static bool revive(Instance *instance, const char *function) {
     Text fault = {0};
     if (side->process) process_end(side->process, 0.0, &fault); /* nobody has asked it since it ended */
     text_clear(&fault);
-    instance->mode = FAILED; /* whatever the mode was, that run is lost; whoever asked for the revival sets another */
+    instance->mode = FAILED; /* whatever the mode was, that run is lost; the caller of the revival sets another */
     Start start = begin(instance, function, &fault);
     if (start == NO_PYTHON)
         refuse(instance, function,

@@ -1,7 +1,7 @@
 /* A sampled block's ticks: at start + k * period, k = 0, 1, 2, ...
  *
  * Without event mode a step runs the ticks in [t, t + dt) by itself. With event mode the host activates the clock at each
- * tick, and steps only pass the time between. There are hosts that use event mode wherever it is offered, yet know no
+ * tick, and steps only pass the time between. Some hosts use event mode wherever it is offered, but do not support
  * clocks: when one leaves out the first tick, the unit ticks by itself, after a warning. Either way the block is stepped
  * by its period with the inputs as they are at the tick, and its outputs hold until the next one.
  */
@@ -12,7 +12,7 @@
 #include "slave.h"
 #include "variables.h"
 
-#define MOST_TICKS 1e9 /* in a step: hours */
+#define MOST_TICKS 1e9 /* in a step; they would take hours */
 #define STEP_TOLERANCE 1e-6 /* relative: hosts write step sizes as decimals, and add them up */
 
 double period(const Instance *instance) {
@@ -48,7 +48,7 @@ static Status tick(Instance *instance, const char *function) {
     return status;
 }
 
-/* A step size in other units, or a wild one, would hold the host up for ever. */
+/* A step size that is wrong, perhaps by its unit, would block the host for hours. */
 static bool too_many_ticks(const Instance *instance, double t, double dt) {
     return (t + dt - next_tick(instance)) / period(instance) > MOST_TICKS;
 }
@@ -60,7 +60,7 @@ static Status tick_by_itself(Instance *instance, const char *function, double t,
     bool ticked = false;
     while (next_tick(instance) < t + dt - tick_tolerance(instance, dt)) {
         if (tick(instance, function) != STATUS_OK) {
-            if (ticked) instance->mode = FAILED; /* something has changed, whatever the exception says */
+            if (ticked) instance->mode = FAILED; /* the state has changed, although the exception says it has not */
             return STATUS_ERROR;
         }
         ticked = true;

@@ -11,7 +11,7 @@ double period(const Instance *instance); /* s */
 /* The ticks within a step or, where the host activates the clock, the time until the next. */
 Status sampling_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
 
-/* A tick in event mode: the host activates the clock, may read outputs, which are worked out without the tick being
+/* A tick in event mode: the host activates the clock, may read outputs, which are computed without the tick being
  * done, and settles it. */
 Status sampling_activate(Instance *instance, const char *function);
 Status sampling_evaluate(Instance *instance, const char *function);

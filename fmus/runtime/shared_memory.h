@@ -1,4 +1,4 @@
-/* Memory that an instance shares with its Python process: a file without a name, or one that goes with its last user. */
+/* Memory that an instance shares with its Python process: a file without a name, or one deleted with its last user. */
 #ifndef SHARED_MEMORY_H
 #define SHARED_MEMORY_H
 

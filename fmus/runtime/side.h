@@ -1,8 +1,8 @@
 /* Where an instance's Python side runs: in the host's process (embedded.c), or in a process of its own (remote.c).
  *
  * The environment variable FMU_PYTHON_PROCESS decides: 1, a process of its own; 0, never; not set, only where the
- * host's process cannot have a usable Python. In the host's process a step is leaner, but a block that never comes back
- * or ends its process takes the host with it.
+ * host's process cannot have a usable Python. In the host's process a step is cheaper, but a block that never returns
+ * or ends its process does that to the host, too.
  */
 #ifndef SIDE_H
 #define SIDE_H
@@ -12,7 +12,7 @@
 
 typedef enum {
     ANSWERED,
-    REFUSED, /* and nothing has changed */
+    REFUSED, /* the call was rejected; nothing has changed */
     RAISED,  /* the block's own code failed; its state may be half changed */
     LOST     /* the interpreter is gone */
 } Outcome;
@@ -25,7 +25,7 @@ typedef struct {
     size_t size;
 } Question;
 
-/* The bytes that a method returned; a NUL follows the last. Whoever asks frees them, or gives NULL if he wants none. */
+/* The bytes that a method returned; a NUL follows the last. The caller frees them, or gives NULL if it wants none. */
 typedef struct {
     char *bytes;
     size_t size;

@@ -59,7 +59,7 @@ static Status status_of(Instance *instance, Outcome outcome) {
     return outcome == ANSWERED ? STATUS_OK : STATUS_ERROR;
 }
 
-/* The same after a call that may have left the block's state half changed: only a refusal leaves the mode as it is. */
+/* The same after a call that may have changed half of the block's state: only a rejected call keeps the mode. */
 static Status changed(Instance *instance, Outcome outcome) {
     if (outcome == RAISED) instance->mode = FAILED;
     return status_of(instance, outcome);

@@ -1,5 +1,5 @@
 /* Calls into Python, wherever it runs (side.h). Those that change the block (call, step, set_state) put the instance
- * into the mode FAILED if they fail otherwise than by a refusal; all do if the interpreter is gone. */
+ * into the mode FAILED if they fail other than by rejecting the call; all do if the interpreter is gone. */
 #ifndef SLAVE_H
 #define SLAVE_H
 

@@ -39,7 +39,7 @@ static uint64_t digest_on(uint64_t digest, const void *bytes, size_t size) {
     return digest;
 }
 
-/* A block's state is what its own code made; it is not asked to recognise one that was damaged on its way. */
+/* The digest detects a state that was damaged on its way: a block's own code is not expected to. */
 static uint64_t digest_of(StateHeader header, const char *bytes) {
     header.digest = 0;
     return digest_on(digest_on(0xcbf29ce484222325u, &header, sizeof header), bytes, header.size);

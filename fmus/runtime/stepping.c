@@ -1,4 +1,4 @@
-/* How an instance gets on in time: steps, and event mode between them. A block may have events of its own
+/* How an instance advances in time: steps, and event mode between them. A block may have events of its own
  * (cosim/blocks/block.py); what a sampled block does in a step, and at its ticks, is in sampling.c. */
 #include <math.h>
 
@@ -8,7 +8,7 @@
 #include "stepping.h"
 #include "variables.h"
 
-#define TIME_TOLERANCE 1e-9 /* of the time, or of 1 s: what a host may lose by adding up step sizes */
+#define TIME_TOLERANCE 1e-9 /* of the time, or of 1 s: rounding errors of a host that adds up step sizes */
 
 static double time_tolerance(const Instance *instance) {
     return TIME_TOLERANCE * fmax(1.0, fabs(instance->floats[0]));
@@ -27,14 +27,14 @@ static Status plain_step(Instance *instance, const char *function, double t, dou
     return check_outputs(instance, function);
 }
 
-/* When the block will have an event that is known beforehand; infinity if none. */
+/* The time of the block's next time event; infinity if there is none. */
 static Status ask_next_event(Instance *instance, const char *function, double *next) {
     if (slave_call(instance, function, "next_event") != STATUS_OK) return STATUS_ERROR;
     *next = instance->floats[1];
     return STATUS_OK;
 }
 
-/* Without leave to return early the block handles what happens within the step by itself; only an event at the step's
+/* If it may not return early, the block handles what happens within the step by itself; only an event at the step's
  * end is left to the host. */
 static Status step_to_event(Instance *instance, const char *function, double t, double dt, StepEnd *end) {
     if (instance->events.event_pending)

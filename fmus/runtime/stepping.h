@@ -6,7 +6,7 @@
 
 static inline bool has_events(const Instance *instance) { return instance->abilities & HAS_EVENTS; }
 
-/* A step from `t` on, which is to be where the instance is, but for what a host loses by adding up step sizes. */
+/* A step from `t` on, which must be the instance's time but for rounding errors of a host that adds up step sizes. */
 Status instance_step(Instance *instance, const char *function, double t, double dt, StepEnd *end);
 
 /* Into event mode and out of it; to leave, what is due has to be settled. */

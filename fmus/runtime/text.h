@@ -14,7 +14,7 @@ typedef struct {
 void text_add(Text *text, const char *format, ...);
 void text_add_list(Text *text, const char *format, va_list arguments);
 
-/* Adds a string, if it is longer than `most` without lines from its middle: of a traceback its end tells most. */
+/* Adds a string, if it is longer than `most` without lines from its middle: a traceback's end says most. */
 void text_add_shortened(Text *text, const char *string, size_t most);
 void text_clear(Text *text);
 const char *text_of(const Text *text);

@@ -1,4 +1,4 @@
-/* Variables read and written, whatever the standard: what may be now, and the kinds that both standards treat alike. */
+/* Getting and setting variables: what is allowed in which mode, and the kinds that both standards treat alike. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -99,7 +99,7 @@ bool may_set(Instance *instance, const char *function, Kind kind, Type type, con
         count += variable->count;
     }
     if (!counted(instance, function, count, values, n_values)) return false;
-    bool may_yet_be_refused = kind == STRING || kind == BINARY; /* one value by one, by whoever sets them */
+    bool may_yet_be_refused = kind == STRING || kind == BINARY; /* value by value, by the caller */
     if (n > 0 && !may_yet_be_refused) instance->outputs_stale = true;
     return true;
 }

@@ -1,4 +1,4 @@
-"""What holds a floating object: springs with damping in all six directions, that slide at a limit, and a palm."""
+"""What holds a floating object: springs with damping in all six directions that slide at a limit, and a flat palm."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A light object that floats, alone or held by stiff springs, in steps as long as the robot's control period."""
+"""A light object that floats freely or is held by stiff springs, stable at steps as long as a control period."""
 
 from collections.abc import Sequence
 
@@ -31,36 +31,35 @@ Wrench = tuple[Vector, Vector]
 Held = Sequence[tuple[Attachment, Frame]]
 Scales = list[tuple[float, float]]
 
-_TIGHTENINGS = 4
+_MAX_TIGHTENINGS = 4
 _TOLERANCE = 0.01
 """Relative; an attachment slides when its limit is exceeded by more."""
 
 
 class FloatingObject:
-    """A box in microgravity; held, it goes by the linearly implicit Euler rule, free by Runge and Kutta's.
+    """A box in microgravity; held, it is advanced by the linearly implicit Euler rule, free by Runge-Kutta.
 
     With nu = (v, w) at the end of a step, in the frame of its beginning, M the masses, b_i what attachment i does to an
     object at rest there, and its frame F_i where it is at the end of the step:
 
         (M + h sum_i J_i^T (h K_i + C_i) J_i) nu = (m v, L) + h sum_i J_i^T b_i,  J_i = [1, -r_i x; 0, 1],
 
-    which is stable for any stiffness, and momentum balances to the last bit: an attachment's force in the step is
-    b_i - (h K_i + C_i) J_i nu. The matrix is the same as long as the same attachments hold the same places, so its
-    inverse is kept. A palm adds one row, solved by the Sherman-Morrison formula, that only pushes. Where a limit is
-    exceeded, force or torque of the attachment is scaled down until it keeps it.
+    which is stable for any stiffness, and momentum balances to the last bit: an attachment's force in the step is b_i -
+    (h K_i + C_i) J_i nu. The matrix is the same as long as the same attachments hold the same places, so its inverse is
+    kept. A palm adds one row, solved by the Sherman-Morrison formula, that only pushes. Where a limit is exceeded,
+    force or torque of the attachment is scaled down to it.
 
     Args:
         mass: in kg.
         sides: of the box, m.
-        p: position of its centre in the world.
-        q: orientation.
+        body: advanced instead of a new one at rest in the world's origin.
     """
 
     def __init__(self, mass: float, sides: Vector, body: RigidBody | None = None) -> None:
         a, b, c = (x * x for x in sides)
         self._moments = (mass * (b + c) / 12.0, mass * (a + c) / 12.0, mass * (a + b) / 12.0)
         self.body = body or RigidBody(mass, np.diag(self._moments), ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
-        self._kept: dict[tuple[object, ...], list[list[float]]] = {}
+        self._inverses: dict[tuple[object, ...], list[list[float]]] = {}
 
     def advance(self, h: float, held: Held, palm: Palm | None) -> tuple[list[Wrench], Vector]:
         """Advance by h seconds.
@@ -76,7 +75,7 @@ class FloatingObject:
         loads = [a.load(F, body.p, body.q, R) for a, F in held]
         momentum = scale(body.mass, inverse_rotate(R, body.v)), inverse_rotate(R, body.spin)
         nu, push, wrenches = self._balanced(h, held, loads, [(1.0, 1.0)] * len(held), palm, momentum)
-        if _too_much(held, wrenches):
+        if _exceeds_limits(held, wrenches):
             nu, push, wrenches = self._slide(h, held, loads, palm, momentum, wrenches)
         else:
             self._move(h, R, nu)
@@ -95,7 +94,7 @@ class FloatingObject:
         """Move while attachments keep their limits, and let those give way; return what `_balanced` does."""
         scales = [(1.0, 1.0)] * len(held)
         before = [(1.0, 1.0, 0.0, 0.0)] * len(held)
-        for _ in range(_TIGHTENINGS):
+        for _ in range(_MAX_TIGHTENINGS):
             tighter, before = _tightened([a for a, _ in held], wrenches, scales, before)
             if tighter == scales:
                 break
@@ -132,16 +131,16 @@ class FloatingObject:
 
     def _inverse(self, h: float, held: Held, scales: Scales) -> list[list[float]]:
         key = (h, *[(a.r, id(a.stiffness), s) for (a, _), s in zip(held, scales, strict=True)])
-        if key not in self._kept:
-            if len(self._kept) >= 8:
-                self._kept.clear()
+        if key not in self._inverses:
+            if len(self._inverses) >= 8:
+                self._inverses.clear()
             masses = np.diag([*[self.body.mass] * 3, *self._moments])
             for (a, _), (s, s_turn) in zip(held, scales, strict=True):
                 J = np.hstack([np.eye(3), -_crossing(a.r)])
                 masses += h * s * (a.stiffness.k * h + a.stiffness.c) * np.transpose(J) @ J
                 masses[3:, 3:] += h * s_turn * (a.stiffness.k_turn * h + a.stiffness.c_turn) * np.eye(3)
-            self._kept[key] = np.linalg.inv(masses).tolist()
-        return self._kept[key]
+            self._inverses[key] = np.linalg.inv(masses).tolist()
+        return self._inverses[key]
 
     def _move(self, h: float, R: Matrix, nu: Six) -> None:
         body = self.body
@@ -180,7 +179,7 @@ def _wrench(h: float, a: Attachment, load: Wrench, shares: tuple[float, float], 
     return scale(s, f), scale(s_turn, tau)
 
 
-def _too_much(held: Held, wrenches: Sequence[Wrench]) -> bool:
+def _exceeds_limits(held: Held, wrenches: Sequence[Wrench]) -> bool:
     """Return whether a limit is exceeded."""
     for (a, _), (f, tau) in zip(held, wrenches, strict=True):
         s = a.stiffness

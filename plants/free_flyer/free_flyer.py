@@ -94,7 +94,7 @@ class Inputs:
 
 @dataclass(kw_only=True)
 class Outputs:
-    """Where the robot is and how it moves, in the world: the truth, and what its navigation makes of it."""
+    """Where the robot is and how it moves, in the world: the truth, and its navigation's estimate."""
 
     p_WB: Vector3[Metre] = output("position of the centre of mass")
     q_WB: Vector4[Number] = output("orientation")
@@ -133,8 +133,7 @@ class FreeFlyer:
         params.check()
         self._substep, self._turn = params.substep, params.turn
         q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
-        places = [vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0)]
-        p_BG, p_WB, v_WB, w_WB = places
+        p_BG, p_WB, v_WB, w_WB = (vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0))
         self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
         deviations = (params.position_noise, 0.5 * params.attitude_noise, params.velocity_noise, params.rate_noise)
         self._deviations = np.repeat(np.array(deviations, dtype=np.float64), 3)
@@ -162,7 +161,7 @@ class FreeFlyer:
         return pickle.dumps((b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this robot or of one with equal parameters."""
+        """Restore a state of this robot or of one with equal parameters."""
         b = self._body
         b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state = pickle.loads(state)
 

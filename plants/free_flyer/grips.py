@@ -1,6 +1,7 @@
-"""A person's hand at the end of a compliant arm: on its course, on the object that it holds, or against a palm.
+"""How the free-flyer's object is held: a person's hand at the end of a compliant arm, and the robot's gripper.
 
-The gripper of a free-flyer: two fingers that close along z of G around an object, and a palm behind them.
+The hand follows its course, the object that it holds, or keeps off a palm that it presses. The gripper has two fingers
+that close along z of G around an object, and a palm behind them.
 """
 
 import pickle
@@ -34,17 +35,19 @@ from handover.plants.free_flyer.parameters import Params
 from handover.plants.free_flyer.rigid_body import RigidBody
 from handover.plants.hand_tremor import HandTremor
 
-_SPARE = 0.1
+_SLACK = 0.1
 """Metres beyond its reach at which an arm loses what the hand holds."""
+_NEAR = 0.02
+"""Metres in front of the palm within which an object may come to touch it in a step."""
 
 
 class FlyerHand:
     """The hand H. Its course, where the arm wants it, is the person's plus tremor.
 
-    What the hand holds, it holds fast: the compliance is the arm's, between course and object (`Attachment`), and gives
-    in at arm_force_max; what it gave in, it takes back with the time constant recovery_time. A fist on the palm of a
-    gripper is kept off it, by the depth that its course has in the palm, and presses with the arm's stiffness and
-    damping times depth and speed, at most arm_force_max.
+    What the hand holds, it holds fast: the compliance is the arm's, between course and object (`Attachment`). The arm
+    yields at arm_force_max, and recovers with the time constant recovery_time. A fist on the palm of a gripper is kept
+    off it, by the depth that its course has in the palm, and presses with the arm's stiffness and damping times depth
+    and speed, at most arm_force_max.
     """
 
     def __init__(self, params: Params, p: Vector, q: Quaternion) -> None:
@@ -65,7 +68,7 @@ class FlyerHand:
             params.drift_time,
             params.seed,
         )
-        self._shake, self._rest, self._led = ZERO, p, p
+        self._shake, self._rest, self._target = ZERO, p, p
         self.p, self.q = p, q
         self.p_OH, self.q_OH = vector(params.p_OH), IDENTITY
         self.course = Frame(p, q)
@@ -77,12 +80,12 @@ class FlyerHand:
         return subtract(self.p, self._shake)
 
     def move(self, dt: float, p: Vector, q: Quaternion) -> Frame:
-        """Return the course at the end of a step that leads to a pose, without tremor, where nothing is in the way."""
+        """Return the course at the end of a step that leads to a pose without tremor, if nothing obstructs it."""
         self._recover(dt)
         self._tremor.advance(dt)
         self._shake = vector(self._tremor.displacement)
-        led, self._led = self._led, add(p, self._shake)
-        return _led(dt, led, self._led, q)
+        before, self._target = self._target, add(p, self._shake)
+        return _moving_frame(dt, before, self._target, q)
 
     def press(self, dt: float, course: Frame, G: Frame) -> tuple[Frame, Vector, Vector]:
         """Return the course of a fist as the palm lets it, its force on the gripper, and where it acts, seen from G."""
@@ -90,13 +93,13 @@ class FlyerHand:
         arm = subtract(course.p, G.p)
         x, y, z = inverse_rotate(G.R, arm)
         depth, aside = x + p.fist_radius - p.palm_depth, max(abs(y), abs(z))
-        if not 0.0 < depth < 2.0 * p.fist_radius + _SPARE or aside > p.palm_width + p.fist_radius:
+        if not 0.0 < depth < 2.0 * p.fist_radius + _SLACK or aside > p.palm_width + p.fist_radius:
             return course, ZERO, ZERO
         n = column(G.R, 0)
         v = subtract(course.v, add(G.v, cross(G.w, arm)))
         push = p.arm_stiffness * depth + p.arm_damping * dot(v, n)
         push = min(max(push, 0.0), p.arm_force_max)
-        kept_off = _led(dt, self.course.p, add_scaled(course.p, -depth, n), course.q)
+        kept_off = _moving_frame(dt, self.course.p, add_scaled(course.p, -depth, n), course.q)
         return kept_off, scale(push, n), add_scaled(arm, p.fist_radius - depth, n)
 
     def take_or_leave(self, wants: bool, body: RigidBody) -> None:
@@ -112,20 +115,12 @@ class FlyerHand:
             )
             self.hold = Attachment(self._arm, self.p_OH, place, turn)
         elif self.hold is not None:
-            stretched = distance(self.p, self._rest) > self._p.arm_reach + _SPARE
+            stretched = distance(self.p, self._rest) > self._p.arm_reach + _SLACK
             if not wants or stretched:
                 self.hold = None
 
-    def _recover(self, dt: float) -> None:
-        """Draw what the hand holds back to its course, from where the arm gave in."""
-        hold = self.hold
-        if hold is not None:
-            left = max(0.0, 1.0 - dt / self._p.recovery_time)
-            hold.place = scale(left, hold.place)
-            hold.turn = nlerp(quaternion_inverse(self.q_OH), hold.turn, left)
-
     def arrive(self, course: Frame, body: RigidBody) -> None:
-        """Be where the object is that the hand holds, or on the course."""
+        """Take the pose of the object that the hand holds, or of the course."""
         self.course = course
         if self.hold is None:
             self.p, self.q = course.p, course.q
@@ -137,24 +132,29 @@ class FlyerHand:
         """Return the complete state."""
         h, c = self.hold, self.course
         hold = None if h is None else (h.r, h.place, h.turn)
-        places = (self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH)
+        places = (self._shake, self._target, self.p, self.q, self.p_OH, self.q_OH)
         return pickle.dumps((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this hand or of one with equal parameters."""
+        """Restore a state of this hand or of one with equal parameters."""
         tremor, hold, course, places = pickle.loads(state)
         self._tremor.set_state(tremor)
         self.hold = None if hold is None else Attachment(self._arm, *hold)
         self.course = Frame(*course)
-        self._shake, self._led, self.p, self.q, self.p_OH, self.q_OH = places
+        self._shake, self._target, self.p, self.q, self.p_OH, self.q_OH = places
+
+    def _recover(self, dt: float) -> None:
+        """Draw what the hand holds back to its course, after the arm has yielded."""
+        hold = self.hold
+        if hold is not None:
+            left = max(0.0, 1.0 - dt / self._p.recovery_time)
+            hold.place = scale(left, hold.place)
+            hold.turn = nlerp(quaternion_inverse(self.q_OH), hold.turn, left)
 
 
-def _led(dt: float, before: Vector, p: Vector, q: Quaternion) -> Frame:
+def _moving_frame(dt: float, before: Vector, p: Vector, q: Quaternion) -> Frame:
+    """Return the frame at p, q with the velocity that took it there from a position dt before."""
     return Frame(p, q, divide(subtract(p, before), dt))
-
-
-_NEAR = 0.02
-"""Metres in front of the palm within which an object may come to touch it in a step."""
 
 
 class FlyerGripper:

@@ -113,14 +113,14 @@ class HandAndObject:
 
     - `FloatingObject`: a rigid box of 0.1 kg in microgravity. `FlyerGripper` holds it by a stiff spring in all six
       directions that slides at its limits, or has it pressed against its palm. A hand that holds it is joined to its
-      course by the arm's and wrist's springs, which give in at the force that a person cares to exert (`FlyerHand`).
+      course by the arm's and wrist's springs, which yield at the force that a person cares to exert (`FlyerHand`).
     - `FlyerPerson` moves the hand's course and decides when the fingers close; `HandTremor` is added to the course. A
       fist pushes the palm by the arm's spring.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
-    system this unit comes after the robot; the gripper is led from the last step's pose to this one's, and its wrench
-    acts on the robot in the next step.
+    system this unit comes after the robot; the gripper is interpolated from the last step's pose to this one's, and its
+    wrench acts on the robot in the next step.
 
     Raises:
         InvalidHandParameters: by the constructor, for parameters that contradict each other; by the first step, if the
@@ -165,7 +165,7 @@ class HandAndObject:
         course, f_fist, p_GF = hand.move(dt, person.p, person.q), ZERO, ZERO
         if person.pushes_with_fist:
             course, f_fist, p_GF = hand.press(dt, course, G)
-        self._meet(dt, before, G, course)
+        self._exchange_forces(dt, before, G, course)
         self._f_G, self._tau_G = add(self._f_G, f_fist), add(self._tau_G, cross(p_GF, f_fist))
         self._f_H = subtract(self._f_H, f_fist)
         hand.arrive(course, body)
@@ -181,7 +181,7 @@ class HandAndObject:
         return pickle.dumps(((b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H)))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this unit or of one with equal parameters."""
+        """Restore a state of this unit or of one with equal parameters."""
         b = self._object.body
         (b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H) = pickle.loads(state)
         person, hand, self._gripper.angle = parts
@@ -220,7 +220,7 @@ class HandAndObject:
             q_OH=hand.q_OH,
         )
 
-    def _meet(self, dt: float, before: Frame, after: Frame, course: Frame) -> None:
+    def _exchange_forces(self, dt: float, before: Frame, after: Frame, course: Frame) -> None:
         """Let object, gripper and hand act on each other for dt; find their mean wrenches."""
         count = max(1, math.ceil(dt / self._p.substep - 1e-6))
         f_G, tau_G, f_H, body = ZERO, ZERO, ZERO, self._object.body

@@ -1,4 +1,4 @@
-"""Parameters of the person, the object and the gripper that meet in microgravity."""
+"""Parameters of the person, the object and the gripper that meet in microgravity, and what is wrong with them."""
 
 import enum
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class Params:
     """Object: [Fernandes2020] sec. 4.1.2, its sides in metres. All other values are assumed.
 
     The object lies across the gripper, its long side along y: that makes the handover place (0, -0.07, 0) of
-    [Fernandes2020] the place of an end of an object whose centre is in the world's origin.
+    [Fernandes2020] the position of an end of an object whose centre is in the world's origin.
     """
 
     motion: Motion = parameter(Motion.TAKE, "what the person does at the robot's first signal")
@@ -85,17 +85,17 @@ class Params:
     pull_distance: Metre = parameter(0.30, "longest pull", minimum=0.0, maximum=2.0)
     push_speed: MetrePerSecond = parameter(0.08, "speed of a push against the palm", minimum=0.001, maximum=3.0)
     push_ramp: Second = parameter(0.30, "how long it takes to get to that speed", minimum=0.01, maximum=10.0)
-    push_distance: Metre = parameter(0.30, "longest push, with the way to the palm", minimum=0.0, maximum=2.0)
+    push_distance: Metre = parameter(0.30, "longest push, including the gap to the palm", minimum=0.0, maximum=2.0)
     offer_gap: Metre = parameter(0.04, "how far before the palm a push begins", minimum=0.0, maximum=0.5)
     patience: Second = parameter(10.0, "how long the person pulls or pushes in vain", minimum=0.1, maximum=1e4)
 
     arm_stiffness: NewtonPerMetre = parameter(120.0, "stiffness of the arm", minimum=1.0, maximum=5000.0)
     arm_damping: NewtonSecondPerMetre = parameter(12.0, "damping of the arm", minimum=0.0, maximum=200.0)
-    arm_force_max: Newton = parameter(2.0, "force at which the arm gives in", minimum=0.1, maximum=200.0)
+    arm_force_max: Newton = parameter(2.0, "force at which the arm yields", minimum=0.1, maximum=200.0)
     wrist_stiffness: NewtonMetrePerRadian = parameter(2.5, "stiffness of the wrist", minimum=0.01, maximum=200.0)
     wrist_damping: NewtonMetreSecondPerRadian = parameter(0.20, "damping of the wrist", minimum=0.0, maximum=10.0)
-    wrist_torque_max: NewtonMetre = parameter(0.6, "torque at which the wrist gives in", minimum=0.01, maximum=50.0)
-    recovery_time: Second = parameter(1.0, "how long an arm takes back what it gave in", minimum=0.05, maximum=1e6)
+    wrist_torque_max: NewtonMetre = parameter(0.6, "torque at which the wrist yields", minimum=0.01, maximum=50.0)
+    recovery_time: Second = parameter(1.0, "how long an arm takes to recover from yielding", minimum=0.05, maximum=1e6)
     fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2)
     fist_offset: Metre = parameter(-0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3)
 

@@ -63,7 +63,7 @@ class Perception:
 
 
 class FlyerPerson:
-    """Moves a hand in minimum-jerk reaches, ramped pulls and pushes, one after the other as the robot's doing allows.
+    """Moves a hand in minimum-jerk reaches, ramped pulls and pushes, as the robot's actions allow.
 
     TAKE: REACH for the object's end p_OH, GRASP, PULL until the gripper has let go, WITHDRAW with the object, REST.
     GIVE: OFFER, to p_OG in front of the palm, PUSH against it until the gripper moves, LET_GO when it holds, WITHDRAW.
@@ -91,8 +91,8 @@ class FlyerPerson:
         self._motion = Motion.NONE
         self._from, self._from_q, self._duration = self.p, self.q, 1.0
         self._clock = 0.0  # seconds in this activity
-        self._since = 0.0  # seconds for which what ends it has been there
-        self._way, self._speed, self._axis = 0.0, 0.0, self._pull
+        self._since = 0.0  # seconds for which the condition that ends it has held
+        self._travelled, self._speed, self._axis = 0.0, 0.0, self._pull
         self._saw_light, self._called, self._answered = False, False, False
         self._reaction = params.reaction_time
         self._acts = {
@@ -113,7 +113,7 @@ class FlyerPerson:
         return self._motion is Motion.PUSH and self.activity in (Activity.OFFER, Activity.PUSH, Activity.WITHDRAW)
 
     def act(self, dt: float, seen: Perception) -> None:
-        """Go on for dt with what is seen at its beginning."""
+        """Advance by dt with what is seen at its beginning."""
         if seen.light and not self._saw_light:
             self._called = True
             spread = self._p.reaction_spread * float(self._rng.standard_normal())
@@ -135,22 +135,22 @@ class FlyerPerson:
         """Return the complete state."""
         where = (self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis)
         signal = (self._saw_light, self._called, self._answered, self._reaction)
-        course = (self.holding, self.fingers, self._duration, self._clock, self._since, self._way, self._speed)
+        course = (self.holding, self.fingers, self._duration, self._clock, self._since, self._travelled, self._speed)
         return pickle.dumps((where, signal, course, self._rng.bit_generator.state))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this person or of one with equal parameters."""
+        """Restore a state of this person or of one with equal parameters."""
         where, signal, course, self._rng.bit_generator.state = pickle.loads(state)
         self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis = where
         self._saw_light, self._called, self._answered, self._reaction = signal
-        self.holding, self.fingers, self._duration, self._clock, self._since, self._way, self._speed = course
+        self.holding, self.fingers, self._duration, self._clock, self._since, self._travelled, self._speed = course
 
     def _begin(self, activity: Activity, seen: Perception) -> None:
         """Start an activity: courses go from where the hand is, or the arm wants it if it holds something."""
         if activity is Activity.LET_GO or not self.holding:
             self.p, self.q = seen.p_WH, seen.q_WH
         self.activity = activity
-        self._clock, self._since, self._way, self._speed = 0.0, 0.0, 0.0, 0.0
+        self._clock, self._since, self._travelled, self._speed = 0.0, 0.0, 0.0, 0.0
         self._from, self._from_q = self.p, self.q
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
@@ -191,7 +191,7 @@ class FlyerPerson:
 
     def _pulls(self, dt: float, seen: Perception) -> None:
         p = self._p
-        self._go(dt, self._pull, p.pull_speed, p.pull_ramp, p.pull_distance)
+        self._move_along(dt, self._pull, p.pull_speed, p.pull_ramp, p.pull_distance)
         if not self.holding or self._clock > p.patience:
             self._let_go(seen)
         elif self._has_seen(not seen.gripped, dt):
@@ -207,7 +207,7 @@ class FlyerPerson:
         p = self._p
         moved = seen.angle < p.angle_open - _CLOSING
         if not moved:
-            self._go(dt, self._axis, p.push_speed, p.push_ramp, p.push_distance)
+            self._move_along(dt, self._axis, p.push_speed, p.push_ramp, p.push_distance)
         gives = self._motion is Motion.GIVE
         if gives and seen.gripped:
             if self._has_seen(True, dt):
@@ -236,17 +236,17 @@ class FlyerPerson:
         return there and self._since >= self._reaction
 
     def _follow(self, p: Vector, q: Quaternion) -> None:
-        """Go on along a minimum-jerk course to a goal that may move."""
+        """Follow a minimum-jerk course to a goal that may move."""
         s = minimum_jerk(self._clock / self._duration)
         self.p = lerp(self._from, p, s)
         self.q = nlerp(self._from_q, q, s)
 
-    def _go(self, dt: float, axis: Vector, speed: float, ramp: float, distance: float) -> None:
-        """Go on along an axis with a speed that rises smoothly in the time `ramp`, until the distance is done."""
+    def _move_along(self, dt: float, axis: Vector, speed: float, ramp: float, distance: float) -> None:
+        """Move along an axis with a speed that rises smoothly in the time `ramp`, until the distance is reached."""
         self._speed = min(1.0, self._speed + dt / ramp)
         x = self._speed
-        self._way = min(distance, self._way + dt * speed * x * x * (3.0 - 2.0 * x))
-        self.p = add_scaled(self._from, self._way, axis)
+        self._travelled = min(distance, self._travelled + dt * speed * x * x * (3.0 - 2.0 * x))
+        self.p = add_scaled(self._from, self._travelled, axis)
 
     def _at_object(self, seen: Perception) -> tuple[Vector, Quaternion]:
         """Return the hand's pose at the object's end: the object's axes."""

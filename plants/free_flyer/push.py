@@ -48,7 +48,7 @@ class Push:
     """Gives the mean of a rectangular pulse over each step: w = w_0 |[t, t + dt] and [start, start + duration]| / dt.
 
     Steps follow each other without gaps, so the impulse w_0 duration is exact wherever the pulse's edges lie. In a
-    system the push comes before the robot, which then uses the mean in the very step that it is of; placed after the
+    system the push comes before the robot, which then uses the mean in the same step; placed after the
     robot, or with Jacobi's order, the push comes one step later and is as large. No time has passed at the start: zero.
     """
 
@@ -75,7 +75,7 @@ class Push:
         return b""
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state; any push is the same at the same time."""
+        """Do nothing: the push depends on time alone."""
 
     def _share(self, s: float) -> Outputs:
         p = self._params

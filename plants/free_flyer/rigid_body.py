@@ -30,7 +30,6 @@ from handover.cosim.blocks.ports import Floats
 UNIT_TOLERANCE = 1e-6
 """How far the norm of a quaternion that is given may be from 1."""
 
-
 Wrenches = tuple[Vector, Vector, Vector, Vector]
 """Force and torque in the body's frame, and in the world."""
 
@@ -116,8 +115,8 @@ def momentum_rates(
 ) -> tuple[Vector, Vector, Quaternion]:
     """Return v', L' and q' of `RigidBody`.
 
-    v' = (R f_B + f_G) / m, L' = R tau_B + (R p_BG) x f_G + tau_G, q' = q (0, w) / 2 with w = I^-1 R^T L. Written out:
-    it is called four times a step, and of functions of vectors a step of the free-flyer would take a tenth longer.
+    v' = (R f_B + f_G) / m, L' = R tau_B + (R p_BG) x f_G + tau_G, q' = q (0, w) / 2 with w = I^-1 R^T L. Written out
+    by component, because it is called four times a step: with functions of vectors a step takes a tenth longer.
 
     Args:
         inverse_mass: 1 / m, 1/kg.
@@ -172,17 +171,17 @@ def inertia_faults(mass: float, I_B: Floats) -> list[str]:
     if not np.allclose(I_B, np.transpose(I_B), rtol=0.0, atol=1e-9 * float(np.max(np.abs(I_B)))):
         return [*faults, f"I_B {np.asarray(I_B).tolist()} kg m2 must be symmetric"]
     small, middle, large = sorted(float(a) for a in np.linalg.eigvalsh(I_B))
-    text = f"its principal moments are {small:g}, {middle:g}, {large:g} kg m2"
+    moments = f"its principal moments are {small:g}, {middle:g}, {large:g} kg m2"
     if not small > 0.0:
-        faults.append(f"I_B must be positive definite; {text}")
+        faults.append(f"I_B must be positive definite; {moments}")
     elif large > (small + middle) * (1.0 + 1e-9):
-        faults.append(f"no body has this I_B: {text}, and the largest may not exceed the sum of the others")
+        faults.append(f"no body has this I_B: {moments}, and the largest may not exceed the sum of the others")
     return faults
 
 
 def unit_faults(name: str, q: Floats) -> list[str]:
     """Return what is wrong with a quaternion that should have norm 1."""
-    norm = float(np.linalg.norm(q))
-    if abs(norm - 1.0) <= UNIT_TOLERANCE:
+    length = float(np.linalg.norm(q))
+    if abs(length - 1.0) <= UNIT_TOLERANCE:
         return []
-    return [f"{name} {np.asarray(q).tolist()} must be a unit quaternion; its norm is {norm:g}"]
+    return [f"{name} {np.asarray(q).tolist()} must be a unit quaternion; its norm is {length:g}"]

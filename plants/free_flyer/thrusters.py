@@ -1,4 +1,4 @@
-"""Propulsion of a free-flyer: what becomes of commanded forces and torques, after [Fernandes2020] sec. 4.1.1."""
+"""Propulsion of a free-flyer: limits, delay and lag of commanded wrenches, after [Fernandes2020] sec. 4.1.1."""
 
 import math
 import pickle
@@ -52,12 +52,12 @@ class Outputs:
 
 
 class Thrusters:
-    """Cuts commands at the limits, delays them and lets thrust follow with a lag: T y' = clip(f)(t - delay) - y.
+    """Clips commands to the limits, delays them and lets thrust follow with a lag: T y' = clip(f)(t - delay) - y.
 
     The command is constant in a step, so thrust and its integral are exact: over d seconds of command c,
     y <- c + (y - c) e^(-d/T) and its integral is c d + (y - c) T (1 - e^(-d/T)). The outputs are the mean over the
     step that ends, so that the robot gets the whole impulse; in a system the thrusters come before the robot, which
-    then uses the mean in the very step that it is of. Where a delay is no multiple of the step, two commands share it.
+    then uses the mean in the same step. Where a delay is no multiple of the step, two commands share it.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(("f_B", "tau_B", "saturated"), _COMMANDS)
@@ -68,52 +68,52 @@ class Thrusters:
         self._ideal = params.ideal
         self._lag = 0.0 if params.ideal else params.lag
         self._delayed = params.delay > 0.0
-        self._under_way: deque[tuple[float, _Command]] = deque()  # seconds and command, oldest first
+        self._delay_line: deque[tuple[float, _Command]] = deque()  # seconds and command, oldest first
         if self._delayed:
-            self._under_way.append((params.delay, [0.0] * 6))
+            self._delay_line.append((params.delay, [0.0] * 6))
         self._thrust: _Command = [0.0] * 6
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the thrust at this instant; no time passes."""
         command = _sum(u)
-        cut = command if self._ideal else self._cut(command)
-        thrust = cut if self._lag == 0.0 and not self._delayed else self._thrust
-        return _outputs(thrust, cut != command)
+        clipped = command if self._ideal else self._clip(command)
+        thrust = clipped if self._lag == 0.0 and not self._delayed else self._thrust
+        return _outputs(thrust, clipped != command)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
         command = _sum(u)
-        cut = command if self._ideal else self._cut(command)
+        clipped = command if self._ideal else self._clip(command)
         if self._delayed:
             total = [0.0] * 6
-            for d, arrived in self._pass(dt, cut):
+            for d, arrived in self._delay(dt, clipped):
                 part = self._follow(d, arrived)
                 total = [a + b for a, b in zip(total, part, strict=True)]
         else:
-            total = self._follow(dt, cut)
-        return _outputs([a / dt for a in total], cut != command)
+            total = self._follow(dt, clipped)
+        return _outputs([a / dt for a in total], clipped != command)
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self._thrust, list(self._under_way)))
+        return pickle.dumps((self._thrust, list(self._delay_line)))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of these thrusters or of ones with equal parameters."""
-        self._thrust, under_way = pickle.loads(state)
-        self._under_way = deque(under_way)
+        """Restore a state of these thrusters or of ones with equal parameters."""
+        self._thrust, delay_line = pickle.loads(state)
+        self._delay_line = deque(delay_line)
 
-    def _cut(self, command: _Command) -> _Command:
+    def _clip(self, command: _Command) -> _Command:
         return [c if -m <= c <= m else math.copysign(m, c) for c, m in zip(command, self._limits, strict=True)]
 
-    def _pass(self, dt: float, command: _Command) -> list[tuple[float, _Command]]:
-        """Put dt seconds of a command on their way; return what arrives in the meantime, in order."""
-        self._under_way.append((dt, command))
+    def _delay(self, dt: float, command: _Command) -> list[tuple[float, _Command]]:
+        """Enter dt seconds of a command into the delay line; return what leaves it in that time, in order."""
+        self._delay_line.append((dt, command))
         arrived: list[tuple[float, _Command]] = []
         left = dt
         while left > 1e-12:
-            d, c = self._under_way.popleft()
+            d, c = self._delay_line.popleft()
             if d > left:
-                self._under_way.appendleft((d - left, c))
+                self._delay_line.appendleft((d - left, c))
                 d = left
             arrived.append((d, c))
             left -= d

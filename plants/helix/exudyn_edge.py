@@ -1,4 +1,4 @@
-"""The typed edge to Exudyn: a system of rigid bodies, elastic joints and tendons, advanced in steps."""
+"""Typed interface to Exudyn: a system of rigid bodies, elastic joints and tendons, advanced in steps."""
 
 import contextlib
 import io
@@ -66,7 +66,7 @@ class ExudynEdge:
 
     @property
     def ground(self) -> Any:
-        """The body that stands still, at the origin."""
+        """The fixed body, at the origin."""
         return self._ground
 
     def add_body(self, position: Floats, mass: float, inertia: Floats, centre: Floats, gravity: Floats) -> Any:
@@ -76,7 +76,7 @@ class ExudynEdge:
             position: of the body's origin at the start, unrotated.
             mass: in kg.
             inertia: principal moments about the body's origin, (3,), in kg m2.
-            centre: of mass, in the body.
+            centre: centre of mass, in the body.
             gravity: acceleration, (3,), in m/s2.
         """
         start = [*position, 0.0, 0.0, 0.0]
@@ -102,7 +102,7 @@ class ExudynEdge:
 
         Args:
             markers: of the ends.
-            length: natural, in m.
+            length: natural length, in m.
             stiffness: diagonal, three of translation (N/m), three of rotation (N m), (6,).
             damping: likewise, (6,).
         """
@@ -200,16 +200,16 @@ class ExudynEdge:
         return [np.array(part) for part in self._mbs.systemData.GetSystemState()]
 
     def set_state(self, state: Sequence[Floats]) -> None:
-        """Go back to a state of this or an equal system."""
+        """Restore a state of this or an equal system."""
         data = self._mbs.systemData
         data.SetSystemState(list(state), configuration=_exu.ConfigurationType.Initial)
         data.SetSystemState(list(state), configuration=_exu.ConfigurationType.Current)
 
     def advance(self, t: float, steps: int) -> None:
-        """Advance by internal steps from t, which only failures tell of.
+        """Advance by internal steps; only the report of a failure uses the start t, in s.
 
         Raises:
-            SolverFailure: the state is as before.
+            SolverFailure: there is no solution; the state is as before.
         """
         before = self.get_state()
         timing = self._settings.timeIntegration

@@ -154,8 +154,8 @@ class HandoverPartner:
         self._p_GO: Floats = np.zeros(3)
         self._f_G: Floats = np.zeros(3)
         self._withdrawing = 0.0  # seconds since the hand let go
-        self._p_WG: Floats | None = None  # at the step before, which took:
-        self._elapsed = 0.0
+        self._p_WG: Floats | None = None  # at the previous step
+        self._elapsed = 0.0  # length of that step, s
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where ball and hand are; no time passes."""
@@ -178,7 +178,7 @@ class HandoverPartner:
         return pickle.dumps((self._tremor.get_state(), int(self._holder), arrays, times))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this partner or of one with equal parameters."""
+        """Restore a state of this partner or of one with equal parameters."""
         tremor, holder, arrays, (self._withdrawing, self._elapsed) = pickle.loads(state)
         self._tremor.set_state(tremor)
         self._holder = Holder(holder)
@@ -222,7 +222,7 @@ class HandoverPartner:
         return f * min(1.0, p.guide_force_max / max(float(np.linalg.norm(f)), 1e-12))
 
     def _palm(self) -> Floats:
-        """Return p_WH: at the ball's place while it is offered, then on the way out, along a minimum-jerk course."""
+        """Return p_WH: at the ball's place while it is offered, then withdrawing along a minimum-jerk course."""
         p = self._params
         outwards = np.array([p.p_WO_0[0], p.p_WO_0[1], 0.0])
         away = outwards / max(float(np.linalg.norm(outwards)), 1e-9) - np.array([0.0, 0.0, 1.0])

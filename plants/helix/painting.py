@@ -1,6 +1,7 @@
-"""Paints sketches and decals from far to near over a backdrop, at twice the picture's resolution.
+"""Paints a camera's picture: polygons and decals, from far to near, before the room, as the lens sees them.
 
-The room behind the scene, as one camera sees it, and what the lens does to a picture.
+`Backdrop` is the room behind the scene, and what lens and light do to a picture. `Canvas` paints the scene over it, at
+twice the picture's resolution.
 """
 
 import functools
@@ -159,7 +160,7 @@ class Canvas:
         things += [(d.depth, d, []) for d, s in zip(decals, seen[len(layers) :], strict=True) if s[0]]
         for _, thing, colours in sorted(things, key=lambda x: -x[0]):
             if isinstance(thing, Decal):
-                _stick(fine, thing.texture, _on_canvas(thing.corners, corner))
+                _paint_decal(fine, thing.texture, _on_canvas(thing.corners, corner))
                 continue
             for polygon, colour in zip(thing, colours, strict=True):
                 cv2.fillConvexPoly(fine, polygon, colour, cv2.LINE_8, _SHIFT)
@@ -168,7 +169,7 @@ class Canvas:
         return picture
 
     def _extent(self, points: Floats) -> tuple[NDArray[np.bool_], Floats, Floats]:
-        """Return which things, of points (m, n, 2), are in the picture, and their smallest and largest pixels."""
+        """Return which things, with points (m, n, 2), are in the picture, and their smallest and largest pixels."""
         by_axis = np.ascontiguousarray(np.moveaxis(points, 2, 0))  # (2, m, n): much faster to reduce
         low, high = np.transpose(by_axis.min(axis=2)), np.transpose(by_axis.max(axis=2))
         seen = np.all((high >= 0.0) & (low < self._size) & (high < _FAR) & (low > -_FAR), axis=1)
@@ -176,11 +177,11 @@ class Canvas:
 
 
 def _on_canvas(pixels: Floats, corner: NDArray[np.int64]) -> Floats:
-    """Return canvas pixels; whole numbers are the middles of pixels on both sides."""
+    """Return canvas pixels; whole coordinates are centres of pixels in both pictures."""
     return (pixels - corner + 0.5) * _FINE - 0.5
 
 
-def _stick(fine: Pixels, texture: Pixels, corners: Floats) -> None:
+def _paint_decal(fine: Pixels, texture: Pixels, corners: Floats) -> None:
     """Warp a texture onto the canvas and blend it in."""
     height, width = fine.shape[:2]
     x0, y0 = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, [width, height]).tolist()
@@ -188,7 +189,9 @@ def _stick(fine: Pixels, texture: Pixels, corners: Floats) -> None:
     if x1 <= x0 or y1 <= y0:
         return
     h, w = texture.shape[:2]
-    source = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32) - np.float32(0.5)  # of areas, not middles
+    source = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32) - np.float32(
+        0.5
+    )  # corners of the area, not centres of pixels
     H = cv2.getPerspectiveTransform(source, (corners - [x0, y0]).astype(np.float32))
     warped = cv2.warpPerspective(texture, H, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR)
     patch = fine[y0:y1, x0:x1]

@@ -1,10 +1,7 @@
-"""Arm, gripper, ball and hand as one camera sees them.
+"""What there is to paint before one camera: arm, gripper, ball and hand, as polygons and decals with depths.
 
-The soft arm's body: a ribbed tube along its backbone.
-
-A glossy green ball.
-
-The octagonal collar at the wrist with a fiducial marker on each side.
+`tube` is the ribbed soft arm, `ShadedBall` the glossy green ball, `MarkerCollar` the octagonal collar at the wrist with
+a fiducial marker on each side; `HandoverScene` puts them together.
 """
 
 from typing import Protocol
@@ -69,7 +66,7 @@ _GLOSS = 40.0  # Phong exponent
 
 
 class ShadedBall:
-    """Its outline is exact: the texture's circle goes where the rays from the lens touch the sphere.
+    """A glossy green ball with an exact outline: the texture's circle lies where rays from the lens touch the sphere.
 
     Args:
         radius: in m.
@@ -196,7 +193,7 @@ class HandoverScene:
     """The scene before one camera, as things whose depths give what hides what.
 
     Args:
-        camera: that looks.
+        camera: that sees the scene.
         arm_radius: of the soft arm's ribs, in m.
         ball_radius: in m.
         collar: with the markers, at the wrist.

@@ -1,12 +1,7 @@
-"""What is painted: polygons and decals in a picture's pixels, with their depths.
+"""What is painted: polygons and decals in a picture's pixels, with their depths and shades.
 
-One lamp, far away, and how it shades a matt surface.
-
-Chains of round rods with rounded ends: fingers, a stem, a forearm.
-
-What a person's hand looks like that offers a ball on its fingers.
-
-What the tendon-driven gripper looks like: a stem and three jointed fingers that close on what is at G.
+`Limb`s are chains of round rods with rounded ends. `hand` and `gripper` are made of them: a person's hand that offers a
+ball on its fingers, and a stem with three jointed fingers that close on what is at G.
 """
 
 from collections.abc import Sequence
@@ -52,7 +47,7 @@ class Decal:
 
 @dataclass(frozen=True)
 class Light:
-    """A lamp in the direction `towards`, shape (3,), of unit length; the room gives back the share `ambient`."""
+    """A far lamp in the direction `towards`, shape (3,), of unit length; the room reflects the share `ambient`."""
 
     towards: Floats
     ambient: float

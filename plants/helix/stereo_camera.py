@@ -1,7 +1,4 @@
-"""Two cameras behind the arm and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14.
-
-Noise of a camera's sensor, cheap enough for every picture.
-"""
+"""Two cameras behind the arm and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14."""
 
 import pickle
 from collections.abc import Mapping
@@ -29,7 +26,7 @@ from handover.plants.helix.painting import Backdrop, Canvas
 from handover.plants.helix.scene import HandoverScene, MarkerCollar
 from handover.plants.helix.shapes import Pixels
 
-_SPARE = 1 << 20  # offsets to choose from
+_OFFSETS = 1 << 20  # places in the sheet of noise where a picture's part may begin
 
 
 class SensorNoise:
@@ -49,7 +46,7 @@ class SensorNoise:
     def __init__(self, sigma: float, shape: tuple[int, int, int], rng: Generator) -> None:
         self._shape = shape
         self._size = int(np.prod(shape))
-        sheet = rng.standard_normal(self._size + _SPARE, dtype=np.float32)
+        sheet = rng.standard_normal(self._size + _OFFSETS, dtype=np.float32)
         sheet = np.rint(np.clip(sheet * np.float32(sigma), -255.0, 255.0)).astype(np.int16)
         self._brighter = np.maximum(sheet, 0).astype(np.uint8)
         self._darker = np.maximum(-sheet, 0).astype(np.uint8)
@@ -57,7 +54,7 @@ class SensorNoise:
     @staticmethod
     def draw(rng: Generator) -> int:
         """Return an offset into the sheet."""
-        return int(rng.integers(_SPARE))
+        return int(rng.integers(_OFFSETS))
 
     def add(self, picture: Pixels, offset: int) -> None:
         """Add the noise at the offset to the picture."""
@@ -154,7 +151,7 @@ class StereoCamera:
     """Takes a pair of pictures of the arm, its marker ring and gripper, the ball and the hand.
 
     Pictures are synthesised: solids are projected through either lens's distortion and painted from far to near, then
-    blurred, lit unevenly and given sensor noise. A step shows the scene at its start, as its inputs tell it.
+    blurred, lit unevenly and given sensor noise. A step shows the scene at its start, as the inputs give it.
 
     The state is that of the noise: the generator and where the last pair's noise was taken from.
 
@@ -197,7 +194,7 @@ class StereoCamera:
         return pickle.dumps((self._rng.bit_generator.state, self._offsets))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state that `get_state` gave."""
+        """Restore a state that `get_state` gave."""
         self._rng.bit_generator.state, self._offsets = pickle.loads(state)
 
     def _covers(self) -> list[tuple[str, float, float]]:

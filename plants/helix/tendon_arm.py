@@ -10,7 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
 from handover.cosim.blocks.units import Metre, Newton, Number
-from handover.plants.helix.tendon_design import Params
+from handover.plants.helix.tendon_parameters import Params
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -25,17 +25,17 @@ class StepSizeError(ValueError):
     is_refusal = True
 
     def __init__(self, dt: float, internal_step: float) -> None:
-        fewer = max(int(dt / internal_step), 1)
+        steps = max(int(dt / internal_step), 1)
         super().__init__(
             f"TendonArm: a step of {dt:.6g} s is no multiple of the internal step {internal_step:g} s; "
-            f"{fewer * internal_step:.6g} s or {(fewer + 1) * internal_step:.6g} s would fit"
+            f"{steps * internal_step:.6g} s or {(steps + 1) * internal_step:.6g} s would fit"
         )
         self.dt, self.internal_step = dt, internal_step
 
 
 @dataclass(kw_only=True)
 class Inputs:
-    """What the motors are told, and what pulls at the gripper."""
+    """Commands to motors and gripper, and what pulls at the gripper."""
 
     dl_t: Vector9[Metre] = port(
         np.zeros(9),
@@ -84,9 +84,8 @@ class TendonArm:
     variable_step: ClassVar[bool] = False
 
     def __init__(self, params: Params) -> None:
-        from handover.plants.helix.tendon_chain import (
-            TendonChain,  # Exudyn takes long to load, and ports are read without it
-        )
+        # imported here, since Exudyn takes long to load, and ports are read without it
+        from handover.plants.helix.tendon_chain import TendonChain
         from handover.plants.helix.tendon_design import TendonDesign
 
         self._params = params
@@ -126,7 +125,7 @@ class TendonArm:
         return pickle.dumps((self._chain.edge.get_state(), self._grip))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this arm or of one with equal parameters."""
+        """Restore a state of this arm or of one with equal parameters."""
         system, self._grip = pickle.loads(state)
         self._chain.edge.set_state(system)
 

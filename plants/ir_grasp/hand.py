@@ -70,7 +70,7 @@ hand. In a plan view fingers cannot be spread sideways, so index and ring lie on
 stiffness: the stiffer index lags behind, as in sec. V-D."""
 
 JOINTS: Final = sum(len(f.lengths) for f in FINGERS)
-LOWEST, HIGHEST = -0.2, 1.6
+MIN_ANGLE, MAX_ANGLE = -0.2, 1.6
 """Limits of the joint angles, in rad; assumed."""
 
 PALM: Final = ((0.0, -0.044), (0.056, -0.044), (0.056, 0.044), (0.0, 0.044))
@@ -94,7 +94,7 @@ def finger_points(p_WH: Floats, yaw: float, q: Floats) -> list[Floats]:
         n = len(f.lengths)
         heading = yaw + f.spread + f.flexion * np.cumsum(q[first : first + n], dtype=np.float64)
         first += n
-        base = p_WH + _turned(f.base, yaw)
+        base = p_WH + _rotate(f.base, yaw)
         links = np.array(f.lengths)[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
         points.append(np.vstack([base, base + np.cumsum(links, axis=0)]))
     return points
@@ -102,7 +102,7 @@ def finger_points(p_WH: Floats, yaw: float, q: Floats) -> list[Floats]:
 
 def palm_outline(p_WH: Floats, yaw: float) -> Floats:
     """Return the corners of the palm, (4, 2) in W, in m."""
-    return np.array([p_WH + _turned(corner, yaw) for corner in PALM])
+    return np.array([p_WH + _rotate(corner, yaw) for corner in PALM])
 
 
 def sensor_rays(p_WH: Floats, yaw: float, q: Floats) -> tuple[Floats, Floats]:
@@ -115,6 +115,6 @@ def sensor_rays(p_WH: Floats, yaw: float, q: Floats) -> tuple[Floats, Floats]:
     return origins, directions
 
 
-def _turned(p: tuple[float, float], yaw: float) -> Floats:
+def _rotate(p: tuple[float, float], yaw: float) -> Floats:
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array([c * p[0] - s * p[1], s * p[0] + c * p[1]])

@@ -1,4 +1,4 @@
-"""The things on the table of the grasp scene, seen from above: shapes, poses, masses, reflectivities."""
+"""The objects on the table of the grasp scene, seen from above: shapes, poses, masses, reflectivities."""
 
 import enum
 import math
@@ -31,7 +31,7 @@ class Disc:
         """Largest distance of a point of it from the origin of O, in m."""
         return self.radius
 
-    def met(self, x: float, y: float, d_x: float, d_y: float) -> tuple[float, float] | None:
+    def intersect(self, x: float, y: float, d_x: float, d_y: float) -> tuple[float, float] | None:
         """Return where a ray from (x, y) in O along the unit vector d enters: distance and cosine of incidence."""
         middle = -(x * d_x + y * d_y)
         half_2 = self.radius**2 - x * x - y * y + middle * middle
@@ -59,7 +59,7 @@ class Slab:
         """Largest distance of a point of it from the origin of O, in m."""
         return max(math.hypot(x, y) for x, y in self.corners)
 
-    def met(self, x: float, y: float, d_x: float, d_y: float) -> tuple[float, float] | None:
+    def intersect(self, x: float, y: float, d_x: float, d_y: float) -> tuple[float, float] | None:
         """Return where a ray from (x, y) in O along the unit vector d enters: distance and cosine of incidence."""
         enters, leaves, cosine = 0.0, math.inf, 0.0
         for at, along, low, high in ((x, d_x, self.low[0], self.high[0]), (y, d_y, self.low[1], self.high[1])):
@@ -112,7 +112,7 @@ class Solid:
         """Largest distance of a point of it from the origin of O, in m."""
         return max(p.reach for p in self.parts)
 
-    def met(self, x: float, y: float, d_x: float, d_y: float) -> tuple[float, float] | None:
+    def intersect(self, x: float, y: float, d_x: float, d_y: float) -> tuple[float, float] | None:
         """Return what a ray meets first from outside: its distance in m and the cosine of the angle of incidence.
 
         Args:
@@ -123,7 +123,7 @@ class Solid:
         """
         nearest: tuple[float, float] | None = None
         for part in self.parts:
-            hit = part.met(x, y, d_x, d_y)
+            hit = part.intersect(x, y, d_x, d_y)
             if hit is not None and (nearest is None or hit < nearest):
                 nearest = hit
         return nearest

@@ -30,8 +30,8 @@ from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
 SEES_NOTHING = 0.2
 """Value of the output `range` where a sensor's ray meets no object, in m."""
 
-_LIGHTEST = 1e-3
-"""Least mass of an object, kg: contacts with much heavier phalanges fling away what is lighter."""
+_MIN_MASS = 1e-3
+"""Least mass of an object, kg: contacts with much heavier phalanges would throw a lighter one off."""
 
 
 class InvalidSceneParameters(InvalidParameters):
@@ -90,8 +90,8 @@ class Params:
     b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1)
     c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0)
     d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=0.1)
-    nearest: Metre = parameter(0.004, "where the readings turn: less is nearer than the sensor can tell", minimum=1e-4)
-    farthest: Metre = parameter(0.065, "from where on nothing is seen", maximum=0.15)
+    nearest: Metre = parameter(0.004, "distance of the largest reading; nearer, readings fall again", minimum=1e-4)
+    farthest: Metre = parameter(0.065, "distance beyond which nothing is seen", maximum=0.15)
     contact_share: Number = parameter(
         0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0
     )
@@ -123,13 +123,13 @@ class Params:
         """Raise InvalidSceneParameters, with all faults: ranges, mass, an object beside the table, a sensor."""
         faults = parameter_faults(self)
         if not faults:
-            if 0.0 < self.mass_O < _LIGHTEST:
-                faults.append(f"mass_O {self.mass_O:g} kg must be 0, for the thing's own, or at least {_LIGHTEST:g} kg")
+            if 0.0 < self.mass_O < _MIN_MASS:
+                faults.append(f"mass_O {self.mass_O:g} kg must be 0, for the thing's own, or at least {_MIN_MASS:g} kg")
             faults.extend(self._table_faults())
             try:
                 self.sensor()
-            except InvalidSensorParameters as unusable:
-                faults.extend(unusable.faults)
+            except InvalidSensorParameters as error:
+                faults.extend(error.faults)
         if faults:
             raise InvalidSceneParameters(faults)
 

@@ -1,4 +1,4 @@
-"""The typed edge to pymunk: rigid bodies in a plane without gravity, hinges, friction on the ground."""
+"""Typed interface to pymunk: rigid bodies in a plane without gravity, hinges, friction on the ground."""
 
 import math
 from array import array
@@ -70,7 +70,7 @@ class PymunkEdge:
         self._shared = batch.Buffer()
 
     def add_driven(self, motion: Motion) -> PymunkBody:
-        """Add a body that moves with the velocities it is given, whatever pushes."""
+        """Add a body that moves with the velocities it is given, whatever forces act on it."""
         return self._add(pymunk.Body(body_type=pymunk.Body.KINEMATIC), motion)
 
     def add_body(self, mass: float, inertia: float, motion: Motion) -> PymunkBody:

@@ -14,10 +14,10 @@ from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.ir_grasp.hand import FINGERS
 from handover.plants.ir_grasp.parameters import SEES_NOTHING, InvalidSceneParameters, Params
-from handover.plants.ir_grasp.world import DT, Command, GraspWorld, beginning
+from handover.plants.ir_grasp.world import DT, Command, GraspWorld, initial_snapshot
 
 _SLOT = 5  # internal steps for which a sensor is active
-_CHECKPOINT = 500  # internal steps after which the world is made anew of its own snapshot
+_CHECKPOINT = 500  # internal steps after which the world is rebuilt from its own snapshot
 _SENSORS = len(FINGERS)
 _MIDDLE = ((1.0, 0.0),)
 
@@ -28,23 +28,23 @@ class StepSizeError(ValueError):
     is_refusal = True
 
     def __init__(self, dt: float) -> None:
-        fewer = max(int(dt / DT), 1)
+        steps = max(int(dt / DT), 1)
         super().__init__(
             f"GraspScene: a step of {dt:.6g} s is no multiple of the internal step {DT:g} s; "
-            f"{fewer * DT:.6g} s or {(fewer + 1) * DT:.6g} s would fit"
+            f"{steps * DT:.6g} s or {(steps + 1) * DT:.6g} s would fit"
         )
         self.dt = dt
 
 
 class InvalidCommand(InvalidParameters):
-    """A command that is no number; `faults` names the inputs."""
+    """A command that is not finite; `faults` names the inputs."""
 
     block = "GraspScene"
 
 
 @dataclass(kw_only=True)
 class Inputs:
-    """What arm and hand are told."""
+    """Commands to arm and hand."""
 
     p_WH_cmd: Vector2[Metre] = port(np.array([-0.25, 0.0]), "commanded position of the wrist, in the world")
     yaw_cmd: Radian = port(0.0, "commanded orientation of the hand")
@@ -53,7 +53,7 @@ class Inputs:
 
 @dataclass(kw_only=True)
 class Outputs:
-    """What encoders and sensors tell, and where things are; three entries are of thumb, index and ring finger."""
+    """What encoders and sensors measure, and where things are; three entries are of thumb, index and ring finger."""
 
     p_WH: Vector2[Metre] = output("position of the wrist, in the world")
     yaw: Radian = output("orientation of the hand")
@@ -70,17 +70,17 @@ class Outputs:
 class GraspScene:
     """Soft hand, object and table in the plane x-y of W, with three infrared sensors, after [Luberto] sec. III, V.
 
-    - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`grasp_wrist.follow`), a thumb
-      of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left (`grasp_hand`). One elastic tendon,
+    - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`follow`), a thumb
+      of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left. One elastic tendon,
       T = k max(0, sigma L - sum r q), turns all joints, so a blocked finger lets the others close further.
-    - Object: rigid, with dry friction on the table and in the hand (`grasp_objects`).
+    - Object: rigid, with dry friction on the table and in the hand; `SOLIDS` has the shapes.
     - Sensors: on the distal phalanges, one active at a time (sec. V-B), for 5 ms (assumed), in the order of the
       fingers; it is read at the end of its time. A reading is the mean over three rays of the beam of
       `InfraredSensor.ticks`, plus noise, rounded. At the start all three have been read. Only the object returns
       light, and no finger hides it.
 
     Contacts are solved by pymunk, in steps of 1 ms; a step of the block is a multiple of that. pymunk's solver starts
-    from impulses that it does not give away. So that a state is complete, the world is made anew of its positions and
+    from impulses that cannot be read. So that a state is complete, the world is rebuilt from its positions and
     velocities every 500 internal steps; a state is that snapshot and the commands since, which `set_state` replays.
 
     Raises:
@@ -101,7 +101,7 @@ class GraspScene:
         self._reflectivity = params.reflectivity or params.solid.reflectivity
         angles = (0.0, -params.beam, params.beam)
         self._rays = [(math.cos(a), math.sin(a)) for a in angles]
-        self._checkpoint = beginning(params)
+        self._checkpoint = initial_snapshot(params)
         self._since: list[tuple[int, Command]] = []  # internal steps and their command
         self._replayed = 0  # internal steps since the checkpoint
         self._world = GraspWorld(params, self._checkpoint)
@@ -152,7 +152,7 @@ class GraspScene:
         return pickle.dumps((self._checkpoint, self._since, sensors))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this scene or of one with equal parameters."""
+        """Restore a state of this scene or of one with equal parameters."""
         self._checkpoint, since, (self._clock, self._ticks, self._rng.bit_generator.state) = pickle.loads(state)
         self._world, self._since, self._replayed = GraspWorld(self._params, self._checkpoint), [], 0
         for steps, command in since:
@@ -187,8 +187,8 @@ def _command(u: Inputs) -> Command:
     """Return what is commanded, without negative zeros: equal commands are kept once."""
     x, y, yaw, sigma = *u.p_WH_cmd.tolist(), float(u.yaw_cmd), float(u.sigma_cmd)
     if not all(map(math.isfinite, (x, y, yaw, sigma))):
-        facts = {"p_WH_cmd": (x, y), "yaw_cmd": (yaw,), "sigma_cmd": (sigma,)}
-        wrong = {name: values for name, values in facts.items() if not all(map(math.isfinite, values))}
+        commands = {"p_WH_cmd": (x, y), "yaw_cmd": (yaw,), "sigma_cmd": (sigma,)}
+        wrong = {name: values for name, values in commands.items() if not all(map(math.isfinite, values))}
         raise InvalidCommand([f"{name} must be finite, not {list(values)}" for name, values in wrong.items()])
     return x + 0.0, y + 0.0, yaw + 0.0, min(max(sigma, 0.0), 1.0) + 0.0
 
@@ -196,7 +196,7 @@ def _command(u: Inputs) -> Command:
 def _check_overlap(world: GraspWorld) -> None:
     overlaps = world.overlaps()
     if overlaps:
-        facts = ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)
+        depths = ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)
         raise InvalidSceneParameters(
-            [f"the hand would start in the object: {facts}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"]
+            [f"the hand would start in the object: {depths}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"]
         )

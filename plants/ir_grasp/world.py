@@ -1,8 +1,7 @@
-"""Hand, object and table of the grasp scene as bodies that touch, advanced by 1 ms at a time.
+"""Hand, object and table of the grasp scene as bodies in contact, advanced by 1 ms at a time.
 
-How the arm's wrist follows its command.
-
-The elastic tendon that closes all joints of the soft hand: T = k max(0, sigma L - sum r q).
+`follow` is how the arm's wrist follows its command. One elastic tendon with the tension T = k max(0, sigma L - sum r q)
+closes all joints of the soft hand; `resting_posture` gives the joints that it leads to in free space.
 """
 
 import math
@@ -14,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.ir_grasp.hand import FINGERS, HIGHEST, LOWEST, PALM, SENSOR_PLACE, Finger, finger_points
+from handover.plants.ir_grasp.hand import FINGERS, MAX_ANGLE, MIN_ANGLE, PALM, SENSOR_PLACE, Finger, finger_points
 from handover.plants.ir_grasp.objects import Disc
 from handover.plants.ir_grasp.parameters import Params
 from handover.plants.ir_grasp.pymunk_edge import Motion, PymunkBody, PymunkEdge
@@ -42,7 +41,6 @@ PULLEYS: Final = np.array([r for f in FINGERS for r in f.pulleys])
 STIFFNESS: Final = np.array([k for f in FINGERS for k in f.stiffness])
 """Stiffness K of the joints, (8,), in N m/rad."""
 
-
 GEARS: Final = tuple(
     f.flexion * (r - after) for f in FINGERS for r, after in zip(f.pulleys, (*f.pulleys[1:], 0.0), strict=True)
 )
@@ -69,7 +67,7 @@ def resting_posture(sigma: float, stiffness: float, travel: float) -> Floats:
     """
 
     def posture(T: float) -> Floats:
-        return np.clip(PULLEYS * T / STIFFNESS, LOWEST, HIGHEST)
+        return np.clip(PULLEYS * T / STIFFNESS, MIN_ANGLE, MAX_ANGLE)
 
     low, high = 0.0, stiffness * sigma * travel
     for _ in range(80):
@@ -95,13 +93,13 @@ Ray = tuple[float, float]
 
 _ITERATIONS = 10
 _HAND, _OBJECT = 1, 2  # groups whose own shapes do not collide
-_NAMED = tuple(zip(("thumb", "index", "ring"), FINGERS, strict=True))
-_LAST = tuple(int(i) - 1 for i in accumulate(len(f.lengths) for f in FINGERS))
-_FIRST = 2  # of the phalanges among the bodies
+_NAMED_FINGERS = tuple(zip(("thumb", "index", "ring"), FINGERS, strict=True))
+_DISTAL = tuple(int(i) - 1 for i in accumulate(len(f.lengths) for f in FINGERS))  # among the phalanges
+_FIRST_PHALANX = 2  # among the bodies
 _STILL = (0.0, 0.0, 0.0)
 
 
-def beginning(p: Params) -> Snapshot:
+def initial_snapshot(p: Params) -> Snapshot:
     """Return the scene at the start: everything at rest, the fingers as the tendon has them in free space."""
     q = resting_posture(p.sigma_0, p.tendon_stiffness, p.tendon_travel)
     palm = (float(p.p_WH_0[0]), float(p.p_WH_0[1]), p.yaw_H_0, *_STILL)
@@ -124,8 +122,8 @@ class GraspWorld:
     """The physics of the grasp scene, from a snapshot on.
 
     What follows depends on the snapshot and the commands alone, bit for bit. A snapshot does not hold the contacts'
-    last impulses, from which the solver starts, so a world made of one takes a slightly different course from then on
-    than the world that it was taken of.
+    last impulses, from which the solver starts, so a world made from one moves slightly differently from then on than
+    the world that it was taken from.
 
     The palm follows the wrist's command whatever pushes (`follow`). The tendon, T = k max(0, sigma L - sum r q), turns
     each joint with r T against its spring and damper. Object and table: dry friction, isotropic and uniform.
@@ -171,7 +169,7 @@ class GraspWorld:
     def joints(self) -> list[float]:
         """Joint angles, 8, in rad."""
         q: list[float] = []
-        angles = self._edge.angles(_FIRST)
+        angles = self._edge.angles(_FIRST_PHALANX)
         for f in FINGERS:
             before = self._wrist[2] + f.spread
             for angle in angles[len(q) :][: len(f.lengths)]:
@@ -182,7 +180,7 @@ class GraspWorld:
     @property
     def tension(self) -> float:
         """Tension of the tendon, in N."""
-        return self._tension(self._edge.angles(_FIRST))
+        return self._tension(self._edge.angles(_FIRST_PHALANX))
 
     @property
     def touching(self) -> int:
@@ -191,7 +189,7 @@ class GraspWorld:
 
     def overlaps(self) -> list[tuple[str, float]]:
         """Return which of the hand's bodies are in the object, and how deep, in m."""
-        names = ["palm"] + [f"{n} phalanx {i + 1}" for n, f in _NAMED for i in range(len(f.lengths))]
+        names = ["palm"] + [f"{n} phalanx {i + 1}" for n, f in _NAMED_FINGERS for i in range(len(f.lengths))]
         depths = [self._edge.overlap(b, self._thing) for b in (self._palm, *self._phalanges)]
         return [(name, depth) for name, depth in zip(names, depths, strict=True) if depth > 0.0]
 
@@ -201,9 +199,9 @@ class GraspWorld:
         x, y, yaw, sigma = command
         travel = p.closure_rate * DT
         self._sigma += min(max(sigma - self._sigma, -travel), travel)
-        T = self._tension(self._edge.angles(_FIRST))
+        T = self._tension(self._edge.angles(_FIRST_PHALANX))
         self._drive(x, y, yaw)
-        self._edge.advance(_FIRST, [T * gear for gear in GEARS])
+        self._edge.advance(_FIRST_PHALANX, [T * gear for gear in GEARS])
 
     def cast_rays(self, finger: int, rays: Sequence[Ray], reach: float) -> list[tuple[float, float]]:
         """Return what rays from a finger's sensor meet within reach: distance in m, cosine of the angle of incidence.
@@ -213,7 +211,7 @@ class GraspWorld:
             rays: cosine and sine of their angles from the sensor's direction.
             reach: in m.
         """
-        f, body, solid = FINGERS[finger], self._phalanges[_LAST[finger]], self._params.solid
+        f, body, solid = FINGERS[finger], self._phalanges[_DISTAL[finger]], self._params.solid
         (x, y), (x_O, y_O), yaw_O = body.position, self._thing.position, self._thing.angle
         x, y = x - x_O, y - y_O
         if math.hypot(x, y) > solid.reach + reach + f.lengths[-1]:
@@ -228,7 +226,7 @@ class GraspWorld:
         for d_c, d_s in rays:
             d_x, d_y = d_c * n_x - d_s * n_y, d_s * n_x + d_c * n_y
             # a ray starts r behind the window, in the phalanx: the pad may be in the object by a little
-            hit = solid.met(x - r * d_x, y - r * d_y, d_x, d_y)
+            hit = solid.intersect(x - r * d_x, y - r * d_y, d_x, d_y)
             if hit is not None and hit[0] - r <= reach:
                 met.append((hit[0] - r, hit[1]))
         return met
@@ -273,7 +271,7 @@ class GraspWorld:
             body = self._edge.add_body(p.phalanx_mass, inertia, motion)
             ends = ((-length / 2.0, 0.0), (length / 2.0, 0.0))
             self._edge.add_capsule(body, ends, radius, p.grip_friction, _HAND)
-            low, high = sorted((rest + f.flexion * LOWEST, rest + f.flexion * HIGHEST))
+            low, high = sorted((rest + f.flexion * MIN_ANGLE, rest + f.flexion * MAX_ANGLE))
             self._edge.add_hinge((before, body), (joint, ends[0]), (low, high), rest, stiffness, p.joint_damping)
             self._phalanges.append(body)
             before, joint, rest = body, ends[1], 0.0

@@ -1,7 +1,4 @@
-"""A pressure regulator with a valve behind it, which closes when the pressure is reached.
-
-A geared motor that turns a joint at a limited speed, and the current that it takes.
-"""
+"""Actuators of the VSL arm: a link's pressure regulator with its valve, and a joint's geared servo with its current."""
 
 import math
 import pickle
@@ -11,8 +8,8 @@ class PressureLine:
     """Air in a link, fed through a valve that shuts the regulator off, after [Gandarias2020] sec. II.A.
 
     Valve open: p' = (p_cmd - p) / T. It closes when |p - p_cmd| comes to the tolerance, then p' = -p / T_leak, and it
-    opens when |p - p_cmd| leaves the band. Events inside a step are met where they happen, so the course of the
-    pressure does not depend on the steps.
+    opens when |p - p_cmd| leaves the band. Events inside a step are located exactly, so the pressure over time does not
+    depend on the steps.
 
     Args:
         p: pressure at the start, Pa, with the valve closed.
@@ -28,7 +25,7 @@ class PressureLine:
         self.p = p
         """Pressure, Pa."""
         self.open = False
-        """Whether the valve is."""
+        """Whether the valve is open."""
 
     def advance(self, dt: float, p_cmd: float) -> None:
         """Advance by dt with the command held, Pa."""
@@ -45,11 +42,11 @@ class PressureLine:
         return pickle.dumps((self.p, self.open))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this line or of one with equal arguments."""
+        """Restore a state of this line or of one with equal arguments."""
         self.p, self.open = pickle.loads(state)
 
     def _regulate(self, dt: float, p_cmd: float) -> float:
-        """Let air through until the tolerance is reached, dt at most; return what is left of dt."""
+        """Regulate until the tolerance is reached, at most for dt; return what is left of dt."""
         off = self.p - p_cmd
         until = self._T * math.log(max(abs(off) / self._tolerance, 1.0))
         if until > dt:
@@ -60,7 +57,7 @@ class PressureLine:
         return dt - until
 
     def _leak(self, dt: float, p_cmd: float) -> float:
-        """Hold the air until the pressure falls out of the band, dt at most; return what is left of dt."""
+        """Leak with the valve closed until the pressure leaves the band, at most for dt; return what is left of dt."""
         lowest = p_cmd - self._band
         until = self._T_leak * math.log(self.p / lowest) if self.p > lowest > 0.0 else math.inf
         if until > dt:
@@ -75,8 +72,8 @@ class VslServo:
     """Goes to its command at constant speed; its current carries the torque and the friction of its gear.
 
     i = (tau + tau_f) / kt. Friction opposes the turn: from rest it grows with the angle turned, from -f to f over
-    `sliding`, and stays at f or -f while the gear slides. At rest it stays what it was, so the current tells a torque
-    only to within f / kt, and which way the joint came.
+    `sliding`, and stays at f or -f while the gear slides. At rest it keeps its value, so the current gives a torque
+    only to within f, depending on the direction from which the joint came.
 
     Args:
         angle: at which it starts, rad, with no friction.
@@ -92,7 +89,7 @@ class VslServo:
         self._friction_max = friction
         self._rise = 2.0 * friction / sliding
         self.angle = angle
-        """What the servo aims at on its way to the command, rad."""
+        """What the servo aims at as it moves to the command, rad."""
         self._friction = 0.0
         self._shown = angle
 
@@ -121,5 +118,5 @@ class VslServo:
         return pickle.dumps((self.angle, self._friction, self._shown))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this servo or of one with equal arguments."""
+        """Restore a state of this servo or of one with equal arguments."""
         self.angle, self._friction, self._shown = pickle.loads(state)

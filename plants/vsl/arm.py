@@ -27,19 +27,19 @@ from handover.plants.vsl.statics import NoEquilibrium, VslStatics
 
 __all__ = ["Inputs", "InvalidInput", "InvalidVslArmParameters", "Link", "Motion", "Outputs", "Params", "VslArm"]
 
-HEAVIEST = 0.5
+MAX_LOAD = 0.5
 """Largest load, kg; the published experiments go to 0.1 kg."""
 
 
 class InvalidInput(InvalidParameters):
-    """Inputs that are not numbers, or a load or pressure that there is not; `faults` lists all of them."""
+    """Inputs that are not finite, or a load or pressure out of range; `faults` lists all of them."""
 
     block = "VslArm"
 
 
 @dataclass(kw_only=True)
 class Inputs:
-    """What motors and regulators are told, and what hangs on the gripper."""
+    """Commands to motors and regulators, and what hangs on the gripper."""
 
     q_cmd: Vector3[Radian] = port(
         np.array([0.0, 0.8411, -1.6821]), "commanded joint angles", minimum=-TURN, maximum=TURN
@@ -50,7 +50,7 @@ class Inputs:
     p_cmd: Vector2[Pascal] = port(
         np.array([1.0e5, 1.0e5]), "commanded pressures of links 2 and 3", minimum=0.0, maximum=HIGHEST_PRESSURE
     )
-    load: Kilogram = port(0.0, "mass that hangs on the gripper", minimum=0.0, maximum=HEAVIEST)
+    load: Kilogram = port(0.0, "mass that hangs on the gripper", minimum=0.0, maximum=MAX_LOAD)
 
 
 @dataclass(kw_only=True)
@@ -72,8 +72,8 @@ class VslArm:
       eq. (1), for angles q = (theta_1, theta_2, theta_3), theta_2 from the horizontal, theta_3 from link 2.
     - Bodies, springs: `VslChain`. QUASI_STATIC: at rest at every instant, `VslStatics`. DYNAMIC: `VslDynamics`.
     - Servos go to q_cmd at qd_cmd, `VslServo`. Under the torque tau of J2 or J3 the encoder shows
-      q = q_aim - tau / servo_stiffness (after a while, if DYNAMIC); the joint gives by tau / joint_stiffness more,
-      behind the encoder. Friction shows in the current only. J1 carries no weight and does not give: its current is
+      q = q_aim - tau / servo_stiffness (with a lag, if DYNAMIC); the joint yields by tau / joint_stiffness more,
+      behind the encoder. Friction shows in the current only. J1 carries no weight and does not yield: its current is
       friction and the arm's inertia about it.
     - Air: `PressureLine`. A rigid link has a line that is closed behind the transducer.
     - Readings have white Gaussian noise, drawn once a step.
@@ -148,7 +148,7 @@ class VslArm:
         return pickle.dumps((parts, random, self._spin, self._q, self._i, self._started))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this arm or of one with equal parameters."""
+        """Restore a state of this arm or of one with equal parameters."""
         parts, random, self._spin, self._q, self._i, self._started = pickle.loads(state)
         for part, own in zip((self._mechanics, *self._servos, *self._lines), parts, strict=True):
             part.set_state(own)
@@ -225,13 +225,13 @@ class VslArm:
 
 
 def _check_inputs(u: Inputs) -> None:
-    """Raise InvalidInput for what is no number, or no load or pressure."""
+    """Raise InvalidInput for what is not finite, and for a load or pressure out of range."""
     faults: list[str] = []
     if not np.isfinite((*u.q_cmd, *u.qd_cmd, *u.p_cmd)).all():
         faults.append(f"q_cmd {u.q_cmd}, qd_cmd {u.qd_cmd} and p_cmd {u.p_cmd} must be finite")
     elif not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= HIGHEST_PRESSURE:
         faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {HIGHEST_PRESSURE:g} Pa")
-    if not 0.0 <= u.load <= HEAVIEST:
-        faults.append(f"load {u.load:g} kg must be from 0 to {HEAVIEST:g} kg")
+    if not 0.0 <= u.load <= MAX_LOAD:
+        faults.append(f"load {u.load:g} kg must be from 0 to {MAX_LOAD:g} kg")
     if faults:
         raise InvalidInput(faults)

@@ -1,4 +1,4 @@
-"""Bodies, hinges and weights of the chain that stands for the arm's two upper links."""
+"""The pseudo-rigid chain that stands for the VSL arm's two upper links: its bodies, springs and masses."""
 
 import math
 from typing import NamedTuple
@@ -35,12 +35,12 @@ class Pose(NamedTuple):
 
 
 class VslChain:
-    """A plane pseudo-rigid chain: bodies on springs at their roots, that give to shear along their own normals.
+    """A plane pseudo-rigid chain: bodies on springs at their roots, that yield to shear along their own normals.
 
     A flexible link of length L has n hinges of compliance h / EI, h = (L - 2 cap) / n, in the middle of n equal pieces
     of its flexible part, so its first and last body are half a piece and a cap. A body of which the length f is
-    flexible gives by s = V f / (shear_0 + p pi R^2) to the shear force V; EI = EI_0 + EI_p p. A rigid link has EI_rigid
-    and does not shear. The springs at J2 and J3 are what gives behind the encoders.
+    flexible yields by s = V f / (shear_0 + p pi R^2) to the shear force V; EI = EI_0 + EI_p p. A rigid link has
+    EI_rigid and does not shear. The springs at J2 and J3 are what yields behind the encoders.
 
     With u_k = (l_k + i s_k) exp(i phi_k) in the plane of the arm (real part outwards, imaginary part up), body i ends
     at the sum of u_k, k <= i; its mass is taken at the middle of u_i, with the inertia of an even rod.

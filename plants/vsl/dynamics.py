@@ -1,4 +1,4 @@
-"""How the chain of the arm swings."""
+"""Dynamics of the VSL arm's chain: how it swings, integrated by generalized-alpha."""
 
 import math
 import pickle
@@ -124,7 +124,7 @@ class VslDynamics:
         return pickle.dumps((self._y, self._v, self._a, self._a_mean, self._offset, self.pose))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this chain or of one with equal parameters."""
+        """Restore a state of this chain or of one with equal parameters."""
         self._y, self._v, self._a, self._a_mean, self._offset, self.pose = pickle.loads(state)
 
     def _held(self, p: tuple[float, float], load: float, spin: float) -> _Held:
@@ -160,7 +160,7 @@ class VslDynamics:
     def _move(self, h: float, rest: Floats, k: Floats, held: _Held) -> bool:
         """Advance coordinates and rates by h, with springs k from rest, e + damping_time e' without force.
 
-        Return whether Newton's method came to an end; if not, nothing has moved.
+        Return whether Newton's method converged; if not, nothing has moved.
         """
         alpha_m, alpha_f, beta, gamma = _weights(self._params.high_frequency_damping)
         a_mean = (alpha_f * self._a - alpha_m * self._a_mean) / (1.0 - alpha_m)
@@ -204,7 +204,7 @@ class VslDynamics:
         by: tuple[float, float],
         held: _Held,
     ) -> tuple[Complexes, Floats]:
-        """Return what acceleration, turn and weight pull at u_k with, (n,), and the derivative in y of that, (m, m).
+        """Return the forces of inertia, turn and weight on u_k, (n,), and their derivative in y, (m, m).
 
         Rates v and a are those of y, and change with it by the factors given. With e = exp(i phi) in all terms of
         u'' = i u phi'' + i e s'' - 2 e phi' s' - u phi'^2, its derivative by phi is i u''.
@@ -223,7 +223,7 @@ class VslDynamics:
         return pull, S
 
     def _turning(self, u: Complexes, e: Complexes, pull: Complexes) -> Floats:
-        """Return the derivative in y of the generalised forces of what pulls at u_k, as D turns, (m, m)."""
+        """Return the derivative in y of the generalised forces of the pull at u_k, as D turns, (m, m)."""
         n, at = len(self._chain), self._sheared
         sheared = np.arange(n, len(self._body))
         turning = np.zeros((len(self._body), len(self._body)))

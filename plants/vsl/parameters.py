@@ -1,4 +1,4 @@
-"""What the arm with variable-stiffness links is made of, and how well its sensors see. [Gandarias2020] sec. II."""
+"""Parameters of the VSL arm: links, motors, air and sensors, and what is wrong with them. [Gandarias2020] sec. II."""
 
 import enum
 import math

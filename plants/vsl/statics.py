@@ -1,4 +1,4 @@
-"""Where the chain of the arm rests: its weight against bending, shear and joints."""
+"""Statics of the VSL arm's chain: where it rests under its weight, against bending, shear and joints."""
 
 import math
 import pickle
@@ -11,7 +11,7 @@ from handover.plants.vsl.chain import Pose, VslChain
 _TOLERANCE = 1e-12
 _ITERATIONS = 12
 _MAX_NEWTON_STEP = 0.5  # rad: a Newton step that is longer is cut
-_MAX_SHARE, _MIN_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # of gravity, by which it is turned up
+_MAX_SHARE, _MIN_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # steps, as shares of gravity, in which it is increased
 
 
 class NoEquilibrium(RuntimeError):
@@ -47,8 +47,8 @@ class VslStatics:
         inwards: phi_i-1 = phi_i - b_i tau_i - offset_i
 
     with offsets theta_2 at the shoulder, theta_3 at the elbow. The angle of the tip's body therefore gives all others,
-    down to the ground's, which must be 0. Its derivative goes along: it is positive at every hinge if the rest is
-    stable. The search begins at the last rest; if that leads nowhere, gravity is turned up from 0.
+    down to the ground's, which must be 0. Its derivative is computed with it, and is positive at every hinge if the
+    rest is stable. The search begins at the last rest; if it does not converge, gravity is increased from 0 in steps.
 
     Args:
         chain: whose rest it is.
@@ -99,7 +99,7 @@ class VslStatics:
         return pickle.dumps((self._tip, self.pose))
 
     def set_state(self, state: bytes) -> None:
-        """Go back to a state of this chain or of one with equal parameters."""
+        """Restore a state of this chain or of one with equal parameters."""
         self._tip, self.pose = pickle.loads(state)
 
     def _bodies(self, theta: tuple[float, float], p: tuple[float, float], load: float, share: float) -> list[_Body]:

@@ -1,4 +1,4 @@
-"""Runs a campaign: checks all of it, keeps what is done, gives the rest to a worker pool, writes the table."""
+"""Runs a campaign: checks all of it, keeps runs that are done, gives the others to a worker pool, writes the table."""
 
 import contextlib
 import shutil
@@ -21,37 +21,37 @@ def run_campaign(
     folder: CampaignFolder,
     pool: WorkerPool,
     progress: OnRunCounts,
-    settling: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
+    signals_deferred: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
 ) -> CampaignTable:
-    """Carry out the runs of a campaign that are not done yet, and return the table of all.
+    """Run those runs of a campaign that are not done yet, and return the table of all.
 
-    Whatever ends it, what was done stays; run the same command again to resume: a run is done when it has left its
-    folder, also if a unit failed in it. Lost runs are tried again by the next call. The table is completed in a block
-    of `settling`, which can keep an interruption from it.
+    However it ends, runs that are done are kept, and the next call resumes the campaign. A run is done when its folder
+    is complete, also if a unit failed in it. Lost runs are tried again by the next call. The table is completed in a
+    block of `signals_deferred`, which can defer signals meanwhile.
 
     Raises:
         InvalidRunFolder, PoolError: before anything was written.
-        RecordNotWritten: there is no room.
-        ClusterLost: there are no workers any more.
+        RecordNotWritten: the disk is full.
+        ClusterLost: all workers were lost.
         KeyboardInterrupt: it was interrupted; runs under way are dropped, and the table is written.
     """
-    check = _nothing if folder.has_all(ready.plan) else pool.check
+    check = _no_check if folder.has_all(ready.plan) else pool.check
     with folder.opened(ready.plan, ready.fmus, check) as fmus:
-        work = _Work(ready.plan, folder, progress)
+        state = _CampaignState(ready.plan, folder, progress)
         try:
-            work.give_to(pool, fmus)
+            state.run_on(pool, fmus)
         finally:
-            with settling():
-                work.end()
+            with signals_deferred():
+                state.end()
     return CampaignTable.read(folder.table)
 
 
-def _nothing(_folder: Path) -> None:
-    """Check no crew, as none is needed unless a run turns out to be damaged."""
+def _no_check(_folder: Path) -> None:
+    """Check no worker pool, as none is needed unless a run turns out to be damaged."""
 
 
-class _Work:
-    """A campaign under way."""
+class _CampaignState:
+    """A campaign under way: its table, and how many of its runs are done."""
 
     def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: OnRunCounts) -> None:
         self.plan, self.folder, self.progress = plan, folder, progress
@@ -61,8 +61,8 @@ class _Work:
         self._kept = self._keep(self.runs.values())
         progress(self.counts)
 
-    def give_to(self, pool: WorkerPool, fmus: Mapping[str, Path]) -> None:
-        """Have the runs carried out that are not done."""
+    def run_on(self, pool: WorkerPool, fmus: Mapping[str, Path]) -> None:
+        """Let a worker pool run the runs that are not done."""
         jobs = [self._job(run, fmus) for run in self._to_do()]
         if not jobs:
             return
@@ -71,7 +71,7 @@ class _Work:
                 self._take(result)
 
     def end(self) -> None:
-        """Write the table, also of runs that have ended but whose answers have not come, as after an interruption."""
+        """Write the table, also with runs that have ended but whose results have not come, as after an interruption."""
         known = {row.run.name for row in self.table.rows if row.status != "lost"}
         if self._keep([run for run in self.runs.values() if run.name not in known]):
             self.progress(self.counts)
@@ -79,30 +79,30 @@ class _Work:
 
     @property
     def counts(self) -> RunCounts:
-        """How far it has come."""
+        """Counts of its runs so far."""
         n = self._count
         ended = n["done"] + n["failed"]
         return RunCounts(total=len(self.runs), kept=self._kept, ended=ended, failed=n["failed"], lost=n["lost"])
 
     def _keep(self, runs: Iterable[PlannedRun]) -> int:
-        """Take the rows of those runs that are done, and remove what cannot be read of a run; return how many."""
+        """Take the rows of runs that are done, and remove folders that cannot be read; return how many are done."""
         kept: list[RunRow] = []
         for run in runs:
-            left = self.folder.runs / run.name
-            row = row_of(run, left) if self.folder.is_done(run) else None
+            run_folder = self.folder.runs / run.name
+            row = row_of(run, run_folder) if self.folder.is_done(run) else None
             if row is not None:
                 kept.append(row)
-            elif left.exists():
+            elif run_folder.exists():
                 with disk_errors_reported(self.folder.runs):
-                    shutil.rmtree(left)
+                    shutil.rmtree(run_folder)
         self.table.keep(kept)
         self._count = Counter(row.status for row in self.table.rows)
         return len(kept)
 
     def _to_do(self) -> Sequence[PlannedRun]:
-        """Return the runs that are not done, repetition by repetition, so that a part tells of all points."""
-        left = [run for run in self.runs.values() if not self.folder.is_done(run)]
-        return sorted(left, key=lambda run: run.repetition)
+        """Return the runs that are not done, repetition by repetition, so that a part of them covers all points."""
+        missing = [run for run in self.runs.values() if not self.folder.is_done(run)]
+        return sorted(missing, key=lambda run: run.repetition)
 
     def _job(self, run: PlannedRun, fmus: Mapping[str, Path]) -> RunJob:
         return RunJob(

@@ -1,7 +1,4 @@
-"""The workers of a Dask cluster as a worker pool.
-
-Waiting, for a while, for who may never answer.
-"""
+"""The workers of a Dask cluster as a worker pool, and calls with a timeout to processes that may never answer."""
 
 import contextlib
 import itertools
@@ -36,47 +33,48 @@ def call_with_timeout(ask: Callable[[], _T], bound: float) -> _T:
     So it may run an event loop where the caller's thread has one already, as in a notebook.
 
     Args:
-        ask: asks and waits for the answer.
-        bound: how long it gets, s; after that it is left alone.
+        ask: the function.
+        bound: how long it gets, s; after that its thread is abandoned.
 
     Raises:
-        TimeoutError: it has not returned in time. What it raises itself, besides.
+        TimeoutError: it has not returned in time. Besides, what it raises itself.
     """
-    value: queue.SimpleQueue[tuple[_T] | Exception] = queue.SimpleQueue()
+    answers: queue.SimpleQueue[tuple[_T] | Exception] = queue.SimpleQueue()
 
     def wait() -> None:
         try:
-            value.put((ask(),))
+            answers.put((ask(),))
         except Exception as e:  # raised where it is waited for
-            value.put(e)
+            answers.put(e)
 
     threading.Thread(target=wait, daemon=True).start()
     try:
-        result = value.get(timeout=bound)
+        answer = answers.get(timeout=bound)
     except queue.Empty:
         raise TimeoutError(f"no answer within {bound:g} s") from None
-    if isinstance(result, Exception):
-        raise result
-    return result[0]
+    if isinstance(answer, Exception):
+        raise answer
+    return answer[0]
 
 
 _AHEAD = 2
-"""Orders that the scheduler holds for each thread: one that is carried out and one that waits.
+"""Jobs that the scheduler holds for each thread: one that runs and one that waits.
 
-Of many thousand it would hold many thousand, and take their workers' loss for their fault.
+If it were given all jobs of a campaign at once, it would hold many thousand on few workers, and count the loss of a
+worker as a failure of each of them.
 """
 
 _MAX_REPORTED = 3
-"""Workers that a refusal names."""
+"""Workers that an error names."""
 
 _POLL_INTERVAL = 5.0
-"""How often it is looked whether there are workers while no run ends, s."""
+"""How often is checked whether there are workers while no run ends, s."""
 
-_WITHOUT = 60.0
-"""For how long a cluster may have no worker, s: those that watch them start others."""
+_MAX_TIME_WITHOUT_WORKERS = 60.0
+"""For how long a cluster may have no worker, s: nannies restart workers that crashed."""
 
-_BOUND = 10.0
-"""How long workers get to answer what is asked of all, s."""
+_ANSWER_TIMEOUT = 10.0
+"""How long workers get to answer a question to all of them, s."""
 
 
 class ClusterPool:
@@ -84,7 +82,7 @@ class ClusterPool:
 
     Args:
         client: connected to the cluster's scheduler.
-        name: what the cluster is called where something is wrong with it.
+        name: what the cluster is called in error messages.
     """
 
     def __init__(self, client: Client, name: str) -> None:
@@ -94,79 +92,79 @@ class ClusterPool:
 
     @property
     def workers(self) -> int:
-        """How many runs go on at the same time."""
+        """How many jobs run at the same time."""
         return sum(cast("Mapping[str, int]", self._client.nthreads()).values())
 
     def check(self, folder: Path) -> None:
-        """Check that all workers give the same numbers as this process, and write to the same folder.
+        """Check that all workers compute the same numbers as this process, and write to the same folder.
 
         Raises:
             PoolError: some do not; the first of them are named.
             RecordNotWritten: this process cannot write there itself.
         """
-        value = self._ask(package_versions)
-        self._raise_faults({worker: _difference(self._versions, other) for worker, other in value.items()})
+        found = self._ask(package_versions)
+        self._raise_faults({worker: _difference(self._versions, other) for worker, other in found.items()})
         token = uuid.uuid4().hex
         mark = folder / f".{token}"
         with disk_errors_reported(folder):
             try:
                 mark.write_text(token, encoding="utf-8")
-                value = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
+                faults = self._ask(fault_of_folder, str(folder.absolute()), mark.name, token)
             finally:
                 mark.unlink(missing_ok=True)
         self._raise_faults(
-            {w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in value.items()}
+            {w: f"cannot use {folder.absolute()}: {fault}" if fault else "" for w, fault in faults.items()}
         )
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        """Give each order to a worker; yield the answers as they come.
+        """Give each job to a worker; yield the results as they come.
 
-        A worker that is lost is replaced where something watches it (a nanny), and its run begun anew. If the iteration
-        is left before its end, runs under way are ended and leave nothing.
+        A worker that is lost is replaced where it has a nanny, and its run is started again. If the iteration is left
+        before its end, runs under way are ended and leave nothing.
 
         Raises:
-            ClusterLost: the scheduler has gone, or no worker has been there for a while.
+            ClusterLost: the scheduler is gone, or there has been no worker for a minute.
         """
         waiting = iter(jobs)
-        going: dict[Any, tuple[RunJob, Future[JobResult]]] = {}
+        running: dict[Any, tuple[RunJob, Future[JobResult]]] = {}
         done: queue.SimpleQueue[Future[JobResult]] = queue.SimpleQueue()
 
         def give() -> None:
-            for job in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(going))):
+            for job in itertools.islice(waiting, max(1, _AHEAD * self.workers - len(running))):
                 key = f"run-{uuid.uuid4().hex}"
                 future = self._client.submit(run_job_on_worker, job, self._batch, self._versions, key=key, pure=False)
-                going[future.key] = job, future
+                running[future.key] = job, future
                 future.add_done_callback(done.put)
 
         try:
             give()
-            while going:
-                job, future = going.pop(self._next(done).key)
-                answer = self._result(job, future)
+            while running:
+                job, future = running.pop(self._next(done).key)
+                result = self._result(job, future)
                 give()
-                yield answer
+                yield result
         finally:
-            if going:
-                with contextlib.suppress(Exception):  # of a cluster that is gone nothing is left to end
-                    self._client.cancel([future for _, future in going.values()], force=True)
+            if running:
+                with contextlib.suppress(Exception):  # a cluster that is gone has nothing left to end
+                    self._client.cancel([future for _, future in running.values()], force=True)
                 self.end()
 
     def end(self) -> None:
-        """End the runs that workers carry out for this crew, and the servers that they keep for it."""
-        ended, self._batch = self._batch, uuid.uuid4().hex  # what comes later is no part of it
+        """End the runs of this pool on the workers, and the run servers that they keep for it."""
+        ended, self._batch = self._batch, uuid.uuid4().hex  # later jobs are of another batch
         with contextlib.suppress(Exception):
             self._ask(end_runs, ended)
 
     def _next(self, done: "queue.SimpleQueue[Future[JobResult]]") -> "Future[JobResult]":
         """Wait for a run's end."""
-        there = time.monotonic()
+        last_seen = time.monotonic()
         while True:
             with contextlib.suppress(queue.Empty):
                 return done.get(timeout=_POLL_INTERVAL)
             if self.workers:
-                there = time.monotonic()
-            elif time.monotonic() - there > _WITHOUT:
-                raise ClusterLost(f"{self._name} has had no worker for {_WITHOUT:g} s")
+                last_seen = time.monotonic()
+            elif time.monotonic() - last_seen > _MAX_TIME_WITHOUT_WORKERS:
+                raise ClusterLost(f"{self._name} has had no worker for {_MAX_TIME_WITHOUT_WORKERS:g} s")
 
     def _result(self, job: RunJob, future: "Future[JobResult]") -> JobResult:
         if future.cancelled():
@@ -186,10 +184,10 @@ class ClusterPool:
             return cast("dict[str, Any]", self._client.run(function, *arguments, on_error="return"))
 
         try:
-            value = call_with_timeout(ask, _BOUND)
-        except Exception as e:  # what a cluster's end leads to
+            answers = call_with_timeout(ask, _ANSWER_TIMEOUT)
+        except Exception as e:  # a cluster that ends may raise anything
             raise PoolError(f"the workers of {self._name} do not answer: {one_line(e)}") from e
-        return {f"worker {worker}": answer for worker, answer in value.items()}
+        return {f"worker {worker}": answer for worker, answer in answers.items()}
 
     def _raise_faults(self, faults: Mapping[str, str]) -> None:
         """Raise PoolError if there is a fault."""

@@ -1,6 +1,7 @@
-"""The folder of a campaign: what it is, the FMUs that it uses, the folders of its runs, and their table.
+"""The folder of a campaign: its plan, the FMUs that it uses, the folders of its runs, and their table.
 
-Where a campaign's folder is if the call does not say.
+`CampaignFolder.opened` makes the folder or resumes it, and keeps other commands from it; `default_folder` finds the one
+to resume where the command names none.
 """
 
 import contextlib
@@ -30,9 +31,9 @@ _FILE = "campaign.json"
 
 
 class CampaignFolder:
-    """Paths of what a campaign leaves: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`.
+    """The folder of a campaign: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`.
 
-    A paper's experiment leaves `claims.json` and `figures/` besides.
+    A paper's experiment adds `claims.json` and `figures/`.
     """
 
     def __init__(self, path: Path) -> None:
@@ -77,7 +78,7 @@ class CampaignFolder:
         return read_object(self.path / _FILE, f"it is not the folder of a campaign: it has no {_FILE}")
 
     def check(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
-        """Check that a campaign can begin or go on here; nothing is written.
+        """Check that a campaign can begin or be resumed here; nothing is written.
 
         Raises:
             InvalidRunFolder: it is of another campaign or of something else, damaged, or cannot be written to.
@@ -93,7 +94,7 @@ class CampaignFolder:
         self._check_names(plan)
 
     def check_free(self) -> None:
-        """Check that no other command is at work on it, if it is there.
+        """Check that no other command runs this campaign, if the folder is there.
 
         Raises:
             InvalidRunFolder: one is.
@@ -106,16 +107,16 @@ class CampaignFolder:
     def opened(
         self, plan: CampaignPlan, fmus: Mapping[str, Path], check: Callable[[Path], None]
     ) -> Generator[dict[str, Path], None, None]:
-        """Make the folder, or go on with it, and keep others from it; give the copies of the FMUs in it.
+        """Make the folder, or take the one that is there, and lock it; give the copies of the FMUs in it.
 
-        `check` is called with the folder when it holds no more than `campaign.json`, by which another call finds it;
-        if it raises, all is as it was.
+        `check` is called with the folder when a new one holds no more than `campaign.json`, by which another command
+        finds it; if `check` raises, all is as it was.
 
-        Left-overs of runs that were killed are removed. A file's copy has its name, or, where two units have different
-        files of one name, that of the unit before it.
+        What runs that were killed have left is removed. A copy of an FMU has the name of the file; where two units have
+        different files of one name, the unit's name stands before it.
 
         Raises:
-            InvalidRunFolder: as by `check`; or another command holds it, or it cannot be made.
+            InvalidRunFolder: as by `check`; or another command has locked it, or it cannot be made.
             RecordNotWritten: it cannot be written to.
         """
         with contextlib.ExitStack() as held:
@@ -132,7 +133,7 @@ class CampaignFolder:
             yield copies
 
     def is_done(self, run: PlannedRun) -> bool:
-        """Return whether a run has left its folder, which has its name only when it is complete, with its summary."""
+        """Return whether a run's folder is there, with its summary; it has the run's name only when it is complete."""
         return (self.runs / run.name / "summary.json").is_file()
 
     def has_all(self, plan: CampaignPlan) -> bool:
@@ -141,7 +142,7 @@ class CampaignFolder:
 
     @property
     def is_reported(self) -> bool:
-        """Whether the report page is there, and of the table as it is."""
+        """Whether the report page is there and as new as the table."""
         try:
             return self.report.stat().st_mtime_ns >= self.table.stat().st_mtime_ns
         except OSError:
@@ -178,20 +179,20 @@ class CampaignFolder:
             raise
 
     def held(self) -> contextlib.AbstractContextManager[None]:
-        """Keep other commands from it in a block.
+        """Lock the folder against other commands in a block.
 
         Raises:
-            InvalidRunFolder: one is at work on it.
+            InvalidRunFolder: another command has locked it.
         """
-        return folder_held(self.path, "another command carries this campaign out")
+        return folder_held(self.path, "another command is running this campaign")
 
     def _counts(self, entry: Path) -> bool:
-        """Return whether something is more than what a call leaves that was killed before it wrote `campaign.json`."""
+        """Return whether an entry counts: a command killed before it wrote `campaign.json` leaves some that do not."""
         return entry.name != f"{_FILE}.part" and not entry.name.startswith(".")
 
     @contextlib.contextmanager
     def _written(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> Generator[None, None, None]:
-        """Write `campaign.json`; where one is there, after what follows, and else remove it if that fails."""
+        """Write `campaign.json` before the block, and remove it if the block fails; replace one after the block."""
         was_there = self.is_there
         if not was_there:
             self._write(plan, fmus)
@@ -205,16 +206,16 @@ class CampaignFolder:
             self._write(plan, fmus)
 
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
-        """Write `campaign.json`, before anything else is there: without it, nobody could go on."""
+        """Write `campaign.json`, before anything else is there: without it, the campaign could not be resumed."""
         experiment = SCENARIOS[plan.scenario]
-        facts = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
-        content = {**identity_of(plan, fmus), **facts}
+        display = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
+        content = {**identity_of(plan, fmus), **display}
         if not (self.path / _FILE).exists() or self.read() != content:
             write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
     def _copy(self, unit: str, file: Path, fmus: Mapping[str, Path]) -> Path:
-        alike = [other for other in fmus.values() if other.name == file.name]
-        ambiguous = len({sha256_of(other) for other in alike}) > 1
+        namesakes = [other for other in fmus.values() if other.name == file.name]
+        ambiguous = len({sha256_of(other) for other in namesakes}) > 1
         copy = self.fmus.absolute() / (f"{unit}_{file.name}" if ambiguous else file.name)
         if not copy.is_file() or sha256_of(copy) != sha256_of(file):
             unfinished = copy.with_name(copy.name + ".part")
@@ -234,31 +235,32 @@ class CampaignFolder:
 
 
 PLACE = Path("campaigns")
+"""Where campaigns' folders are if the command names none."""
 
 
 def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
-    """Return the newest folder of this very campaign in `campaigns/` that lacks runs, else a new one.
+    """Return the newest folder of this very campaign in `campaigns/` if it lacks runs, else a new one.
 
-    So a call that was interrupted goes on where it stopped, and one that came to its end begins anew. The plan is a
-    checked one.
+    So a command that was interrupted resumes where it stopped, and one that was complete begins a new campaign. The
+    plan is a checked one.
     """
     wanted = identity_of(plan, fmus)
     for path in sorted(PLACE.glob(f"*_{_stem(plan)}*/"), reverse=True):
         folder = CampaignFolder(path)
         try:
-            there = folder.read()
+            stored = folder.read()
         except InvalidRunFolder:
             continue
-        if all(there.get(key) == value for key, value in wanted.items()):
-            return _new(plan) if folder.has_all(plan) else folder
-    return _new(plan)
+        if all(stored.get(key) == value for key, value in wanted.items()):
+            return _new_folder(plan) if folder.has_all(plan) else folder
+    return _new_folder(plan)
 
 
 def _stem(plan: CampaignPlan) -> str:
     return plan.experiment or plan.scenario
 
 
-def _new(plan: CampaignPlan) -> CampaignFolder:
+def _new_folder(plan: CampaignPlan) -> CampaignFolder:
     name = time.strftime(f"%Y-%m-%d_%H%M%S_{_stem(plan)}")
     path, number = PLACE / name, 1
     while path.exists():

@@ -1,4 +1,4 @@
-"""Turns `name=values` texts into the points of a campaign; every fault is told at once, with what would be right."""
+"""Parses `name=values` texts into the points of a campaign; all faults are reported at once, with valid forms."""
 
 import itertools
 import math
@@ -26,8 +26,8 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
     texts, faults = texts_by_name(experiment, given, "name=v1,v2,... or name=START:STOP:N")
     axes: dict[str, list[str]] = {}
     for name, values in texts.items():
-        axes[name], found = _axis(known[name], values)
-        faults += [f"{name}: {fault}" for fault in found]
+        axes[name], axis_faults = _axis(known[name], values)
+        faults += [f"{name}: {fault}" for fault in axis_faults]
     points = math.prod(map(len, axes.values()))
     if points > MAX_RUNS:
         faults.append(f"the grid has {points:,} points; at most {MAX_RUNS:,} runs can be planned")
@@ -57,7 +57,7 @@ def set_parameters(
 
 
 def _is_list(variable: Variable, text: str) -> bool:
-    """Return whether a text is no value of a parameter, but several."""
+    """Return whether a text is a list of several values of a parameter, and no single value."""
     _, fault = parse_value(variable, text)
     if not fault:
         return False
@@ -92,22 +92,22 @@ def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
 
 
 def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:
-    """Return the values of `START:STOP:N`, rounded to 12 digits so that they read as they are meant."""
-    right = f"{text!r} is not of the form START:STOP:N"
+    """Return the values of `START:STOP:N`, rounded to 12 digits: 0.3, not 0.30000000000000004."""
+    malformed = f"{text!r} is not of the form START:STOP:N"
     parts = text.split(":")
     if variable.shape:
         return [], f"{variable.name} is an array, of which there are lists only, with ; between values"
     if len(parts) != 3:
-        return [], f"{right}, such as 0.1:0.5:5"
+        return [], f"{malformed}, such as 0.1:0.5:5"
     try:
         start, stop = float(parts[0]), float(parts[1])
     except ValueError:
         start = stop = math.nan
     if not math.isfinite(start) or not math.isfinite(stop):
-        return [], f"{right}: START and STOP are finite numbers"
+        return [], f"{malformed}: START and STOP are finite numbers"
     digits = parts[2].lstrip("0") if parts[2].isascii() and parts[2].isdigit() else ""
     if digits in ("", "1"):
-        return [], f"{right}: N is a whole number of values from 2 to {MAX_RUNS:,}"
+        return [], f"{malformed}: N is a whole number of values from 2 to {MAX_RUNS:,}"
     if len(digits) > len(str(MAX_RUNS)) or int(digits) > MAX_RUNS:
         return [], f"{text!r} has too many values: at most {MAX_RUNS:,} runs can be planned"
     if start == stop:

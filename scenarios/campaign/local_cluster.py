@@ -1,4 +1,4 @@
-"""Crews on Dask: workers on this machine's cores, or a cluster that the user runs."""
+"""Worker pools on Dask: starts workers on this machine's cores, or connects to a cluster that the user runs."""
 
 import contextlib
 import logging
@@ -19,8 +19,8 @@ from handover.scenarios.execution.errors import PoolError
 
 _SILENT = logging.CRITICAL + 1
 _LOGGERS = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
-_WORKERS = 3.0
-"""How long a cluster's first worker is waited for, s."""
+_FIRST_WORKER_TIMEOUT = 3.0
+"""How long is waited for a cluster's first worker, s."""
 
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 3,
@@ -28,7 +28,7 @@ _SETTINGS = {
     "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": str(_SILENT),
 }
 
-_STILL = {
+_NO_MONITORING = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "10s",
     "distributed.admin.system-monitor.disk": False,
@@ -37,29 +37,26 @@ _STILL = {
     "distributed.scheduler.active-memory-manager.start": False,
     "distributed.client.scheduler-info-interval": "10s",
 }
-"""Keeps workers from watching themselves many times a second, for a dashboard that is not there."""
+"""Keeps workers from measuring themselves many times a second for a dashboard that nobody opens."""
 
 
 @contextlib.contextmanager
 def local_cluster(workers: int | None) -> Generator[ClusterPool, None, None]:
     """Start workers on this machine, a process each; by default one for each core that this process may use.
 
-    They hear of no Ctrl-C, end with this process, however it ends, and listen on the loopback interface alone.
+    They receive no Ctrl-C, end with this process, however it ends, and listen on the loopback interface alone.
 
     Raises:
         PoolError: they cannot be started.
     """
-    with _quiet(), config.set({**_SETTINGS, **_STILL}), contextlib.ExitStack() as opened:
+    with _quiet(), config.set({**_SETTINGS, **_NO_MONITORING}), contextlib.ExitStack() as opened:
         try:
-            with (
-                _quiet_resource_tracker(),
-                _ignore_ctrl_c(),
-            ):  # so are the threads that are started here, and what these start
+            with _quiet_resource_tracker(), _ignore_ctrl_c():  # threads and processes started here inherit both
                 cluster = LocalCluster(
                     n_workers=workers or cores(),
                     threads_per_worker=1,
                     host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0",  # by default it answers to the whole network
+                    dashboard_address="127.0.0.1:0",  # by default it listens on all interfaces
                     memory_limit=0,
                     silence_logs=_SILENT,
                 )
@@ -74,10 +71,10 @@ def local_cluster(workers: int | None) -> Generator[ClusterPool, None, None]:
 
 @contextlib.contextmanager
 def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
-    """Use the workers of a cluster that the user runs; the address is one that `scheduler_address` has returned.
+    """Connect to a cluster that the user runs; the address is one that `scheduler_address` has returned.
 
     Raises:
-        PoolError: no scheduler answers there any more, or it has no workers.
+        PoolError: no scheduler answers there, or it has no workers.
     """
     with _quiet(), config.set(_SETTINGS), contextlib.ExitStack() as opened:
         try:
@@ -85,7 +82,7 @@ def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
         except (OSError, ValueError) as e:
             raise PoolError(f"the scheduler at {address} cannot be used: {one_line(e)}") from e
         try:
-            client.wait_for_workers(1, timeout=_WORKERS)
+            client.wait_for_workers(1, timeout=_FIRST_WORKER_TIMEOUT)
         except TimeoutError as e:
             raise PoolError(f"the scheduler at {address} has no workers; `dask worker {address}` starts some") from e
         pool = ClusterPool(client, f"the cluster at {address}")
@@ -95,11 +92,11 @@ def connect_cluster(address: str) -> Generator[ClusterPool, None, None]:
 
 @contextlib.contextmanager
 def _quiet() -> Generator[None, None, None]:
-    """Keep what Dask tells of itself from the terminal: what matters is told by `PoolError` and in answers."""
+    """Keep Dask's own log and warnings off the terminal: `PoolError` and job results report what matters."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     before = [logger.level for logger in loggers]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # other versions of Dask's own packages among them
+        warnings.simplefilter("ignore")  # such as that versions of Dask's packages differ
         for logger in loggers:
             logger.setLevel(_SILENT)
         try:
@@ -111,7 +108,7 @@ def _quiet() -> Generator[None, None, None]:
 
 @contextlib.contextmanager
 def _quiet_resource_tracker() -> Generator[None, None, None]:
-    """Let Python's process that cleans up after a killed command do so without telling."""
+    """Let Python's resource tracker, a process that cleans up after a killed command, do so without warnings."""
     name = "PYTHONWARNINGS"
     before = os.environ.get(name)
     os.environ[name] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
@@ -126,11 +123,11 @@ def _quiet_resource_tracker() -> Generator[None, None, None]:
 
 @contextlib.contextmanager
 def _ignore_ctrl_c() -> Generator[None, None, None]:
-    """Let threads and processes that are started meanwhile hear of no Ctrl-C, which is for this thread to act on."""
+    """Let threads and processes that are started meanwhile receive no Ctrl-C, which this thread handles."""
     if sys.platform == "win32":
         yield
         return
-    resource_tracker.ensure_running()  # the thread that starts it hears of Ctrl-C from then on
+    resource_tracker.ensure_running()  # its start unblocks Ctrl-C in the starting thread
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield

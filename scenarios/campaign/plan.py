@@ -1,4 +1,4 @@
-"""What a campaign is to run: points in the space of a scenario's parameters, each several times."""
+"""The plan of a campaign: points in the space of a scenario's parameters, each run several times, with their seeds."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -9,10 +9,10 @@ import numpy as np
 from handover.cosim.stepping.options import MasterOptions
 
 MAX_RUNS = 100_000
-"""Runs of a campaign: above it, a slip of the pen is likelier than a wish."""
+"""Runs of a campaign: more of them are likelier a typing error than intended."""
 
 MAX_REPETITIONS = 10_000
-"""Runs of a point; as many have names that sort in their order."""
+"""Runs of a point: up to here, names of runs sort in the order of their repetitions."""
 
 _MAX_NAME_LENGTH = 80
 _UNSAFE = re.compile(r"[^A-Za-z0-9.,=+_-]")
@@ -48,11 +48,11 @@ class CampaignPlan:
         repetitions: runs of each point.
         seed: the campaign's; each run's is derived from it.
         paired: whether all points of a repetition share a seed, so that their runs can be compared one by one.
-        scenes: if paired, parameters whose values have seeds of their own: points that are not alike in them share
-            none, so that their runs can be counted together.
+        scenes: if paired, parameters whose values have seeds of their own: points that differ in them share no seeds,
+            so that their runs can be counted together.
         units: files of FMUs that take the place of units, by the units' names.
         options: how units are run.
-        experiment: name of the published experiment that it is of; "" if it is of none.
+        experiment: name of the published experiment that it belongs to; "" if to none.
     """
 
     scenario: str
@@ -77,20 +77,20 @@ class CampaignPlan:
         Names are those of a campaign's folder if `checked_plan` has returned the plan. A run's name and seed follow
         from its point and its repetition alone: they stay the same if there are more repetitions.
         """
-        seeded = self._seeded_as()
+        seed_points = self._seed_points()
         return tuple(
             PlannedRun(
                 name=self._name(point, repetition),
                 point=point,
                 repetition=repetition,
                 parameters={**self.fixed, **self.points[point]},
-                seed=run_seed(self.seed, seeded[point], repetition),
+                seed=run_seed(self.seed, seed_points[point], repetition),
             )
             for point in range(len(self.points))
             for repetition in range(self.repetitions)
         )
 
-    def _seeded_as(self) -> Sequence[int | None]:
+    def _seed_points(self) -> Sequence[int | None]:
         """Return, for each point, the first point that shares its seeds, None if all do."""
         if not self.paired:
             return range(len(self.points))
@@ -103,7 +103,7 @@ class CampaignPlan:
         ]
 
     def _name(self, point: int, repetition: int) -> str:
-        """Return such as `007_alpha=0.2_r0003`: point, what is varied as far as there is room, repetition."""
+        """Return a name such as `007_alpha=0.2_r0003`: point, varied values as far as there is room, repetition."""
         number = str(point).zfill(max(3, len(str(len(self.points) - 1))))
         values = "_".join(f"{name}={value}" for name, value in self.points[point].items())
         end = f"_r{repetition:04d}"
@@ -112,9 +112,9 @@ class CampaignPlan:
 
 
 def run_seed(campaign: int, point: int | None, repetition: int) -> int:
-    """Return the seed of a run by its campaign's; `point` is None where all points of a repetition share it.
+    """Return the seed of a run by its campaign's seed; `point` is None where all points of a repetition share it.
 
-    It has 53 bits: any reader of JSON keeps them, and of 100,000 runs no two are likely to share one.
+    It has 53 bits: any reader of JSON keeps them, and no two of 100,000 runs are likely to share a seed.
     """
     key = (repetition,) if point is None else (point, repetition)
     return int(np.random.SeedSequence(campaign, spawn_key=key).generate_state(1, np.uint64)[0] >> np.uint64(11))

@@ -14,7 +14,7 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 
 _MAX_REPORTED = 8
-"""Faults that are told; there may be one a point."""
+"""Faults that are reported; there may be one for each point."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ def prepared(plan: CampaignPlan, before_units: Callable[[CampaignPlan], None] = 
     """Check a plan and its units, which may have to be built.
 
     Args:
-        plan: what is to be carried out.
-        before_units: refuses what can be refused without units; it is given the checked plan.
+        plan: what is to be run.
+        before_units: raises what can be found without units, which take a while to build; it gets the checked plan.
 
     Raises:
         As `checked_plan`, `before_units`, `unit_fmus` and `check_units`.
@@ -48,11 +48,11 @@ def prepared(plan: CampaignPlan, before_units: Callable[[CampaignPlan], None] = 
 
 
 def checked_plan(plan: CampaignPlan) -> CampaignPlan:
-    """Return the plan with each value in the one text that all plans of the same values have.
+    """Return the plan with each value in its canonical text, which is the same in all plans with that value.
 
     Raises:
         UsageError: there is no such scenario.
-        InvalidParameter: it has too many runs or none, values do not fit the scenario, or do not fit each other.
+        InvalidParameter: it has too many runs or none, or values that are invalid by themselves or together.
     """
     experiment = find_scenario(plan.scenario)
     _check_size(plan)
@@ -80,7 +80,7 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
     """Return the FMU of each unit: that of the plan, or the catalog's.
 
     Raises:
-        UsageError: the plan has one for a unit that the scenario does not have, or the catalog's cannot be built.
+        UsageError: the plan names a unit that the scenario does not have, or the catalog's unit cannot be built.
     """
     experiment = find_scenario(plan.scenario)
     others = replacement_fmus(experiment, [f"{name}={file}" for name, file in plan.units.items()])
@@ -88,12 +88,12 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
 
 
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
-    """Check that the FMUs make up the scenario's system, as those that take the place of others need not.
+    """Check that the FMUs make up the scenario's system: one that takes a unit's place may have other ports.
 
     The system is that of the first point: parameters change what units do, not how they are wired.
 
     Raises:
-        InvalidFmu, WiringError, ScheduleError: they do not.
+        InvalidFmu, WiringError, ScheduleError: they do not make it up.
     """
     experiment = find_scenario(plan.scenario)
     given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
@@ -111,7 +111,7 @@ def _check_size(plan: CampaignPlan) -> None:
         raise InvalidParameter([f"{text}; at most {MAX_RUNS:,} can be planned"])
 
 
-class _AtUnits(Exception):
+class _ParametersAccepted(Exception):
     """The scenario has checked its parameters and asks for its first FMU."""
 
 
@@ -119,10 +119,10 @@ def _check_together(experiment: type[Experiment[Any]], parameters: Any, point: M
     """Let a scenario check its parameters against each other, which it does before it asks for FMUs."""
 
     def stop(_unit: str) -> NoReturn:
-        raise _AtUnits
+        raise _ParametersAccepted
 
     try:
-        with suppress(_AtUnits):
+        with suppress(_ParametersAccepted):
             experiment().build(parameters, 0, stop)
     except InvalidParameter as e:
         where = f"at {', '.join(f'{name}={value}' for name, value in point.items())}: " if point else ""

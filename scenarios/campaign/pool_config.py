@@ -1,6 +1,6 @@
-"""Who is to carry out a campaign's runs, as the call says: workers of this machine, or those of a scheduler.
+"""Configuration of a campaign's worker pool, workers of this machine or of a Dask scheduler, and its lazy start.
 
-Workers of a campaign that are started when its folder is held, so that no other command can take it meanwhile.
+Dask, which takes a while to load, is imported when workers are started.
 """
 
 import contextlib
@@ -14,11 +14,11 @@ from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPoo
 
 @dataclass(frozen=True)
 class PoolConfig:
-    """Workers that a call asks for; Dask, which takes a while to load, is loaded when they are needed.
+    """The workers that a command asks for.
 
     Attributes:
-        workers: how many of this machine; None for one a core.
-        scheduler: the address of those of a cluster; None for those of this machine.
+        workers: how many on this machine; None for one a core.
+        scheduler: address of a cluster's scheduler, whose workers are used; None for workers on this machine.
     """
 
     workers: int | None = None
@@ -32,7 +32,7 @@ class PoolConfig:
         return f"{workers} worker{'s' if workers > 1 else ''}"
 
     def check(self) -> None:
-        """Find out whether a scheduler is where the call says.
+        """Check that a scheduler answers at its address.
 
         Raises:
             PoolError: the address is malformed, or no scheduler answers there.
@@ -52,14 +52,17 @@ class PoolConfig:
 
     @functools.cached_property
     def _address(self) -> str:
-        """The whole address of the scheduler, found out once."""
+        """The complete address of the scheduler, which is asked once."""
         from handover.scenarios.campaign.scheduler import scheduler_address
 
         return scheduler_address(self.scheduler or "")
 
 
 class LazyPool:
-    """Starts a worker pool when it is checked, or with its first order if it was not: a campaign may seem to need none.
+    """Starts a worker pool when it is checked, or else with its first job.
+
+    It is checked when the campaign's folder is locked, so that no other command can take the folder while workers
+    start. It is not checked where all runs seem done; if one of them then turns out to be damaged, it is started late.
 
     Args:
         start: gives the worker pool.
@@ -78,18 +81,18 @@ class LazyPool:
         Raises:
             PoolError: it cannot be started or used. RecordNotWritten: as `WorkerPool.check`.
         """
-        self._pool = self._checked(folder)
+        self._pool = self._started(folder)
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        """Let the worker pool carry out orders.
+        """Let the worker pool run jobs.
 
         Raises:
-            PoolError, RecordNotWritten: as `check`, if that was not called. ClusterLost: it has gone.
+            PoolError, RecordNotWritten: as `check`, if that was not called. ClusterLost: all workers were lost.
         """
-        pool = self._pool or self._checked(Path(jobs[0].runs))
+        pool = self._pool or self._started(Path(jobs[0].runs))
         return pool.run_jobs(jobs)
 
-    def _checked(self, folder: Path) -> WorkerPool:
+    def _started(self, folder: Path) -> WorkerPool:
         pool = self._opened.enter_context(self._start())
         pool.check(folder)
         return pool

@@ -1,4 +1,4 @@
-"""What came out at each point of a campaign."""
+"""Results of a campaign by point: successes, medians of metrics, their intervals, and labels."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from handover.scenarios.experiment.display_unit import display_unit
 
 _MAX_METRICS = 4
 _MAX_INTERVALS = 150
-"""Medians of a campaign above which they have no intervals: each takes some 20 ms."""
+"""Medians of a campaign above which they have no intervals: a bootstrap takes some 20 ms."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +28,7 @@ class PointResults:
         number: the point's, from 0.
         values: of the parameters that are varied, as texts.
         rows: of its runs in the campaign's table.
-        done: of `rows`, those whose task was carried out to its end.
+        done: of `rows`, those of runs that came to their end.
         successes: how many of these succeeded.
     """
 
@@ -53,13 +53,13 @@ class CampaignResults:
     """A campaign's table, point by point.
 
     Args:
-        told: what is in `campaign.json`.
+        metadata: what is in `campaign.json`.
         table: the runs that have ended.
     """
 
-    def __init__(self, facts: Mapping[str, Any], table: CampaignTable) -> None:
-        self.metadata, self.table = facts, table
-        self._values: list[Mapping[str, str]] = list(facts["points"])
+    def __init__(self, metadata: Mapping[str, Any], table: CampaignTable) -> None:
+        self.metadata, self.table = metadata, table
+        self._values: list[Mapping[str, str]] = list(metadata["points"])
         self._intervals: dict[tuple[int, str], Interval | None] = {}
 
     @property
@@ -114,7 +114,7 @@ class CampaignResults:
 
     @cached_property
     def headline(self) -> tuple[str, ...]:
-        """Columns of the metrics that are told first, in their order: those that any run has, but CPU time."""
+        """Columns of the metrics that are shown first, in their order: those that any run has, without CPU time."""
         experiment = SCENARIOS.get(self.scenario)
         first = () if experiment is None else experiment.headline
         columns = [n if n in self.table.metrics else f"{n}_metric" for n in first]
@@ -145,14 +145,14 @@ class CampaignResults:
         """The points of which a run has ended."""
         number, status = self.table.column("point"), self.table.column("status")
         success = self.table.column("success")
-        found: list[PointResults] = []
+        points: list[PointResults] = []
         for k, values in enumerate(self._values):
             rows = np.flatnonzero(number == k)
             if len(rows):
                 done = rows[status[rows] == "done"]
                 successes = int(np.count_nonzero(success[done] == np.True_))
-                found.append(PointResults(number=k, values=values, rows=rows, done=done, successes=successes))
-        return found
+                points.append(PointResults(number=k, values=values, rows=rows, done=done, successes=successes))
+        return points
 
     @property
     def has_intervals(self) -> bool:
@@ -186,6 +186,6 @@ class CampaignResults:
         return text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:
-        """Return what tells a point from the others."""
+        """Return a point's label: the values in which it differs from the others."""
         texts = [self.value_text(name, point.values[name]) for name in self.independent if name in point.values]
         return ", ".join(texts) or "all runs"

@@ -1,4 +1,4 @@
-"""Carries out an order in this process, and gives its folder the name that says it is complete."""
+"""Runs a job in this process, and gives its folder the name that says that it is complete."""
 
 import contextlib
 import os
@@ -23,28 +23,28 @@ from handover.scenarios.results.summary import ElapsedTime, refused_run, refused
 from handover.scenarios.results.task import Task
 
 _REFUSALS = (InitializationError, UnitFailure, WiringError, ScheduleError)
-"""Why a run cannot begin, where that follows from what it is and not from where it is carried out."""
+"""Why a run cannot begin, where that depends on the run and not on the machine: it would end so each time."""
 
 
 def run_job(job: RunJob, folder: Path) -> None:
-    """Run an order into a folder, without figures or a report; if it cannot begin, the folder says why.
+    """Run a job into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `carry_out` and `parse_parameters`, but for a refusal of the run. UsageError: there is no such scenario.
+        As `run_task` and `parse_parameters`, without `_REFUSALS`. UsageError: there is no such scenario.
     """
     task, clock = _task(job, folder), ElapsedTime().clock()
     try:
         run_task(task, lambda _t, _end: None, Interruption())
-    except _REFUSALS as e:  # it would end so each time
-        _refuse(task, e, clock())
+    except _REFUSALS as e:
+        _write_refusal(task, e, clock())
 
 
 def record_failed_job(job: RunJob, folder: Path, failure: UnitFailure, spent: ElapsedTime) -> None:
-    """Write the folder of a run whose process ended as a unit was loaded or initialised."""
-    _refuse(_task(job, folder), failure, spent)
+    """Write the folder of a run whose process crashed while a unit was loaded or initialised."""
+    _write_refusal(_task(job, folder), failure, spent)
 
 
-def _refuse(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
+def _write_refusal(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
     task.folder.make()
     task.folder.write_run(refused_run(task, refusal))
     task.folder.write_summary(refused_summary(task, refusal, spent))
@@ -64,20 +64,20 @@ def _task(job: RunJob, folder: Path) -> Task:
 
 
 def job_result(job: RunJob, work: Callable[[], object]) -> JobResult:
-    """Do something for an order; answer why it could not be done, if it could not."""
+    """Call `work` for a job; return the result, with what was raised as the reason why the run is lost."""
     try:
         with one_line_errors():
             work()
     except click.ClickException as e:
         return lost_by(e, job, e.message)
-    except BaseException as e:  # a run may raise what it likes: the campaign goes on
+    except BaseException as e:  # a run may raise anything: the campaign continues
         traceback.print_exc()
         return lost_by(e, job, f"{type(e).__name__}: {one_line(e)}")
     return JobResult(name=job.name)
 
 
 def lost_by(error: BaseException, job: RunJob, text: str) -> JobResult:
-    """Answer that a run is lost by an exception, with what is told of it."""
+    """Return the result of a run that an exception lost, with a sentence that says why."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and is_full(cause):
@@ -88,7 +88,7 @@ def lost_by(error: BaseException, job: RunJob, text: str) -> JobResult:
 
 @contextlib.contextmanager
 def printing_to(log: BinaryIO):
-    """Let what this process prints, in Python or in native code, go to a file meanwhile."""
+    """Redirect what this process prints, in Python or in native code, to a file meanwhile."""
     before = [os.dup(number) for number in (1, 2)]
     try:
         for number in (1, 2):
@@ -102,11 +102,11 @@ def printing_to(log: BinaryIO):
 
 
 def finish(job: RunJob, folder: Path, log: BinaryIO) -> JobResult:
-    """Name the folder of a run that has ended as the order says; answer why it cannot be, if it cannot.
+    """Rename the folder of a run that has ended as the job says; the result says why if it cannot be renamed.
 
     What the run printed goes into its `log.txt`. A folder without a summary is left as it is.
     """
-    named = Path(job.runs, job.name)
+    target = Path(job.runs, job.name)
     if not (folder / "summary.json").exists():
         return JobResult(name=job.name, lost="it ended without a summary")
     with contextlib.suppress(OSError):  # a full disk: the run itself is complete
@@ -114,9 +114,9 @@ def finish(job: RunJob, folder: Path, log: BinaryIO) -> JobResult:
         if printed := log.read():
             (folder / "log.txt").write_bytes(printed)
     try:
-        os.rename(folder, named)
+        os.rename(folder, target)
     except OSError as e:
-        if not (named / "summary.json").exists():  # else it was carried out twice, as when a worker was taken for lost
-            return lost_by(e, job, f"its folder cannot be named {named}: {e.strerror}")
+        if not (target / "summary.json").exists():  # else it ran twice, as when a worker seemed lost
+            return lost_by(e, job, f"its folder cannot be named {target}: {e.strerror}")
         shutil.rmtree(folder, ignore_errors=True)
     return JobResult(name=job.name)

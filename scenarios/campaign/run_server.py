@@ -1,10 +1,10 @@
-"""A process that carries out one run after the other, each in a child of its own: `python -m` this module.
+"""A process that runs one job after the other, each in a forked child: `python -m` this module.
 
-It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads orders from
-standard input and answers on standard output, all pickled: an order is a `RunJob` and the folder for its files while
-it runs; the answer is a `JobResult`. It ends with its input, and a run under way with it.
+It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads jobs from
+standard input and writes results to standard output, all pickled: a job is a `RunJob` and the folder for its files
+while it runs; the result is a `JobResult`. It ends when its input is closed, and a run under way with it.
 
-Where processes cannot be forked (Windows) it carries runs out itself: what a unit does to the process, it does to it.
+Where processes cannot be forked (Windows) it runs jobs itself, and a unit that crashes crashes the server.
 """
 
 import contextlib
@@ -39,15 +39,15 @@ from handover.scenarios.execution.crash import Crash
 from handover.scenarios.results.summary import ElapsedTime
 
 IDLE = 60.0
-"""Seconds without an order after which it ends by itself, so that none stays on a cluster that lives on."""
+"""Seconds without a job after which it ends by itself: a cluster may outlive the campaign."""
 
 
 class RunServer:
-    """Carries out orders.
+    """Runs jobs.
 
     Args:
-        orders: where they come from.
-        answers: where the answers go.
+        jobs: stream from which jobs are read.
+        results: stream to which their results are written.
     """
 
     def __init__(self, jobs: BinaryIO, results: BinaryIO) -> None:
@@ -56,18 +56,18 @@ class RunServer:
         self._forks = supervisor.can_supervise()
 
     def serve(self) -> None:
-        """Carry out orders until there are no more."""
-        while self._comes():
+        """Run jobs until there are no more."""
+        while self._job_comes():
             try:
                 job, folder = pickle.load(self._jobs)
-            except (EOFError, pickle.UnpicklingError):  # the worker has ended, maybe amid an order
+            except (EOFError, pickle.UnpicklingError):  # the worker has ended, maybe while it wrote a job
                 return
             self._load(job.scenario)
             pickle.dump(self._run_job(job, folder), self._results)
             self._results.flush()
 
-    def _comes(self) -> bool:
-        """Wait for an order, or the end of them."""
+    def _job_comes(self) -> bool:
+        """Wait for a job, or the end of the stream; return False if none came in time."""
         return not self._forks or bool(select.select([self._jobs], [], [], IDLE)[0])
 
     def _load(self, scenario: str) -> None:
@@ -76,7 +76,7 @@ class RunServer:
             return
         self._loaded.add(scenario)
         for unit in SCENARIOS[scenario].units.values():
-            with contextlib.suppress(Exception):  # a run that needs it will tell
+            with contextlib.suppress(Exception):  # a run that needs it will report it
                 import_block(UNITS[unit].block)
                 for module in UNITS[unit].deferred:
                     importlib.import_module(module)
@@ -100,33 +100,33 @@ class RunServer:
         return result
 
     def _fork(self, job: RunJob, folder: Path, log: BinaryIO) -> JobResult:
-        """Carry out a run in a child; if that dies of a unit, another child tells of it in the folder."""
+        """Run a job in a child; if a unit crashes that, another child completes the folder."""
         began = time.monotonic()
         end, heartbeat = self._in_child(lambda: job_result(job, lambda: run_job(job, folder)), folder, log)
         if heartbeat.status is not None:
             return _result(job, heartbeat, "")
-        death = Crash(heartbeat, end, time.monotonic() - began)
-        if death.was_killed or end.signal in supervisor.ORDERS:
-            return JobResult(name=job.name, lost=death.message)
-        left, failure, spent = death.folder, death.failure, ElapsedTime(time.monotonic() - began, end.cpu)
-        if left is None and failure is None:
-            return JobResult(name=job.name, lost=death.message)
+        crash = Crash(heartbeat, end, time.monotonic() - began)
+        if crash.was_killed or end.signal in supervisor.TERMINATION_SIGNALS:
+            return JobResult(name=job.name, lost=crash.message)
+        run_folder, failure, spent = crash.folder, crash.failure, ElapsedTime(time.monotonic() - began, end.cpu)
+        if run_folder is None and failure is None:
+            return JobResult(name=job.name, lost=crash.message)
 
-        def tell() -> None:
-            if left is not None:
-                death.complete(left)
+        def record_crash() -> None:
+            if run_folder is not None:
+                crash.complete(run_folder)
             elif failure is not None:
                 record_failed_job(job, folder, failure, spent)
 
-        end, heartbeat = self._in_child(lambda: job_result(job, tell), folder, log)
-        return _result(job, heartbeat, "" if heartbeat.status == 0 else death.message)
+        end, heartbeat = self._in_child(lambda: job_result(job, record_crash), folder, log)
+        return _result(job, heartbeat, "" if heartbeat.status == 0 else crash.message)
 
     def _in_child(self, work: Callable[[], JobResult], folder: Path, log: BinaryIO) -> tuple[ChildEnd, Heartbeat]:
         heartbeat = supervisor.renew_heartbeat()
 
         def begin() -> NoReturn:
             supervisor.begin_child()
-            os.close(self._jobs.fileno())  # answers stay open: by their end the worker knows that runs have ended too
+            os.close(self._jobs.fileno())  # results stay open: their end says that the run has ended, too
             for number in (1, 2):
                 os.dup2(log.fileno(), number)
             result = work()
@@ -136,7 +136,7 @@ class RunServer:
 
         child = ForkedChild(begin, heartbeat)
         end = child.wait(self._jobs.fileno())
-        if end is None:  # no order comes before the answer: the worker is gone
+        if end is None:  # jobs come one by one: what can be read now is the end of the stream
             child.kill()
             for scratch in heartbeat.facts.get("scratch", []):
                 shutil.rmtree(scratch, ignore_errors=True)
@@ -146,7 +146,7 @@ class RunServer:
 
 
 def _result(job: RunJob, heartbeat: Heartbeat, otherwise: str) -> JobResult:
-    """Answer as the child has told that the run is lost, or otherwise."""
+    """Return the result that a child has left in its heartbeat, or `otherwise` as the reason why the run is lost."""
     loss: Mapping[str, str] = heartbeat.facts.get("loss", {"lost": otherwise})
     return JobResult(name=job.name, **loss)
 

@@ -1,6 +1,7 @@
-"""Where a Dask scheduler is, and whether it is one: found out before anything is sent to it.
+"""Checks the address of a Dask scheduler: its form, whether something answers there, and whether that is a scheduler.
 
-Whether something answers at a port as Dask's schedulers do: found out in seconds, without loading Dask.
+`probe_port` finds out the most frequent mistakes within seconds and without loading Dask; `scheduler_address` then asks
+in Dask's own protocol.
 """
 
 import asyncio
@@ -10,8 +11,8 @@ from urllib.parse import urlsplit
 from handover.cosim.exceptions import one_line
 from handover.scenarios.execution.errors import PoolError
 
-_CONNECT_TIMEOUT, _GREETING = 3.0, 3.0
-"""How long a server gets to be connected, and to say something, s."""
+_CONNECT_TIMEOUT, _GREETING_TIMEOUT = 3.0, 3.0
+"""How long a plain connection to a server may take, and how long its first byte, s."""
 
 RIGHT = "tcp://HOST:PORT, as `dask scheduler` prints it, is right"
 
@@ -22,34 +23,34 @@ def probe_port(address: str, host: str, port: int) -> None:
     Most other servers wait to be spoken to.
 
     Args:
-        address: what is told.
-        host: where it is.
-        port: its number there.
+        address: as error messages name it.
+        host: name or number of the machine.
+        port: TCP port.
 
     Raises:
-        PoolError: nothing is there, or it says nothing.
+        PoolError: nothing listens there, or it sends nothing.
     """
     try:
         with socket.create_connection((host, port), timeout=_CONNECT_TIMEOUT) as connection:
-            connection.settimeout(_GREETING)
+            connection.settimeout(_GREETING_TIMEOUT)
             greeted = bool(connection.recv(1))
     except TimeoutError as e:
-        raise PoolError(f"{address} does not answer as a Dask scheduler within {_GREETING:g} s; {RIGHT}") from e
+        raise PoolError(f"{address} does not answer as a Dask scheduler within {_GREETING_TIMEOUT:g} s; {RIGHT}") from e
     except OSError as e:
         raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
     if not greeted:
         raise PoolError(f"{address} is no Dask scheduler: it hangs up; {RIGHT}")
 
 
-_CONNECT, _ANSWER = 4.0, 5.0
-"""How long a scheduler gets to be connected, and until it has answered, s."""
+_DASK_CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 4.0, 5.0
+"""How long a connection in Dask's protocol may take, and how long until the answer, s."""
 
 
 def scheduler_address(text: str) -> str:
-    """Return the whole address of a scheduler that has answered.
+    """Return the complete address, with its protocol, of a scheduler that has answered.
 
     Raises:
-        PoolError: the address is malformed, nothing is there, or no scheduler is.
+        PoolError: the address is malformed, nothing answers there, or something else than a scheduler.
     """
     address, host, port = _parts(text)
     if address.startswith("tcp:"):
@@ -57,12 +58,12 @@ def scheduler_address(text: str) -> str:
     from handover.scenarios.campaign.scheduler_kind import kind_at  # loads Dask
 
     try:
-        kind = kind_at(address, _CONNECT, _ANSWER)
+        kind = kind_at(address, _DASK_CONNECT_TIMEOUT, _ANSWER_TIMEOUT)
     except (asyncio.TimeoutError, TimeoutError) as e:
-        raise PoolError(f"{address} does not answer as a Dask scheduler within {_ANSWER:g} s; {RIGHT}") from e
+        raise PoolError(f"{address} does not answer as a Dask scheduler within {_ANSWER_TIMEOUT:g} s; {RIGHT}") from e
     except OSError as e:
         raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e
-    except Exception as e:  # what another protocol's bytes lead to
+    except Exception as e:  # bytes of another protocol may raise anything
         raise PoolError(f"{address} is no Dask scheduler: {one_line(e)}; {RIGHT}") from e
     if kind != "Scheduler":
         raise PoolError(f"{address} is a {kind}, not a scheduler; {RIGHT}")

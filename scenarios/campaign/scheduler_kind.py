@@ -1,4 +1,4 @@
-"""Asks a server for what it is, in Dask's protocol."""
+"""Asks a server in Dask's protocol what it is: scheduler, worker or nanny. Importing this module loads Dask."""
 
 import asyncio
 from typing import Any, cast
@@ -10,7 +10,7 @@ from distributed.security import Security
 from handover.scenarios.campaign.cluster import call_with_timeout
 
 PROTOCOLS = tuple(p for p in backends if p != "inproc")
-"""Those that Dask has here."""
+"""Protocols that Dask has here."""
 
 
 def kind_at(address: str, connect: float, answer: float) -> str:
@@ -18,8 +18,8 @@ def kind_at(address: str, connect: float, answer: float) -> str:
 
     Args:
         address: with its protocol.
-        connect: how long it gets to be connected, s.
-        answer: how long it gets until it has answered, s.
+        connect: how long the connection may take, s.
+        answer: how long it may take until the answer, s.
 
     Raises:
         TimeoutError, asyncio.TimeoutError, OSError: it cannot be reached, or does not answer.
@@ -29,6 +29,6 @@ def kind_at(address: str, connect: float, answer: float) -> str:
 
 async def _kind(address: str, connect: float) -> str:
     arguments = cast("dict[str, Any]", Security().get_connection_args("client"))
-    async with rpc(address, timeout=connect, connection_args=arguments) as there:
-        value = cast("dict[str, Any]", await there.identity())
-        return str(value["type"])
+    async with rpc(address, timeout=connect, connection_args=arguments) as server:
+        identity = cast("dict[str, Any]", await server.identity())
+        return str(identity["type"])

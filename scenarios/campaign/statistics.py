@@ -13,7 +13,7 @@ LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
 
 MIN_SAMPLES = 3
-"""Values below which a bootstrap says nothing: of two there are but three different resamples."""
+"""Values below which a bootstrap says nothing: two values have only three different resamples."""
 
 RESAMPLES = 9999
 """Of a bootstrap."""
@@ -29,7 +29,7 @@ Statistic = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Interval:
-    """A confidence interval, and how it was made."""
+    """A confidence interval, and the method that gave it."""
 
     low: float
     high: float
@@ -79,9 +79,9 @@ def time_interval(values: ArrayLike, statistic: Statistic = np.median) -> Interv
     x = x[~np.isnan(x)]
     if len(x) < MIN_SAMPLES:
         return None
-    for method, value in _METHODS:
+    for method, name in _METHODS:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that BCa is not defined: told by its interval, which is NaN
+            warnings.simplefilter("ignore")  # that BCa is not defined shows in its interval, which is NaN
             ci = bootstrap(
                 (x,),
                 statistic,
@@ -91,7 +91,7 @@ def time_interval(values: ArrayLike, statistic: Statistic = np.median) -> Interv
                 rng=np.random.default_rng(0),
             ).confidence_interval
         if np.isfinite(ci.low) and np.isfinite(ci.high):
-            return Interval(float(ci.low), float(ci.high), value)
+            return Interval(float(ci.low), float(ci.high), name)
     return None
 
 
@@ -115,7 +115,7 @@ def two_proportions(successes: int, n: int, others: int, n_others: int) -> float
 
 
 def compatible_counts(successes: int, n: int, n_others: int) -> tuple[int, int]:
-    """Return the fewest and the most successes of `n_others` that Fisher's test cannot tell from `successes` of `n`.
+    """Return the smallest and the largest count of `n_others` that Fisher's test cannot tell from `successes` of `n`.
 
     They say what the test could have found: where they span all counts, nothing.
     """

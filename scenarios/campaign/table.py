@@ -1,7 +1,4 @@
-"""The table of a campaign: a row for each run that has ended.
-
-A row of a campaign's table: how one run went.
-"""
+"""Reads the table of a campaign, a row for each run that has ended, and the row of one run from its folder."""
 
 import json
 from collections.abc import Mapping
@@ -20,7 +17,7 @@ from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.results.summary import metric_of
 
-_ANEW = "the call that began the campaign writes it anew"
+_REMEDY = "run the campaign's command again to rewrite it"
 
 
 class CampaignTable:
@@ -46,9 +43,9 @@ class CampaignTable:
         try:
             return cls(pq.read_table(file))
         except FileNotFoundError as e:
-            raise InvalidRunFolder(file.parent, f"it has no {file.name}; {_ANEW}") from e
+            raise InvalidRunFolder(file.parent, f"it has no {file.name}; {_REMEDY}") from e
         except (OSError, pa.ArrowException) as e:
-            raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_ANEW}") from e
+            raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_REMEDY}") from e
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -75,7 +72,7 @@ class CampaignTable:
         Raises:
             KeyError: there is none of that name.
         """
-        column, kind = self.table.column(self._known(name)), self._kind(name)
+        column, kind = self.table.column(self._checked(name)), self._kind(name)
         if pa.types.is_floating(kind):
             return np.asarray(column.to_numpy(), dtype=np.float64)
         if pa.types.is_integer(kind) and column.null_count == 0:
@@ -101,16 +98,16 @@ class CampaignTable:
         return self._metadata(name, "description")
 
     def _kind(self, name: str) -> pa.DataType:
-        return cast(Any, self.table.schema.field(self._known(name))).type
+        return cast(Any, self.table.schema.field(self._checked(name))).type
 
     def _of_role(self, role: str) -> tuple[str, ...]:
         return tuple(name for name in self.table.column_names if self._metadata(name, "role") == role)
 
-    def _metadata(self, name: str, fact: str) -> str:
-        metadata: Mapping[bytes, bytes] = self.table.schema.field(self._known(name)).metadata or {}
-        return metadata.get(fact.encode(), b"").decode()
+    def _metadata(self, name: str, key: str) -> str:
+        metadata: Mapping[bytes, bytes] = self.table.schema.field(self._checked(name)).metadata or {}
+        return metadata.get(key.encode(), b"").decode()
 
-    def _known(self, name: str) -> str:
+    def _checked(self, name: str) -> str:
         if name not in self.table.column_names:
             raise KeyError(f"no column {name!r}: {nearest(name, self.table.column_names)}")
         return name
@@ -126,7 +123,7 @@ class RunRow:
         success: whether its task succeeded; None if it is not done.
         reason: why, in a sentence.
         simulated, wall, cpu: seconds that it took; None where that is not known.
-        metrics: its figures; a value of NaN is none.
+        metrics: by name; NaN stands for no value.
     """
 
     run: PlannedRun
@@ -140,7 +137,7 @@ class RunRow:
 
 
 def row_of(run: PlannedRun, folder: Path) -> RunRow | None:
-    """Return the row of a run that has left a folder; None if the folder does not say how the run ended."""
+    """Return the row of a run by its folder; None if the folder does not say how the run ended."""
     try:
         summary: Any = json.loads((folder / "summary.json").read_bytes())
         if summary["seed"] != run.seed or (summary["failure"] is None and not summary["complete"]):

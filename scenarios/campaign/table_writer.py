@@ -1,6 +1,6 @@
-"""Writes the table of a campaign as its runs end.
+"""Writes the table of a campaign while its runs end, and rebuilds it from the runs' folders.
 
-Completes the table that a campaign has left: a kill may come between a run's end and its row.
+A campaign that was killed may have runs whose rows are missing: `rebuild_table` adds them.
 """
 
 import contextlib
@@ -26,13 +26,13 @@ from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_value
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place, disk_errors_reported, versions
 
-_SHARE = 0.005
-"""Part of the time that may go into writing tables before the last one."""
+_MAX_SHARE = 0.005
+"""Share of the time that may go into writing tables while runs end."""
 
 _PAUSE = 1.0
-"""Seconds that pass at least from table to table."""
+"""Seconds that pass at least from one table to the next."""
 
-_BEGIN = (
+_RUN_COLUMNS = (
     ("run", pa.string(), "", "name of the run's folder in runs/"),
     ("point", pa.int64(), "1", "number of the point, from 0"),
     ("repetition", pa.int64(), "1", "number of the point's repetition, from 0"),
@@ -56,9 +56,9 @@ _TYPES: Mapping[Kind, pa.DataType] = {
 
 
 class TableWriter:
-    """Keeps `runs.parquet`, the table that `CampaignTable` reads: whole at any time, seldom enough to cost nothing.
+    """Keeps `runs.parquet`, the table that `CampaignTable` reads: complete at any time, and written seldom.
 
-    Rows are in the order of the plan. A metric that is called like another column gets the suffix `_metric`.
+    Rows are in the order of the plan. A metric with the name of another column gets the suffix `_metric`.
     """
 
     def __init__(self, plan: CampaignPlan, path: Path) -> None:
@@ -88,7 +88,7 @@ class TableWriter:
         return sorted(self._rows.values(), key=lambda row: self._rank[row.run.name])
 
     def complete(self) -> None:
-        """Write the table, unless it is there as it is to be: what was made of it stays younger than it.
+        """Write the table unless the file is the same already: a report that was made of it then stays up to date.
 
         Raises:
             RecordNotWritten: it cannot be written.
@@ -115,7 +115,7 @@ class TableWriter:
                     unfinished.unlink(missing_ok=True)
                 raise
         took = time.monotonic() - began
-        self._next = began + took + max(_PAUSE, took / _SHARE)
+        self._next = began + took + max(_PAUSE, took / _MAX_SHARE)
 
 
 def table_of(plan: CampaignPlan, rows: Sequence[RunRow]) -> pa.Table:
@@ -127,7 +127,7 @@ def table_of(plan: CampaignPlan, rows: Sequence[RunRow]) -> pa.Table:
         columns.append(pa.field(name, kind, metadata={"role": role, "unit": unit, "description": description}))
         values.append(column)
 
-    for name, kind, unit, description in _BEGIN:
+    for name, kind, unit, description in _RUN_COLUMNS:
         add(name, kind, "run", unit, description, [_of_run(row, name) for row in rows])
     for variable in _set_parameters(plan):
         kind = _type_of(variable)
@@ -163,7 +163,7 @@ def _text(plan: CampaignPlan, point: int, name: str) -> str | None:
 
 
 def _plain(variable: Variable, text: str | None) -> Any:
-    """Return a parameter's value as a column has it: what a point does not set is the parameter's start."""
+    """Return a parameter's value as a column has it; where a point does not set it, the parameter's default."""
     value = variable.start if text is None else parse_value(variable, text)[0]
     if variable.enumeration is not None:
         return str(value.name).lower()
@@ -187,19 +187,19 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-_OF_PLAN = ("scenario", "points", "fixed", "repetitions", "seed", "paired", "scenes", "experiment")
-"""What `campaign.json` tells of a plan, as far as the table follows from it."""
+_PLAN_KEYS = ("scenario", "points", "fixed", "repetitions", "seed", "paired", "scenes", "experiment")
+"""Keys of `campaign.json` on which the table depends."""
 
 
 def rebuild_table(folder: CampaignFolder) -> None:
-    """Give the table of a campaign a row for each run that is done; a table that is damaged is made anew.
+    """Give the table of a campaign a row for each run that is done; a damaged table is replaced.
 
-    It stays as it is if a command carries the campaign out now, if another version has left it, if the folder cannot be
-    written to, or if `campaign.json` is damaged.
+    It stays as it is if a command runs the campaign at this time, if another version wrote it, if the folder cannot be
+    written to, or if the plan in `campaign.json` is damaged.
 
     Raises:
         InvalidRunFolder: there is no `campaign.json`, or it cannot be read.
-        RecordNotWritten: there is no room.
+        RecordNotWritten: the disk is full.
     """
     plan = _plan_of(folder.read())
     if plan is None:
@@ -208,18 +208,18 @@ def rebuild_table(folder: CampaignFolder) -> None:
         try:
             check_place(folder.path)
             held.enter_context(folder.held())
-        except InvalidRunFolder:  # who is at work on it keeps its table
+        except InvalidRunFolder:  # the command that has locked it writes the table itself
             return
         _complete(folder, plan)
 
 
-def _plan_of(facts: Mapping[str, Any]) -> CampaignPlan | None:
-    """Return the plan that a campaign's file tells, None if it cannot be known."""
-    if facts.get("versions") != versions():
+def _plan_of(metadata: Mapping[str, Any]) -> CampaignPlan | None:
+    """Return the plan that `campaign.json` describes; None if it is another version's or damaged."""
+    if metadata.get("versions") != versions():
         return None
     try:
-        return checked_plan(CampaignPlan(**{name: facts[name] for name in _OF_PLAN}))
-    except (UsageError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):  # told by who reads on
+        return checked_plan(CampaignPlan(**{name: metadata[name] for name in _PLAN_KEYS}))
+    except (UsageError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):  # the page reports it
         return None
 
 
@@ -230,10 +230,10 @@ def _complete(folder: CampaignFolder, plan: CampaignPlan) -> None:
         known = {}
     writer = TableWriter(plan, folder.table)
     for run in plan.runs():
-        there = known.get(run.name, {})
+        old_row = known.get(run.name, {})
         row = row_of(run, folder.runs / run.name)
-        if row is None and there.get("status") == "lost":
-            row = RunRow(run=run, status="lost", success=None, reason=str(there.get("reason")))
+        if row is None and old_row.get("status") == "lost":
+            row = RunRow(run=run, status="lost", success=None, reason=str(old_row.get("reason")))
         writer.keep([] if row is None else [row])
     if {row.run.name: row.status for row in writer.rows} != {name: row.get("status") for name, row in known.items()}:
         writer.write()

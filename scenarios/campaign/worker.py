@@ -1,8 +1,7 @@
 """What a worker of a Dask cluster does for a campaign: functions that the campaign's process calls there.
 
-A worker's threads carry out a run each, by a run server of their own.
-
-A run server, seen from the worker that uses it.
+Each thread of a worker has a run server (`handover.scenarios.campaign.run_server`), a process to which it gives one job
+after the other. All jobs of one worker pool have the same `batch`, by which they can be ended together.
 """
 
 import contextlib
@@ -26,17 +25,17 @@ from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 from handover.scenarios.results.run_folder import version_differences, versions
 
 _POLL_INTERVAL = 0.5
-"""How often it is asked whether a run is still wanted, s."""
+"""How often is checked whether a run is still wanted, s."""
 
 _GRACE = 5.0
-"""How long a server gets to end its run and remove what it left, s."""
+"""How long a server gets to end its run and remove its files, s."""
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
-"""Runs go on side by side: each has one core."""
+"""Set to 1 for servers: runs are side by side, each with one core."""
 
 
 class ServerLost(Exception):
-    """The server has ended without an answer."""
+    """The server has ended without a result."""
 
 
 class NotWanted(Exception):
@@ -46,19 +45,18 @@ class NotWanted(Exception):
 class ServerProcess:
     """A process of `handover.scenarios.campaign.run_server`. It ends when this process does, however that ends.
 
-    It hears of no Ctrl-C: whoever started the campaign does, and ends it.
+    It receives no Ctrl-C: the process that runs the campaign does, and ends it.
     """
 
     def __init__(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
-        places = [p for p in sys.path if p]
-        alike = {"PYTHONPATH": os.pathsep.join(places), "PYTHONSAFEPATH": "1"}
+        same_path = {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "PYTHONSAFEPATH": "1"}
         self._process = subprocess.Popen(
             [sys.executable, "-m", "handover.scenarios.campaign.run_server"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, **alike, **dict.fromkeys(_ONE_THREAD, "1")},
+            env={**os.environ, **same_path, **dict.fromkeys(_ONE_THREAD, "1")},
             start_new_session=True,
         )
         self._results: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -67,19 +65,19 @@ class ServerProcess:
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """Its process id."""
         return self._process.pid
 
     @property
     def lives(self) -> bool:
-        """Whether it can be given orders."""
+        """Whether it can be given jobs."""
         return self._process.poll() is None
 
     def run_job(self, job: RunJob, wanted: Callable[[], bool]) -> JobResult:
-        """Carry out an order.
+        """Let the server run a job.
 
         Raises:
-            ServerLost: the server has died, or was about to end. NotWanted: `wanted` says so; the server has ended.
+            ServerLost: the server has crashed, or was about to end. NotWanted: `wanted` says so; the server has ended.
         """
         folder = Path(job.runs, f".{job.name}.{uuid.uuid4().hex[:12]}")
         try:
@@ -87,16 +85,16 @@ class ServerProcess:
                 pickle.dump((job, folder), self._jobs)
                 self._jobs.flush()
             except (OSError, ValueError) as e:
-                raise ServerLost(self._last_words()) from e
+                raise ServerLost(self._how_it_ended()) from e
             while True:
                 lives = self.lives
                 with contextlib.suppress(queue.Empty):
                     result = self._results.get(timeout=_POLL_INTERVAL)
                     if result is None:
-                        raise ServerLost(self._last_words())
+                        raise ServerLost(self._how_it_ended())
                     return result
                 if not lives:
-                    raise ServerLost(self._last_words())
+                    raise ServerLost(self._how_it_ended())
                 if not wanted():
                     raise NotWanted
         except BaseException:
@@ -110,35 +108,35 @@ class ServerProcess:
             self._jobs.close()
 
     def end(self) -> None:
-        """End it, and the run that it carries out, which leaves nothing."""
+        """End it, and its run, which leaves nothing."""
         self.ask_to_end()
         try:
             self._process.wait(_GRACE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._listening.join(_GRACE)  # its run dies after it, and writes until then
+        self._listening.join(_GRACE)  # its run ends after it, and writes until then
 
     @property
     def _jobs(self) -> BinaryIO:
         return cast(BinaryIO, self._process.stdin)
 
     def _listen(self) -> None:
-        """Take answers until both the server and the run that it carries out have ended."""
+        """Take results until both the server and its run have ended."""
         results = cast(BinaryIO, self._process.stdout)
-        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it has ended, maybe amid an answer
+        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it ended, maybe amid a result
             while True:
                 self._results.put(pickle.load(results))
         self._results.put(None)
         results.close()
 
-    def _last_words(self) -> str:
+    def _how_it_ended(self) -> str:
         """Return how the server ended."""
         status = self._process.wait()
         self._errors.seek(0)
         lines = self._errors.read().decode("utf-8", "replace").split("\n")
-        said = next((f": {line.strip()}" for line in reversed(lines) if line.strip()), "")
-        return f"its run server ended with status {status}{said}"
+        error = next((f": {line.strip()}" for line in reversed(lines) if line.strip()), "")
+        return f"its run server ended with status {status}{error}"
 
 
 _servers: dict[tuple[str, int], ServerProcess] = {}
@@ -151,9 +149,9 @@ _lock = threading.Lock()
 
 
 def run_job_on_worker(job: RunJob, batch: str, wanted_versions: Mapping[str, str]) -> JobResult:
-    """Carry out an order of a batch. If its server dies, begin it anew with another one, once.
+    """Run a job of a batch. If its server crashes, start the job again with another server, once.
 
-    A worker that came when the others had been checked may be of other versions; it carries out nothing.
+    A worker that joined after the others were checked may be of other versions; it runs nothing.
     """
     worker = get_worker()
     if other := difference(wanted_versions, _versions()):
@@ -189,7 +187,7 @@ def end_runs(batch: str) -> None:
 
 
 def package_versions() -> dict[str, str]:
-    """Return the versions of what a run's numbers depend on."""
+    """Return the versions of the packages on which a run's numbers depend."""
     return _versions()
 
 
@@ -197,7 +195,7 @@ _versions = functools.cache(versions)
 
 
 def difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
-    """Return what other versions a worker has, "" if it has none."""
+    """Return which versions of a worker differ, as a predicate; "" if none does."""
     other = version_differences(here, there)
     return f"has other versions: {other}" if other else ""
 
@@ -213,10 +211,10 @@ def fault_of_folder(folder: str, file: str, content: str) -> str:
 
 
 def _server_of(batch: str) -> ServerProcess:
-    """Return this thread's server, started unless it lives.
+    """Return this thread's server, which is started unless it runs.
 
     Raises:
-        NotWanted: the batch is ended: orders that waited here come until the scheduler has taken them back.
+        NotWanted: the batch is ended; jobs that waited here still come until the scheduler has cancelled them.
     """
     key = batch, threading.get_ident()
     with _lock:

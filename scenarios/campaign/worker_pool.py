@@ -1,8 +1,6 @@
-"""Who carries out the runs of a campaign.
+"""The worker pool that runs a campaign, as a protocol; its jobs, their results, and counts of runs.
 
-One run of a campaign as a worker gets it, and what it answers.
-
-How far a campaign has come.
+`handover.scenarios.campaign.cluster` implements it by Dask.
 """
 
 import os
@@ -16,11 +14,11 @@ from handover.cosim.stepping.options import MasterOptions
 
 @dataclass(frozen=True, kw_only=True)
 class RunJob:
-    """What a worker needs to carry out a run. It can be pickled; paths are absolute and seen by all workers alike.
+    """What a worker needs for a run. It can be pickled; paths are absolute and the same for all workers.
 
     Attributes:
         name: of the run's folder in `runs`. While it runs, its files are in a folder of another name beside it, which
-            is given this name when the run has ended, so that what bears the name is complete.
+            is renamed when the run has ended, so that a folder of this name is complete.
         scenario, parameters, seed: what to run; parameters are texts `name=value`.
         fmus: the FMU of each unit.
         runs: the campaign's folder of runs.
@@ -38,12 +36,12 @@ class RunJob:
 
 @dataclass(frozen=True, kw_only=True)
 class JobResult:
-    """How a worker did with an order.
+    """How a job ended.
 
     Attributes:
-        name: the order's.
-        lost: why there is no folder of the run, in a sentence; "" if there is one, whose `summary.json` tells the rest.
-        no_room: what the system says if a full disk is why it is lost, as "No space left on device"; else "".
+        name: the job's.
+        lost: why there is no folder of the run, in a sentence; "" if there is one, whose `summary.json` says the rest.
+        no_room: the system's message if it is lost by a full disk, as "No space left on device"; else "".
     """
 
     name: str
@@ -52,10 +50,10 @@ class JobResult:
 
 
 class WorkerPool(Protocol):
-    """Workers that carry out orders side by side."""
+    """Workers that run jobs side by side."""
 
     def check(self, folder: Path) -> None:
-        """Check that all workers give the same numbers as this process would, and write to the same folder.
+        """Check that all workers compute the same numbers as this process would, and write to the same folder.
 
         Args:
             folder: an existing one, into which runs are to be written.
@@ -66,13 +64,13 @@ class WorkerPool(Protocol):
         ...
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        """Give each order to a worker; yield the answers as they come.
+        """Give each job to a worker; yield the results as they come.
 
-        A worker that is lost is replaced where that is possible, and its run begun anew. If the iteration is left
+        A worker that is lost is replaced where that is possible, and its run started again. If the iteration is left
         before its end, runs under way are ended and leave nothing.
 
         Raises:
-            ClusterLost: all of them have gone for good.
+            ClusterLost: all workers were lost, and none came back.
         """
         ...
 
@@ -88,8 +86,8 @@ class RunCounts:
 
     Attributes:
         total: all that are planned.
-        kept: those that earlier calls have carried out.
-        ended: those that have left a folder, with those kept.
+        kept: those that were done before this call.
+        ended: those whose folder is complete, with those kept.
         failed: those of `ended` in which a unit failed.
         lost: those that no worker came back with in this call.
     """
@@ -107,4 +105,4 @@ class RunCounts:
 
 
 OnRunCounts = Callable[[RunCounts], None]
-"""Told how far a campaign has come, at its start and after each run."""
+"""Is called with the counts of a campaign's runs, at its start and after each run."""

@@ -1,8 +1,6 @@
-"""Writes the page of a campaign, of what is in its folder.
+"""Writes the page of a campaign from its folder: reads and checks the files, writes the header, chooses the sections.
 
-What stands under the heading of a campaign's page: what was run, how it went, what it took.
-
-What a campaign's folder says of it, checked as it is read: it may be another version's, or damaged.
+Files are checked as they are read: they may be another version's, or damaged.
 """
 
 import json
@@ -44,19 +42,19 @@ _MAX_VALUES = 10
 
 
 def campaign_header(results: CampaignResults, claims: Sequence[Claim]) -> Markup:
-    """Return what was run, verdict, claims by verdict, and the plan in sentences."""
+    """Return the page's header: what was run, how it went, claims by verdict, and the plan in sentences."""
     lines = [Markup("<p class='soft'>{}</p>").format(_scenario(results)), _verdict(results)]
     for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):
         counts = verdict_counts(claims, beyond)
         if counts:
-            entries = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
-            lines.append(Markup("<p>{}: {}.</p>").format(heading, entries))
+            verdicts = Markup(", ").join(Markup("{} {}").format(n, verdict_html(v, words)) for n, v, words in counts)
+            lines.append(Markup("<p>{}: {}.</p>").format(heading, verdicts))
     lines.append(Markup("<p class='soft'>{}</p>").format(f"{_plan(results)} {_cost(results)}".strip()))
     return Markup("\n").join(lines)
 
 
 def _scenario(results: CampaignResults) -> str:
-    """Tell of the scenario what the page's title does not: its name below a paper's, else what it does."""
+    """Describe the scenario by what the page's title lacks: below a paper's title its name, else what it does."""
     if results.metadata.get("experiment"):
         return f"Runs of the scenario {results.scenario}."
     scenario = SCENARIOS.get(results.scenario)
@@ -67,40 +65,40 @@ def _verdict(results: CampaignResults) -> Markup:
     ended, planned, status = len(results.table), results.planned, results.table.column("status")
     done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
     succeeded = sum(p.successes for p in results.points)
-    entries = [f"in {succeeded} of {done} runs done the task succeeded"]
-    entries += [f"{failed} failed to run"] if failed else []
-    entries += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
-    sentence = "; ".join(entries) + "."
+    parts = [f"in {succeeded} of {done} runs done the task succeeded"]
+    parts += [f"{failed} failed to run"] if failed else []
+    parts += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
+    sentence = "; ".join(parts) + "."
     if ended < planned:
-        begun = Markup("<b>{} of {} runs so far</b>; run the same command again to resume.").format(ended, planned)
-        return Markup("<p class='verdict'>{} {}</p>").format(begun, sentence[0].upper() + sentence[1:])
+        so_far = Markup("<b>{} of {} runs so far</b>; run the same command again to resume.").format(ended, planned)
+        return Markup("<p class='verdict'>{} {}</p>").format(so_far, sentence[0].upper() + sentence[1:])
     kind = " bad" if failed or lost else ""
     number = "1 run" if planned == 1 else f"{planned} runs"
     return Markup("<p class='verdict{}'><b>{}</b>: {}</p>").format(kind, number, sentence)
 
 
 def _plan(results: CampaignResults) -> str:
-    """Tell what was varied and how often each point was run."""
-    entries = results.metadata
+    """Describe what was varied and how often each point was run."""
+    metadata = results.metadata
     varied = [f"{name.replace('_', ' ')} ({_values(results, name)})" for name in results.varied]
-    points, repetitions = len(entries["points"]), int(entries["repetitions"])
+    points, repetitions = len(metadata["points"]), int(metadata["repetitions"])
     parts = [f"Varied: {'; '.join(varied)}" if varied else "Nothing is varied"]
     number = f"{points} points" if points != 1 else "One point"
     parts.append(
-        f"{number}, {repetitions} {'run' if repetitions == 1 else 'runs'} each; campaign's seed {entries['seed']}"
+        f"{number}, {repetitions} {'run' if repetitions == 1 else 'runs'} each; campaign's seed {metadata['seed']}"
     )
-    if entries.get("paired"):
+    if metadata.get("paired"):
         parts.append("Runs of a repetition share a seed, so that points can be compared run by run")
     return ". ".join(parts) + "."
 
 
 def _cost(results: CampaignResults) -> str:
-    """Tell what the runs took, one added to another."""
+    """Describe the time that all runs took together."""
     if not len(results.table):
         return ""
     cpu, wall = (float(np.nansum(results.table.column(n).astype(np.float64))) for n in ("cpu_seconds", "wall_seconds"))
-    took = [display_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
-    return f"The runs took {took[0]} of CPU time, and {took[1]} from begin to end, added up."
+    times = [display_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
+    return f"The runs took {times[0]} of CPU time, and {times[1]} from begin to end, added up."
 
 
 def _values(results: CampaignResults, name: str) -> str:
@@ -142,7 +140,7 @@ def read_results(folder: CampaignFolder) -> CampaignResults:
 
 
 def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
-    """Read what became of a paper's claims; none if the campaign is of none, or not that far.
+    """Read a paper's claims with their verdicts; none if the campaign is of no paper, or not complete.
 
     Raises:
         InvalidRunFolder: the file is damaged.
@@ -153,7 +151,7 @@ def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
     try:
         return [Claim.from_data(entry) for entry in cast(list[Mapping[str, Any]], json.loads(file.read_bytes()))]
     except (KeyError, TypeError, ValueError) as e:
-        fault = f"its {file.name} is damaged: {one_line(e)}; the same `handover paper` call writes it anew"
+        fault = f"its {file.name} is damaged: {one_line(e)}; run the same `handover paper` command again to rewrite it"
         raise InvalidRunFolder(folder.path, fault) from e
 
 
@@ -166,7 +164,7 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
 
     Raises:
         InvalidRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
-        RecordNotWritten: there is no room.
+        RecordNotWritten: the disk is full.
     """
     with tempfile.TemporaryDirectory(prefix="handover-") as figures:
         _write(folder, read_results(folder), read_claims(folder), None, Path(figures), file)
@@ -178,7 +176,7 @@ def write_campaign_report(folder: CampaignFolder, file: Path | None = None, pape
     Args:
         folder: the campaign's.
         file: where the page goes, as of `write_campaign_page`.
-        paper: what the runs say of the paper, if that is known already.
+        paper: the paper's claims and tables for these runs, if they are made already; else they are read.
 
     Raises:
         InvalidRunFolder, RecordNotWritten: as `write_campaign_page`.
@@ -198,9 +196,9 @@ def _write(
     figures: Path,
     file: Path | None,
 ) -> None:
-    """Write the page; a paper's figures are drawn into a folder on the way, and its tables made if they are not."""
-    named = EXPERIMENTS.get(str(results.metadata.get("experiment", "")))
-    experiment = None if named is None else named()
+    """Write the page; a paper's figures are drawn into a folder, and its tables are made unless they are given."""
+    experiment_type = EXPERIMENTS.get(str(results.metadata.get("experiment", "")))
+    experiment = None if experiment_type is None else experiment_type()
     sections: list[Section | None] = [claims_section(claims)]
     if experiment is not None and results.points:
         sections += _published(experiment, tables, results, folder.runs, figures)
@@ -225,7 +223,7 @@ def _published(
     runs: Path,
     figures: Path,
 ) -> Sequence[Section | None]:
-    """Return published values beside ours, and the experiment's figures; a section that says why where it cannot."""
+    """Return published values beside ours, and the figures, or a section that says why there are none."""
     try:
         tables = experiment.tables(results.table) if tables is None else tables
         drawn = draw_figures(experiment, results.table, runs, figures)

@@ -1,4 +1,4 @@
-"""What became of a paper's claims, and its values beside the campaign's."""
+"""A paper's claims with their verdicts, and published values beside ours."""
 
 from collections.abc import Sequence
 
@@ -39,7 +39,7 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
         "claim": Markup("{}{}").format(claim.claim, where),
         "published": claim.published,
         "ours": claim.measured,
-        "95 % interval": _span(claim),
+        "95 % interval": _interval(claim),
         "verdict": Markup("{}<br><span class='soft'>{}</span>").format(verdict, claim.reason),
     }
     text = Markup().join(
@@ -51,7 +51,7 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
     return Markup("<tr>{}</tr>").format(text)
 
 
-def _span(claim: Claim) -> str:
+def _interval(claim: Claim) -> str:
     """Return the interval, a rate's in percent."""
     if claim.interval is None:
         return ""

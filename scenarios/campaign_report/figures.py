@@ -16,16 +16,16 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 
 _LINE = 0.24
-"""Height of a point of a list, in inches."""
+"""Height of a row where points are a list, in inches."""
 
 _MAX_ENTRIES = 80
-_LETTERS_ALONG = 60
+_LETTERS_ALONG = 60  # that fit along a horizontal axis
 
 
 def draw_campaign(results: CampaignResults, folder: Path) -> list[Figure]:
-    """Draw success rates and the metrics that are told first into a folder, as PNG and SVG.
+    """Draw success rates and the first metrics of the headline into a folder, as PNG and SVG.
 
-    Nothing if no run is done, or if the points are more than a figure has room for.
+    Draws nothing if no run is done, or if the points are more than a figure has room for.
     """
     if not any(len(p.done) for p in results.points):
         return []
@@ -44,8 +44,8 @@ def _success(results: CampaignResults, layout: PointLayout, folder: Path) -> Fig
             if span is not None:
                 low, middle, high = 100 * span.low, 100 * point.rate, 100 * span.high
                 _bar(axes, layout, float(layout.places[k]), (low, middle, high), COLOURS[layout.groups[k]])
-        _place(axes, layout)
-        _across(axes, layout, "success rate (%)", (-3.0, 103.0))
+        _set_point_axis(axes, layout)
+        _set_value_axis(axes, layout, "success rate (%)", (-3.0, 103.0))
     caption = "Share of the runs done that succeeded, with 95 % intervals of Clopper and Pearson."
     return Figure("success_by_point", caption)
 
@@ -58,21 +58,21 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
     with figure(folder / f"{name}_by_point", 1, size=_size(layout)) as [axes]:
         for k, point in enumerate(results.points):
             values, colour = column[point.rows] * unit.factor, COLOURS[layout.groups[k]]
-            fine = np.array([success[row] is True for row in point.rows])
+            succeeded = np.array([success[row] is True for row in point.rows])
             places = layout.beside(k, len(values)) - 0.12 * layout.room
-            for chosen, marker, width in ((fine, "o", 0.0), (~fine, "x", 1.1)):
+            for chosen, marker, width in ((succeeded, "o", 0.0), (~succeeded, "x", 1.1)):
                 x, y = _ordered(layout, places[chosen], values[chosen])
                 axes.plot(x, y, marker, ms=4, mew=width, color=colour, alpha=0.6)
             _median(axes, layout, k, (results.median(point, name), results.median_interval(point, name)), unit)
-        _place(axes, layout)
-        _across(axes, layout, unit.axis(words), None)
-    value = results.table.description(name) or words
+        _set_point_axis(axes, layout)
+        _set_value_axis(axes, layout, unit.axis(words), None)
+    description = results.table.description(name) or words
+    intervals = " with their 95 % bootstrap intervals" if results.has_intervals else ""
     caption = (
-        f"{value[0].upper()}{value[1:]}: runs that succeeded (discs) and others (crosses); medians of the runs done"
+        f"{description[0].upper()}{description[1:]}: runs that succeeded (discs) and others (crosses); medians of the "
+        f"runs done{intervals}."
     )
-    return Figure(
-        f"{name}_by_point", caption + (" with their 95 % bootstrap intervals." if results.has_intervals else ".")
-    )
+    return Figure(f"{name}_by_point", caption)
 
 
 def _median(
@@ -104,15 +104,15 @@ def _size(layout: PointLayout) -> tuple[float, float]:
     return (8.0, 1.0 + _LINE * max(len(layout.places), 2)) if layout.listed else (8.0, 3.6)
 
 
-def _across(axes: Axes, layout: PointLayout, title: str, limits: tuple[float, float] | None) -> None:
+def _set_value_axis(axes: Axes, layout: PointLayout, title: str, limits: tuple[float, float] | None) -> None:
     if layout.listed:
         axes.set(xlabel=title, **({} if limits is None else {"xlim": limits}))
     else:
         axes.set(ylabel=title, **({} if limits is None else {"ylim": limits}))
 
 
-def _place(axes: Axes, layout: PointLayout) -> None:
-    """Give axes the names of the points, and the colours' names."""
+def _set_point_axis(axes: Axes, layout: PointLayout) -> None:
+    """Label the points along their axis, and the colours in a legend."""
     low, high = layout.limits
     if layout.listed:
         axes.set(ylim=(low, high), ylabel=layout.title)

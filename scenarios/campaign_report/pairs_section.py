@@ -1,4 +1,4 @@
-"""A paired campaign's points against each other, run by run in the same scenes."""
+"""Exact tests of a paired campaign's points against each other, run by run in the same scenes."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +41,7 @@ def pairs_section(results: CampaignResults) -> Section | None:
 
 
 Alike = Mapping[tuple[str, frozenset[tuple[str, str]]], Sequence[int]]
-"""Points that differ in a parameter at most, by its name and by what they have in common."""
+"""Points that differ in at most one parameter, by its name and by the values that they share."""
 
 
 def _alike(results: CampaignResults) -> Alike:
@@ -104,7 +104,7 @@ def _row(
 
 
 def _labels(results: CampaignResults, a: PointResults, b: PointResults, name: str) -> tuple[str, str, str]:
-    """Return what two points have in common, and what each has for itself."""
+    """Return labels of what two points have in common, and of the value in which each differs."""
     shared = [results.value_text(n, a.values[n]) for n in results.varied if n != name and n in a.values]
     first, second = (results.value_text(name, p.values[name]) for p in (a, b))
     return ", ".join(shared) or "all", first, second

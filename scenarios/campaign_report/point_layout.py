@@ -16,7 +16,7 @@ _MAX_LABEL_LENGTH = 80
 """Letters of all names along a horizontal axis."""
 
 _UNEVEN = 8.0
-"""Ratio of the widest to the narrowest step of values above 0 from which on their axis is logarithmic."""
+"""Ratio of the widest to the narrowest step of positive values above which their axis is logarithmic."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,10 +26,10 @@ class PointLayout:
     Attributes:
         title: of the axis.
         places: of each of the campaign's points along it, in its coordinates.
-        room: what each has of the axis for itself.
-        ticks: places and names; None where the places are numbers that any axis can tell.
+        room: width along the axis that each has for itself.
+        ticks: places and names; None where the places are numbers, which the plot labels by itself.
         groups: number of each point's colour.
-        group_names: by number; one empty name if nothing tells them apart.
+        group_names: by number; one empty name if there is one group.
         listed: whether the points are a list from top to bottom instead of standing side by side.
     """
 
@@ -48,7 +48,10 @@ class PointLayout:
         return float(self.places.min()) - edge, float(self.places.max()) + edge
 
     def beside(self, k: int, n: int) -> Floats:
-        """Return the places of n runs of a point: spread over half its room, evenly and always alike."""
+        """Return the places of n runs of a point: spread over about half its room, reproducibly.
+
+        Multiples of the golden ratio, modulo 1, are spread evenly for any n.
+        """
         spread = (np.arange(n) * (math.sqrt(5.0) - 1.0) / 2.0 + 0.5) % 1.0 - 0.5
         return self.places[k] + 0.55 * self.room * (spread if n > 1 else np.zeros(n))
 
@@ -57,7 +60,7 @@ def layout_of(results: CampaignResults) -> PointLayout:
     """Lay a campaign's points out.
 
     One varied parameter is the axis; of two, that with more values, or the only number, is the axis, and the other is
-    told by colour. Points that differ otherwise, or whose names need more room, are a list.
+    shown by colour. Points that differ otherwise, or whose names need more room, are a list.
     """
     varied = results.independent
     if any(name not in p.values for p in results.points for name in varied):

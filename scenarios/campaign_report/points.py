@@ -1,7 +1,4 @@
-"""A campaign's points in numbers: successes, and the median of the metrics that matter, with intervals.
-
-How often a campaign's runs succeeded, point by point.
-"""
+"""A campaign's points: a table of successes and medians of metrics with intervals, and a plot of success rates."""
 
 import math
 from collections.abc import Mapping
@@ -25,10 +22,10 @@ def points_section(results: CampaignResults) -> Section | None:
         return None
     metrics = results.shown_metrics
     units = {m: display_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
-    written = _written(results)
+    units_of_varied = _units_of_varied(results)
     rows = [
         (
-            *_values(results, point, written),
+            *_values(results, point, units_of_varied),
             str(len(point.rows)),
             *_success(point),
             *(_median(results, point, m, units[m]) for m in metrics),
@@ -50,20 +47,20 @@ def points_section(results: CampaignResults) -> Section | None:
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
 
 
-def _written(results: CampaignResults) -> Mapping[str, DisplayUnit]:
-    """Return in which unit the values of each varied number are written."""
+def _units_of_varied(results: CampaignResults) -> Mapping[str, DisplayUnit]:
+    """Return the unit in which the values of each varied number are shown."""
     texts = {n: {p.values[n] for p in results.points if n in p.values} for n in results.varied if results.is_number(n)}
     return {name: display_unit(results.unit(name), list(map(float, values))) for name, values in texts.items()}
 
 
-def _values(results: CampaignResults, point: PointResults, written: Mapping[str, DisplayUnit]) -> list[Cell]:
+def _values(results: CampaignResults, point: PointResults, units: Mapping[str, DisplayUnit]) -> list[Cell]:
     cells: list[Cell] = []
     for name in results.varied:
         text = point.values.get(name)
         if text is None:
             cells.append(Cell("–"))
-        elif name in written:
-            cells.append(Cell(written[name].text(float(text)), float(text)))
+        elif name in units:
+            cells.append(Cell(units[name].text(float(text)), float(text)))
         else:
             cells.append(Cell(text.replace("_", " ")))
     return cells or [Cell("all runs")]
@@ -88,12 +85,12 @@ def _median(results: CampaignResults, point: PointResults, metric: str, unit: Di
 
 
 def _short(x: float) -> str:
-    """Write a number to three digits, as long as they show all that stands before its point."""
+    """Format a number to three digits, or four where three would cut its integer part."""
     return f"{x:.3g}" if abs(x) < 999.5 else f"{x:.4g}"
 
 
-_A_SCREEN = 15
-"""Points of a list; the values of a longer one stand at its top."""
+_SCREEN = 15
+"""Points of a list that fit a screen; a longer list has its value axis at the top."""
 
 
 def success_section(results: CampaignResults, layout: PointLayout) -> Section | None:
@@ -104,13 +101,13 @@ def success_section(results: CampaignResults, layout: PointLayout) -> Section | 
     for group, name in enumerate(layout.group_names):
         figure.add_trace(_rates(results, layout, group, name))
     place_axis(figure, layout)
-    value = "xaxis" if layout.listed else "yaxis"
-    figure.update_layout({value: {"title": {"text": "success rate (%)"}, "range": [-4, 104], "dtick": 25}})
-    entries = Markup("<p class='soft'>Of the runs done; bars: 95 % intervals of Clopper and Pearson.</p>")
+    rate_axis = "xaxis" if layout.listed else "yaxis"
+    figure.update_layout({rate_axis: {"title": {"text": "success rate (%)"}, "range": [-4, 104], "dtick": 25}})
+    note = Markup("<p class='soft'>Of the runs done; bars: 95 % intervals of Clopper and Pearson.</p>")
     return Section(
         anchor="success",
         title="Success",
-        html=plot_html(figure, plot_height(layout), "success rate by point, with intervals") + entries,
+        html=plot_html(figure, plot_height(layout), "success rate by point, with intervals") + note,
     )
 
 
@@ -121,7 +118,7 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
     spans = [p.interval for p in points]
     low = np.array([s.low for s in spans if s]) * 100.0
     high = np.array([s.high for s in spans if s]) * 100.0
-    entries = [
+    hover = [
         [results.label(p), f"{p.successes} of {len(p.done)}", f"{a:.0f} to {b:.0f} %"]
         for p, a, b in zip(points, low, high, strict=True)
     ]
@@ -133,13 +130,13 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
         marker={"size": 10, "color": f"var(--c{group})"},
         name=name,
         showlegend=len(layout.group_names) > 1,
-        customdata=entries,
+        customdata=hover,
         hovertemplate="%{customdata[0]}<br>%{customdata[1]} succeeded<br>95 %: %{customdata[2]}<extra></extra>",
     )
 
 
 def place_axis(figure: Any, layout: PointLayout) -> None:
-    """Give a figure the axis along which points stand."""
+    """Set the axis of a figure along which points stand."""
     axis: dict[str, Any] = {"title": {"text": layout.title}, "range": list(layout.limits)}
     if layout.ticks is not None:
         names = [name for _, name in layout.ticks]
@@ -147,7 +144,7 @@ def place_axis(figure: Any, layout: PointLayout) -> None:
             names = [_broken(name) for name in names]
         axis |= {"tickmode": "array", "tickvals": [place for place, _ in layout.ticks], "ticktext": names}
     figure.update_layout({"yaxis" if layout.listed else "xaxis": axis})
-    if layout.listed and len(layout.places) > _A_SCREEN:
+    if layout.listed and len(layout.places) > _SCREEN:
         figure.update_layout({"xaxis": {"side": "top"}})
 
 

@@ -1,7 +1,4 @@
-"""All runs of a campaign in a table that can be sorted and filtered.
-
-Why runs of a campaign did not succeed, grouped by reason.
-"""
+"""A campaign's runs: a table of all that can be sorted and filtered, and why runs failed, grouped by reason."""
 
 import math
 import re
@@ -62,14 +59,14 @@ def _number_of(rows: Sequence[Any]) -> str:
 
 def run_html(name: str, folder: Path) -> Markup:
     """Return a run's name, linked to its page if that is there."""
-    place = _page_of(name, folder)
-    return Markup("<a href='{}'>{}</a>").format(quote(place), name) if place else Markup("{}").format(name)
+    page = _page_of(name, folder)
+    return Markup("<a href='{}'>{}</a>").format(quote(page), name) if page else Markup("{}").format(name)
 
 
 def _page_of(name: str, folder: Path) -> str:
     """Return where a run's page is within a campaign's folder; "" if it is not there."""
-    place = f"runs/{name}/report.html"
-    return place if (folder / place).exists() else ""
+    page = f"runs/{name}/report.html"
+    return page if (folder / page).exists() else ""
 
 
 def _row(
@@ -96,10 +93,10 @@ def _parameter(value: Any, unit: DisplayUnit | None) -> Cell:
 
 def _verdict(row: dict[str, Any]) -> Markup:
     if row["status"] != "done":
-        kind, entries = "bad", row["status"] if row["status"] == "lost" else "run failed"
+        kind, verdict = "bad", row["status"] if row["status"] == "lost" else "run failed"
     else:
-        kind, entries = ("good", "succeeded") if row["success"] else ("bad", "failed")
-    return Markup("<span class='{}' title='{}'>{}</span>").format(kind, row["reason"] or "", entries)
+        kind, verdict = ("good", "succeeded") if row["success"] else ("bad", "failed")
+    return Markup("<span class='{}' title='{}'>{}</span>").format(kind, row["reason"] or "", verdict)
 
 
 def _number(value: float | None, unit: DisplayUnit) -> Cell:
@@ -123,7 +120,7 @@ class _Group:
 def failures_section(results: CampaignResults, folder: Path) -> Section | None:
     """Return the table of reasons, most frequent first; None if all runs succeeded.
 
-    Reasons that differ but in their numbers are one; the first run's is told.
+    Reasons that differ only in their numbers are one; the first run's is shown.
     """
     groups = _groups(results)
     if not groups:
@@ -149,10 +146,10 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
 def _groups(results: CampaignResults) -> Sequence[_Group]:
     status, success, reasons = (results.table.column(n) for n in ("status", "success", "reason"))
     groups: dict[tuple[str, str], _Group] = {}
-    for row, (state, fine, reason) in enumerate(zip(status, success, reasons, strict=True)):
-        if fine is True:
+    for row, (state, succeeded, reason) in enumerate(zip(status, success, reasons, strict=True)):
+        if succeeded is True:
             continue
         kind = "task failed" if state == "done" else f"run {state}"
-        same = _NUMBER.sub("#", reason or "")
-        groups.setdefault((kind, same), _Group(kind, reason or "no reason told")).rows.append(row)
+        pattern = _NUMBER.sub("#", reason or "")
+        groups.setdefault((kind, pattern), _Group(kind, reason or "no reason given")).rows.append(row)
     return sorted(groups.values(), key=lambda g: -len(g.rows))

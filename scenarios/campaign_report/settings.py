@@ -1,7 +1,4 @@
-"""With what a campaign was run: parameters that are the same in all runs, options of the master, versions.
-
-Figures of a folder within a page.
-"""
+"""The settings of a campaign, as fixed parameters, options of the master, versions and FMUs; and its figures."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -19,13 +16,13 @@ from handover.scenarios.results.tables import format_value
 
 
 def setting_section(results: CampaignResults) -> Section:
-    """Return tables of what is set for all runs; the scenario's defaults hold for the rest."""
-    found = results.metadata
+    """Return tables of what is set for all runs; other parameters have the scenario's defaults."""
+    metadata = results.metadata
     parts = [
-        _part("Fixed parameters", {n: _value(results, n, v) for n, v in found["fixed"].items()}),
-        _part("Master", _flat(found.get("master", {}))),
-        _part("Versions", {n: str(v) for n, v in found.get("versions", {}).items()}),
-        _fmus(found.get("units", {})),
+        _part("Fixed parameters", {n: _value(results, n, v) for n, v in metadata["fixed"].items()}),
+        _part("Master", _flat(metadata.get("master", {}))),
+        _part("Versions", {n: str(v) for n, v in metadata.get("versions", {}).items()}),
+        _fmus(metadata.get("units", {})),
     ]
     defaults = "Parameters that are neither varied nor fixed have the scenario's defaults; each run's run.json has all."
     html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)
@@ -62,7 +59,7 @@ def _value(results: CampaignResults, name: str, text: str) -> str:
 
 
 def _flat(options: Mapping[str, Any]) -> dict[str, str]:
-    """Return options as texts, without those that are not chosen."""
+    """Return options as texts, nested ones by both names, without those that are not set."""
     flat: dict[str, str] = {}
     for name, value in options.items():
         if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""What a campaign's runs measured, run by run and point by point, one metric at a time."""
+"""Plot of a campaign's metrics: each run as a mark, each point as a box, one metric at a time to choose from."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -41,7 +41,7 @@ def spread_section(results: CampaignResults, layout: PointLayout) -> Section | N
         choices[0]["told"],
         plot_html(figure, plot_height(layout) + 60, f"{first} by point"),
         json_html(choices, "choices"),
-        "A mark is a run: a disc succeeded, a cross did not. Boxes: quartiles and median; whiskers: least and most.",
+        "A mark is a run: a disc succeeded, a cross did not. Boxes: quartiles and median; whiskers: extremes.",
     )
     return Section(anchor="metrics", title="Metrics", html=html, scripts=("campaign.js",))
 
@@ -59,9 +59,9 @@ def _strips(results: CampaignResults, layout: PointLayout) -> list[Strip]:
             places: list[float] = []
             for k, point in enumerate(results.points):
                 if layout.groups[k] == group:
-                    fits = np.array([(success[row] is True) == succeeded for row in point.rows])
-                    rows += point.rows[fits].tolist()
-                    places += layout.beside(k, len(point.rows))[fits].tolist()
+                    chosen = np.array([(success[row] is True) == succeeded for row in point.rows])
+                    rows += point.rows[chosen].tolist()
+                    places += layout.beside(k, len(point.rows))[chosen].tolist()
             if rows:
                 strips.append((group, succeeded, rows, places))
     return strips
@@ -76,9 +76,8 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
     traces: list[dict[str, Any]] = []
     for group, succeeded, rows, places in strips:
         name, outcome = layout.group_names[group], "succeeded" if succeeded else "not succeeded"
-        entries = [
-            [name_of, int(seed), _ENDED[success]]
-            for name_of, seed, success in zip(*(c[rows] for c in columns), strict=True)
+        hover = [
+            [run, int(seed), _ENDED[success]] for run, seed, success in zip(*(c[rows] for c in columns), strict=True)
         ]
         traces.append(
             {
@@ -87,7 +86,7 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
                 along: places,
                 "name": ", ".join(filter(None, (name, outcome if mixed or not name else ""))),
                 "marker": _marker(f"var(--c{group})", _SUCCESS if succeeded else _OTHER),
-                "customdata": entries,
+                "customdata": hover,
                 "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{across}:.4g}}"
                 "<br>%{customdata[2]}<extra></extra>",
             }

@@ -1,7 +1,4 @@
-"""The command `handover build`.
-
-A unit of one's own, as `handover build` is given it: the path of a block's class.
-"""
+"""The command `handover build`: units as FMUs, from the catalog or from a user's own block, named MODULE:CLASS."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -35,7 +32,7 @@ def load_user_block(path: str, step: str | None) -> Entry:
     Its step is that which is given, a number or a fraction of seconds, else the block's period, else 0.01 s.
 
     Raises:
-        UsageError: there is no such class, its module does not load, it is no block, or the step is none.
+        UsageError: there is no such class, its module cannot be loaded, it is no block, or the step is invalid.
     """
     here = str(Path.cwd())
     if here not in sys.path:
@@ -70,7 +67,8 @@ A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
 Environment, when units are built
   HANDOVER_FMI_PLATFORMS  platforms for which the package, and what is missing
                           of it, is compiled [default: host]
-  HANDOVER_CACHE          what is compiled where the package cannot be written
+  HANDOVER_CACHE          folder for what is compiled where the package cannot be
+                          written
 
 \b
 Environment, when a tool loads the units
@@ -119,8 +117,8 @@ def build_command(
     named = list(dict.fromkeys(units))
     unknown = [u for u in named if u not in UNITS and ":" not in u]
     if unknown:
-        cure = "a unit of your own is named MODULE:CLASS"
-        raise UsageError("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown) + f"; {cure}")
+        remedy = "a unit of your own is named MODULE:CLASS"
+        raise UsageError("; ".join(f"no unit {u!r}: {nearest(u, UNITS)}" for u in unknown) + f"; {remedy}")
     with Interruption(), one_line_errors():
         check_place(out)
         entries = [UNITS[u] if u in UNITS else load_user_block(u, step) for u in named or UNITS]

@@ -1,8 +1,7 @@
-"""A campaign as a command carries it out: with its progress, ended in order by Ctrl-C, its end told in a line.
+"""Runs a campaign as a command does: with its progress, Ctrl-C, and exit statuses. `sweep` and `paper` call it.
 
-Tells how far a campaign has come: a bar on a terminal, a line now and then elsewhere, as in a batch system's log.
-
-Ctrl-C during a campaign: the first ends it in order, the second at once.
+Progress is a bar on a terminal, elsewhere a line now and then, as in a batch system's log. The first Ctrl-C ends a
+campaign in order, the second at once.
 """
 
 import contextlib
@@ -35,22 +34,22 @@ from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_
 from handover.scenarios.execution.supervisor import leave
 
 _PAUSE = 30.0
-"""Seconds from line to line where there is no terminal."""
+"""Seconds from one line to the next where there is no terminal."""
 
 _STARTING = "starting workers"
 
 
 class CampaignProgress:
-    """Shows a campaign's tally while it is used as a context manager; calling it moves it.
+    """Shows the counts of a campaign's runs while it is used as a context manager; calling it updates them.
 
     Args:
-        stream: where to; a bar if it is a terminal.
-        clock: gives the seconds from an instant on.
+        stream: what it is written to; a bar if it is a terminal.
+        clock: returns monotonic time, s.
     """
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self.counts: RunCounts | None = None
-        """What it was told last."""
+        """The last counts."""
         self._stream = stream
         self._clock = clock
         self._began = self._printed_at = clock()
@@ -62,7 +61,7 @@ class CampaignProgress:
         self._printer = threading.Thread(target=self._print_periodically, daemon=True)
 
     def __call__(self, counts: RunCounts) -> None:
-        """Take how far it has come."""
+        """Take the present counts."""
         if self.counts is None:
             self._began = self._clock()
         self.counts = counts
@@ -109,7 +108,7 @@ class CampaignProgress:
 
 
 def format_progress(counts: RunCounts) -> str:
-    """Return such as "12 of 60 runs done, 1 failed, 2 lost"."""
+    """Return a text such as "12 of 60 runs done, 1 failed, 2 lost"."""
     parts = [f"{counts.ended} of {counts.total} runs done"]
     parts += [f"{counts.failed} failed"] if counts.failed else []
     parts += [f"{counts.lost} lost"] if counts.lost else []
@@ -117,11 +116,11 @@ def format_progress(counts: RunCounts) -> str:
 
 
 def format_time_left(counts: RunCounts, elapsed: float) -> str:
-    """Return such as "3 min left", reckoned from the runs of this call; "" where nothing can be said."""
-    here = counts.ended + counts.lost - counts.kept
-    if here == 0 or counts.left == 0:
+    """Return a text such as "3 min left", estimated from the runs of this call; "" where nothing can be said."""
+    ended_here = counts.ended + counts.lost - counts.kept
+    if ended_here == 0 or counts.left == 0:
         return ""
-    seconds = elapsed / here * counts.left
+    seconds = elapsed / ended_here * counts.left
     if seconds < 60:
         return f"{max(1, round(seconds))} s left"
     if seconds < 3600:
@@ -133,11 +132,11 @@ _SIGNALS = [n for n in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP",
 
 
 class CampaignInterruption:
-    """Takes SIGINT, SIGTERM and SIGHUP over. Use it as a context manager in the main thread.
+    """Handles SIGINT, SIGTERM and SIGHUP. Use it as a context manager in the main thread.
 
     The first of them raises KeyboardInterrupt, on which a campaign drops the runs under way and writes its table. The
-    second ends this process at once with status 130; workers end when they miss it. One that is ignored, as under
-    nohup, stays so.
+    second ends this process at once with status 130, whereupon its workers end by themselves. A signal that is ignored,
+    as under nohup, stays so.
     """
 
     def __init__(self) -> None:
@@ -160,7 +159,7 @@ class CampaignInterruption:
 
     @contextlib.contextmanager
     def at_once(self) -> Generator[None, None, None]:
-        """Let the first signal end this process like the second, while there is nothing to put in order."""
+        """Let the first signal end this process like the second, while there is nothing to clean up."""
         before, self._asked = self._asked, True
         try:
             yield
@@ -169,7 +168,7 @@ class CampaignInterruption:
 
     @contextlib.contextmanager
     def deferred_signals(self) -> Generator[None, None, None]:
-        """Let the first signal count at the end of the block, as what is half started or ended is not in order.
+        """Defer the first signal to the end of the block, as half-started workers cannot be cleaned up.
 
         Raises:
             KeyboardInterrupt: at the end, if there has been one.
@@ -192,12 +191,12 @@ class CampaignInterruption:
 
 
 Finish = Callable[[CampaignFolder, CampaignTable], None]
-"""Writes what is made of a campaign that has come to its end."""
+"""Writes what is made of a complete campaign, such as its report."""
 
 
 @dataclass(frozen=True)
 class CampaignCall:
-    """A campaign that has come to its end: the plan as it was checked, where it is, its runs, and how many failed."""
+    """A complete campaign: the plan as it was checked, its folder, its runs, and their counts."""
 
     plan: CampaignPlan
     folder: CampaignFolder
@@ -210,7 +209,7 @@ class CampaignCall:
         return UNIT_FAILED if self.counts.failed or self.counts.lost else 0
 
 
-def workforce_of(workers: int | None, scheduler: str | None) -> PoolConfig:
+def pool_config(workers: int | None, scheduler: str | None) -> PoolConfig:
     """Return workers of this machine, or those of a scheduler.
 
     Raises:
@@ -222,21 +221,21 @@ def workforce_of(workers: int | None, scheduler: str | None) -> PoolConfig:
 
 
 def call_campaign(plan: CampaignPlan, out: Path | None, workers: PoolConfig, finish: Finish) -> CampaignCall:
-    """Carry out a campaign in a folder, or in one of its own in `campaigns/`, and finish it.
+    """Run a campaign in a folder, or in one of its own in `campaigns/`, and finish it.
 
-    Interrupted, the command ends here, with the status that says so.
+    If it is interrupted, the command exits here with the status for that.
 
     Raises:
-        UsageError, RunNotWritten, WorkersLost: with what was wrong, in a line.
+        UsageError, RunNotWritten, WorkersLost: with one line that says what was wrong.
     """
     progress = CampaignProgress(sys.stderr)
     folder = None
     try:
         with CampaignInterruption() as interruption, one_line_errors():
-            called = CampaignFolder(out) if out else None
-            ready = prepared(plan, lambda checked: _check_cheaply(checked, called, workers, interruption))
-            folder = called or default_folder(ready.plan, ready.fmus)
-            folder.check(ready.plan, ready.fmus)  # before it is told what begins
+            named = CampaignFolder(out) if out else None
+            ready = prepared(plan, lambda checked: _check_without_units(checked, named, workers, interruption))
+            folder = named or default_folder(ready.plan, ready.fmus)
+            folder.check(ready.plan, ready.fmus)  # before anything is printed
             table = _run(ready, folder, workers, interruption, progress)
             finish(folder, table)
     except KeyboardInterrupt:
@@ -244,18 +243,18 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: PoolConfig, fin
     counts = progress.counts
     assert counts is not None
     if counts.kept == counts.total:
-        click.echo(f"{folder.path} has all of its runs; none was carried out", err=True)
+        click.echo(f"{folder.path} has all of its runs; nothing was run", err=True)
     return CampaignCall(ready.plan, folder, table, counts)
 
 
-def _check_cheaply(
+def _check_without_units(
     plan: CampaignPlan, folder: CampaignFolder | None, workers: PoolConfig, interruption: CampaignInterruption
 ) -> None:
-    """Check what takes no units, which may have to be built."""
+    """Check what needs no units, which may have to be built."""
     if folder is not None:
         folder.check_free()
     if folder is None or not folder.has_all(plan):
-        with interruption.at_once():  # a server that does not answer holds up asyncio's end
+        with interruption.at_once():  # asyncio cannot end while a server does not answer
             workers.check()
 
 

@@ -1,4 +1,4 @@
-"""What a campaign's end prints: a row for each point, what failed, and where the rest is."""
+"""Prints the summary of a campaign: a row for each point, why runs failed, and where table and report are."""
 
 import math
 from collections import Counter
@@ -12,13 +12,13 @@ from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign import format_progress
-from handover.scenarios.cli.listing import open_console
+from handover.scenarios.cli.console import open_console
 from handover.scenarios.experiment.display_unit import display_unit
 
 _MAX_POINTS = 12
 _MAX_REASONS = 5
-_COLUMN = 24
-"""Characters that a metric's column takes; as many metrics are told as the terminal is wide."""
+_COLUMN_WIDTH = 24
+"""Characters that a metric's column takes; as many metrics are shown as fit the terminal."""
 
 
 def print_campaign(results: CampaignResults, counts: RunCounts, folder: CampaignFolder) -> None:
@@ -37,7 +37,7 @@ def print_campaign(results: CampaignResults, counts: RunCounts, folder: Campaign
 
 def _points(results: CampaignResults, console: Console) -> Table:
     varied = list(dict.fromkeys(name for point in results.points for name in point.values))
-    metrics = results.headline[: max(1, (console.width - 40 - 12 * len(varied)) // _COLUMN)]
+    metrics = results.headline[: max(1, (console.width - 40 - 12 * len(varied)) // _COLUMN_WIDTH)]
     rows = Table(box=None, padding=(0, 2), pad_edge=True)
     for heading in (*varied, "runs", "succeeded", "95 % interval", *(f"median\n{name}" for name in metrics)):
         rows.add_column(Text(heading), justify="right", overflow="fold")
@@ -49,11 +49,11 @@ def _points(results: CampaignResults, console: Console) -> Table:
 
 
 def _successes(point: PointResults) -> tuple[str, str]:
-    """Return the number of successes, and the interval of Clopper and Pearson."""
-    span = point.interval
-    if span is None:
+    """Return the number of successes, and the Clopper-Pearson interval of their rate."""
+    interval = point.interval
+    if interval is None:
         return "", ""
-    return f"{point.successes} of {len(point.done)}", f"{100 * span.low:.0f} % to {100 * span.high:.0f} %"
+    return f"{point.successes} of {len(point.done)}", f"{100 * interval.low:.0f} % to {100 * interval.high:.0f} %"
 
 
 def _median(results: CampaignResults, point: PointResults, metric: str) -> str:

@@ -1,4 +1,4 @@
-"""`handover check`: tells of FMUs what is wrong with them."""
+"""The command `handover check`: what is wrong with FMUs, from any tool, as text or JSON."""
 
 import json
 import sys
@@ -12,18 +12,18 @@ from rich.text import Text
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section
 from handover.cosim.fmu.archive import NO_FILE_FAULT, folder_fault
-from handover.scenarios.cli.listing import open_console
+from handover.scenarios.cli.console import open_console
 from handover.scenarios.execution.errors import UsageError
 
 _FAULTS = 1
 _MAX_FINDINGS = 20  # of one level in one section
 _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAULT: "bold red"}
 
-_HELP = """Tell what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
+_HELP = """Find what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
 
-The archive, its model description, by the standard's schema and rules, and its library for this machine are looked at;
+The archive, its model description (by the standard's schema and rules) and its library for this machine are checked;
 then the unit is loaded and run for ten steps in a process of its own, which may crash. A unit of `handover build` reads
-its environment then, as in other tools: see there.
+its environment variables then, as in other tools: see `handover build --help`.
 
 \b
 Exit status
@@ -33,7 +33,7 @@ Exit status
 """
 
 
-@click.command("check", help=_HELP, short_help="Tell what is wrong with FMUs, whoever made them.")
+@click.command("check", help=_HELP, short_help="Find what is wrong with FMUs, whoever made them.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @click.option(
     "--timeout",
@@ -45,7 +45,7 @@ Exit status
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
-    """Tell what is wrong with files that should be co-simulation FMUs."""
+    """Find what is wrong with files that should be co-simulation FMUs."""
     _check_files_exist(files)
     reports: list[CheckReport] = []
     for file in files:
@@ -74,11 +74,11 @@ def _check_files_exist(files: Sequence[Path]) -> None:
 
 
 def _print_report(report: CheckReport) -> None:
-    shown = open_console()
-    shown.print(Text(_visible(str(report.path)), style="bold"), soft_wrap=True)
+    console = open_console()
+    console.print(Text(_visible(str(report.path)), style="bold"), soft_wrap=True)
     for section in report.sections:
         _print_section(section)
-    shown.print(_verdict(report), soft_wrap=True)
+    console.print(_verdict(report), soft_wrap=True)
 
 
 def _print_section(section: Section) -> None:
@@ -104,18 +104,18 @@ def _print_finding(finding: Finding, *, named: bool) -> None:
 
 
 def _print_indented(mark: str, text: Text, width: int) -> None:
-    """Print a text behind a mark, wrapped beside both in a terminal and in one line where other programs read it."""
-    shown = open_console()
-    if shown.is_terminal:
+    """Print a text after a mark: with a hanging indent in a terminal, in one line where other programs read it."""
+    console = open_console()
+    if console.is_terminal:
         row = Table.grid()
         row.add_row(" " * width + mark, text)
-        shown.print(row)
+        console.print(row)
     else:
-        shown.print(Text(" " * width + mark) + text, soft_wrap=True)
+        console.print(Text(" " * width + mark) + text, soft_wrap=True)
 
 
 def _visible(text: str) -> str:
-    """Return a text without what would steer a terminal: it comes from files that others made."""
+    """Return a text without control characters, which could steer the terminal: it comes from files of others."""
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text.replace("\t", " "))
 
 

@@ -1,4 +1,4 @@
-"""What the end of a published experiment prints: ours beside the published, and the verdicts with their reasons."""
+"""Prints the results of a published experiment: ours beside the published, and verdicts with their reasons."""
 
 from rich.console import Console
 from rich.padding import Padding
@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.cli.listing import open_console
+from handover.scenarios.cli.console import open_console
 from handover.scenarios.published.published_experiment import (
     Claim,
     ComparisonTable,
@@ -20,16 +20,16 @@ _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red",
 
 
 def print_results(experiment: PublishedExperiment, results: PaperResults, folder: CampaignFolder) -> None:
-    """Print tables, claims, and where the rest is."""
+    """Print tables, claims, and where claims, table and report are."""
     console = open_console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold", markup=False)
     for compared in results.tables:
         _print_table(console, compared)
     for beyond, heading in ((False, "Claims"), (True, "Beyond the paper")):
-        entries = [claim for claim in results.claims if claim.beyond is beyond]
-        if entries:
+        claims = [claim for claim in results.claims if claim.beyond is beyond]
+        if claims:
             console.print(f"\n{heading}", style="bold")
-        for claim in entries:
+        for claim in claims:
             _print_claim(console, claim)
     console.print()
     for beyond, heading in ((False, "The paper's claims"), (True, "Beyond the paper")):

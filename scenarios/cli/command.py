@@ -1,4 +1,4 @@
-"""The command `handover`: its commands by name, each loaded when it is called or its help is asked for."""
+"""The command `handover`: its subcommands by name, each loaded when it is called or its help is asked for."""
 
 from importlib import import_module
 
@@ -16,11 +16,11 @@ Look
 Run
   handover run helix_handover            one run; leaves a folder with a report
   handover run x.ssp --stop 5            a system from another tool, for 5 s
-  handover resume runs/long              goes on with a run with checkpoints
+  handover resume runs/long              resumes a run with checkpoints
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
                                          a campaign: many runs, one table
   handover paper ir-table                a paper's experiment: ours beside the published
-  handover report runs/long              its page anew, also of a killed run
+  handover report runs/long              writes its page again, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
@@ -40,17 +40,17 @@ Exit status
 \b
 Environment
   HANDOVER_CACHE  folder of built units [default: the user's cache folder]
-  Those that units read, here as in other tools: see `handover build --help`
+  For variables that units read, here as in other tools, see `handover build --help`
 """
 
 
 class DeferredCommand(click.Command):
-    """A command that stands in the group's help until it is called, and is loaded then.
+    """A placeholder for a command in the group's help; the command is loaded when it is called.
 
     Args:
         name: of the command.
         path: where it is, `module:attribute`.
-        help: the first sentence of its help, as click shortens it for the group's.
+        help: the first sentence of its help, which click shortens for the group's help.
         short_help: its short help, where it has one.
     """
 
@@ -68,7 +68,7 @@ class DeferredCommand(click.Command):
 class DeferringGroup(click.Group):
     """A group that loads the command that is called, and no other.
 
-    Physics, tables and pages take seconds to load; its help would take as long.
+    Physics, tables and pages take seconds to load, which `handover --help` should not take.
     """
 
     def resolve_command(
@@ -86,7 +86,7 @@ COMMANDS = (
         help="Build UNITs (all by default) as FMUs for other tools.",
     ),
     DeferredCommand(
-        "check", "handover.scenarios.cli.check:check", short_help="Tell what is wrong with FMUs, whoever made them."
+        "check", "handover.scenarios.cli.check:check", short_help="Find what is wrong with FMUs, whoever made them."
     ),
     DeferredCommand(
         "export",
@@ -101,13 +101,13 @@ COMMANDS = (
     DeferredCommand(
         "paper",
         "handover.scenarios.cli.paper:paper",
-        help="Carry out a paper's EXPERIMENT, and put what comes out beside what was published.",
+        help="Run a paper's EXPERIMENT, and compare its results with the published ones.",
     ),
     DeferredCommand(
         "report", "handover.scenarios.cli.report:report", short_help="Write the page of a run or of a campaign."
     ),
     DeferredCommand(
-        "resume", "handover.scenarios.cli.resume:resume", short_help="Go on with a run from its last checkpoint."
+        "resume", "handover.scenarios.cli.resume:resume", short_help="Resume a run from its last checkpoint."
     ),
     DeferredCommand(
         "run",

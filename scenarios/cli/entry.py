@@ -1,7 +1,4 @@
-"""Where the command `handover` starts: Ctrl-C counts from its first instant.
-
-The standard streams, of which a process may be started without any, as by a daemon or by `>&-`.
-"""
+"""Entry point of the command `handover`: standard streams, Ctrl-C from the first instant, and the supervised child."""
 
 import os
 import sys
@@ -11,9 +8,9 @@ from handover.scenarios.execution.exit_status import ABORTED
 
 
 def open_standard_streams() -> None:
-    """Let streams that are closed lead nowhere.
+    """Open standard streams that are closed, as by a daemon or by `>&-`, to the null device.
 
-    Otherwise the next files that are opened, such as a record, take their numbers, and what a unit prints goes there.
+    Otherwise the next files that are opened, such as a record, get their numbers, and what a unit prints goes there.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -30,11 +27,11 @@ if TYPE_CHECKING:
     from handover.scenarios.execution.child_process import ChildEnd
 
 _SUPERVISED = ("run", "resume")
-"""Commands that load units, which may end the process that they are in."""
+"""Commands that load units, which may crash the process that they are in."""
 
 
 def main() -> None:
-    """Run the command; loading it takes a second or so, in which it can be aborted like later."""
+    """Run the command; loading it takes a second or so, during which Ctrl-C aborts it as later."""
     open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:
@@ -57,7 +54,7 @@ def _command() -> None:
 
 
 def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:
-    from handover.scenarios.cli.crash_report import report_crash  # what it loads is loaded by no other run
+    from handover.scenarios.cli.run_summary import report_crash  # only a run that crashed loads it
 
     return report_crash(heartbeat, end, wall)
 

@@ -1,4 +1,4 @@
-"""The command `handover export`."""
+"""The command `handover export`: a scenario as an SSP."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,8 +17,8 @@ from handover.scenarios.results.run_folder import check_place
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 
-Its units are FMUs of FMI 2, and of FMI 3 only where there is no other form (pictures). The SSP is of version 1.0, or of
-2.0 if a unit is of FMI 3. Parameters are bound in files of their own (SSV), one for each unit.
+Its units are FMI 2 FMUs, or FMI 3 where FMI 2 cannot express them (pictures). The SSP is of version 1.0, or of 2.0 if a
+unit is of FMI 3. Parameters are bound in files of their own (SSV), one for each unit.
 """
 
 
@@ -42,10 +42,10 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
             raise UsageError(f"--ssp {file}: there is a folder of that name")
         check_place(file.parent)
         fmus = select_fmus(experiment, replacement_fmus(experiment, replaced), exchangeable)
-        chosen = experiment()
-        system = chosen.build(values, seed, lambda unit: fmus[unit])
+        instance = experiment()
+        system = instance.build(values, seed, lambda unit: fmus[unit])
         try:
-            write_ssp(system, file, experiment.name, chosen.stop_time(values))
+            write_ssp(system, file, experiment.name, instance.stop_time(values))
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
     click.echo(file)

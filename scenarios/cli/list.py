@@ -1,4 +1,4 @@
-"""The command `handover list`."""
+"""The command `handover list`: scenarios and units, their parameters and ports."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS, Entry, import_block
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
-from handover.scenarios.cli.listing import open_console, print_rows
+from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.experiment import Experiment
 
@@ -41,7 +41,7 @@ def print_catalog() -> None:
             ("units", [(name, UNITS[name].summary) for name in system.units]),
         ):
             console.print(f"  {heading}", style="italic")
-            print_rows(console, [("", name.ljust(width), told) for name, told in rows])
+            print_rows(console, [("", name.ljust(width), summary) for name, summary in rows])
 
 
 def print_scenario(experiment: type[Experiment[Any]]) -> None:
@@ -78,8 +78,8 @@ def _type_of(v: Variable) -> str:
 
 
 def _start_of(v: Variable) -> str:
-    told = "" if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else _plain(v.start)
-    return told if len(told) <= 40 else told[:37] + "..."
+    text = "" if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else _plain(v.start)
+    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def _plain(value: Any) -> str:

@@ -62,14 +62,14 @@ _OPTIONS = (
         "--extrapolation",
         type=_choice(Extrapolation),
         default=_PLAIN.extrapolation.value,
-        help="What inputs are during a step: held, or on a line through the last two values.",
+        help="Inputs during a step: held, or extrapolated linearly from the last two values.",
     ),
     _step_option(
         "--adaptive",
         type=_Above0(),
         metavar="ERROR",
         help="Let the step follow its error, with rollback: what one step may be wrong by, relative to a signal's"
-        " magnitude, such as 1e-4; errors of steps add up over a run. Looked at are connected real outputs (all where"
+        " magnitude, such as 1e-4; errors of steps add up over a run. Connected real outputs are controlled (all where"
         " none is). `--extrapolation linear` pays here, with longer steps for the same error."
         "  [default: fixed steps]",
     ),
@@ -90,7 +90,7 @@ _OPTIONS = (
         "--smallest-step",
         type=Seconds(),
         metavar="SECONDS",
-        help="With --adaptive: the run fails where a shorter step were needed."
+        help="With --adaptive: the run fails where a shorter step would be needed."
         f"  [default: {float(_CONTROL.smallest):g}]",
     ),
     _step_option(
@@ -100,7 +100,7 @@ _OPTIONS = (
         "--uncontrolled",
         multiple=True,
         metavar="UNIT.PORT",
-        help="With --adaptive: an output whose error is not looked at, such as noise; may be given more than once.",
+        help="With --adaptive: an output whose error is not controlled, such as noise; may be given more than once.",
     ),
     _step_option(
         "--repeat-discarded",
@@ -118,7 +118,7 @@ _CONTROL_FIELDS: Mapping[str, str] = {
 
 
 def master_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options; they fit `MasterOptions` by `coupling_of`."""
+    """Add the options; `coupling_of` converts them to those of `MasterOptions`."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
@@ -128,7 +128,8 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options as those of `MasterOptions`; `given` has their values by name, and no others.
 
     Raises:
-        UsageError: options of the control of the step are given without it. InvalidOptions: they contradict each other.
+        UsageError: options of step size control are given without --adaptive.
+        InvalidOptions: options contradict each other.
     """
     limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] not in (None, ())}
     if given["adaptive"] is None and limits:

@@ -1,14 +1,7 @@
-"""Options under headings in a command's help, of which one list would be too long to read.
+"""Options that several commands share, headings for them in the help, and types of their values.
 
-Options of commands that take a scenario: its parameters, its seed, and other FMUs for its units.
-
-Options of commands that run units: how long a call may take, and how fast simulated time passes.
-
-Options of commands that carry out campaigns: where it is, whether it has a page, and who carries it out.
-
-Numbers of a call that are neither infinite nor none.
-
-Numbers of seconds in a call.
+`scenario_options` are for commands that take a scenario, `limit_options` for those that run units, `campaign_options`
+for those that run campaigns. Options of the master are in `handover.scenarios.cli.master_options`.
 """
 
 import math
@@ -47,24 +40,8 @@ class HeadedCommand(click.Command):
                 formatter.write_dl(rows)
 
 
-_OPTIONS = (
-    click.option(
-        "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
-    ),
-    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers."),
-    click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Let another FMU take a unit's place."),
-)
-
-
-def scenario_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `-p`, `--seed` and `--unit`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
 class FiniteRange(click.FloatRange):
-    """A number of a range; `click.FloatRange` lets infinity and not-a-number through."""
+    """A finite number in a range; `click.FloatRange` lets infinity and not-a-number through."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number."""
@@ -74,70 +51,8 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-CALL_LIMIT = 60.0
-"""Seconds of wall time that a unit may take for one call where nothing else is said."""
-
-_option = partial(click.option, cls=HeadedOption, heading="Wall time")
-_LIMIT = _option(
-    "--call-limit",
-    type=FiniteRange(min=0),
-    default=CALL_LIMIT,
-    show_default=True,
-    metavar="SECONDS",
-    help="Wall time that a unit may take for one call, such as loading it or one step; 0: any. The run fails then.",
-)
-_PACE = _option(
-    "--pace",
-    type=FiniteRange(min=0, min_open=True),
-    metavar="FACTOR",
-    help="Let so many simulated seconds pass in one of the wall clock, 1 being real time; missed deadlines are told."
-    "  [default: as fast as it goes]",
-)
-
-
-def limit_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--call-limit` and `--pace`; they fit `MasterOptions` by `limits`."""
-    return _LIMIT(_PACE(command))
-
-
-def limits(call_limit: float, pace: float | None) -> dict[str, Any]:
-    """Return the options as those of `MasterOptions`."""
-    return {"call_limit": call_limit or None, "pace": pace}
-
-
-_worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
-
-_CAMPAIGN_OPTIONS = (
-    click.option(
-        "--out",
-        type=click.Path(path_type=Path),
-        help="Folder of the campaign; one that is there goes on.  [default: one of its own in campaigns/]",
-    ),
-    click.option("--no-report", is_flag=True, help="Write no report page at the end."),
-    click.help_option("-h", "--help"),
-    _worker_option(
-        "--workers",
-        type=click.IntRange(min=1),
-        metavar="N",
-        help="Runs at the same time, on this machine.  [default: one a core]",
-    ),
-    _worker_option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Dask scheduler whose workers carry out the runs; they see this folder under the same path.",
-    ),
-)
-
-
-def campaign_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--out`, `--no-report`, `--help`, `--workers` and `--scheduler`."""
-    for option in reversed(_CAMPAIGN_OPTIONS):
-        command = option(command)
-    return command
-
-
 _FORM = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
-"""Larger exponents would take long to reckon with."""
+"""Exact fractions of larger exponents would take long to compute."""
 
 
 class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
@@ -154,3 +69,81 @@ class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (g
         if not sys.float_info.min <= seconds <= sys.float_info.max:
             self.fail(f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30", param, ctx)
         return seconds
+
+
+_SCENARIO_OPTIONS = (
+    click.option(
+        "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
+    ),
+    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers."),
+    click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Replace a unit by another FMU."),
+)
+
+
+def scenario_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `-p`, `--seed` and `--unit`."""
+    for option in reversed(_SCENARIO_OPTIONS):
+        command = option(command)
+    return command
+
+
+CALL_LIMIT = 60.0
+"""Seconds of wall time that a unit may take for one call by default."""
+
+_wall_time_option = partial(click.option, cls=HeadedOption, heading="Wall time")
+_LIMIT = _wall_time_option(
+    "--call-limit",
+    type=FiniteRange(min=0),
+    default=CALL_LIMIT,
+    show_default=True,
+    metavar="SECONDS",
+    help="Wall time after which a unit's call, such as loading it or one step, fails the run; 0: no limit.",
+)
+_PACE = _wall_time_option(
+    "--pace",
+    type=FiniteRange(min=0, min_open=True),
+    metavar="FACTOR",
+    help="Simulated seconds in one second of the wall clock, 1 being real time; missed deadlines are reported."
+    "  [default: as fast as it goes]",
+)
+
+
+def limit_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--call-limit` and `--pace`; `limits` converts them to those of `MasterOptions`."""
+    return _LIMIT(_PACE(command))
+
+
+def limits(call_limit: float, pace: float | None) -> dict[str, Any]:
+    """Return the options as those of `MasterOptions`."""
+    return {"call_limit": call_limit or None, "pace": pace}
+
+
+_worker_option = partial(click.option, cls=HeadedOption, heading="Workers")
+
+_CAMPAIGN_OPTIONS = (
+    click.option(
+        "--out",
+        type=click.Path(path_type=Path),
+        help="Folder of the campaign; one that is there is resumed.  [default: one of its own in campaigns/]",
+    ),
+    click.option("--no-report", is_flag=True, help="Write no report page at the end."),
+    click.help_option("-h", "--help"),
+    _worker_option(
+        "--workers",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Runs at the same time, on this machine.  [default: one a core]",
+    ),
+    _worker_option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers do the runs; they see this folder under the same path.",
+    ),
+)
+
+
+def campaign_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--out`, `--no-report`, `--help`, `--workers` and `--scheduler`."""
+    for option in reversed(_CAMPAIGN_OPTIONS):
+        command = option(command)
+    return command

@@ -1,4 +1,4 @@
-"""The command `handover paper`."""
+"""The command `handover paper`: runs a paper's experiment and compares its results with the published ones."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.exceptions import nearest
-from handover.scenarios.cli.campaign import call_campaign, workforce_of
-from handover.scenarios.cli.listing import open_console
+from handover.scenarios.cli.campaign import call_campaign, pool_config
+from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.options import HeadedCommand, campaign_options
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.results.run_folder import InvalidRunFolder
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from handover.scenarios.campaign.table import CampaignTable
     from handover.scenarios.published.published_experiment import PaperResults, PublishedExperiment
 
-_HELP = """Carry out a paper's EXPERIMENT, and put what comes out beside what was published.
+_HELP = """Run a paper's EXPERIMENT, and compare its results with the published ones.
 
 Without EXPERIMENT, list them.
 
-Each claim of the paper gets a verdict, reproduced, not reproduced or not comparable, with the rule that it was given
-by. Rules were laid down before the runs. Intervals are at 95 %: Clopper and Pearson's for rates, bootstrapped for times
-and distances.
+Each claim of the paper gets a verdict, reproduced, not reproduced or not comparable, with the rule behind it. Rules
+were laid down before the runs. Intervals are at 95 %: Clopper and Pearson's for rates, bootstrapped for times and
+distances.
 
 The folder is that of a campaign, as of `handover sweep`, with claims.json, and figures for papers in figures/. However
 it was ended, run the same command again to resume; nothing that is done is repeated.
@@ -59,7 +59,7 @@ def paper(
     workers: int | None,
     scheduler: str | None,
 ) -> None:
-    """Carry out a paper's EXPERIMENT."""
+    """Run a paper's EXPERIMENT."""
     from handover.scenarios.published.catalog import EXPERIMENTS  # its statistics take long to load
 
     if experiment is None:
@@ -67,20 +67,20 @@ def paper(
         return
     if experiment not in EXPERIMENTS:
         raise UsageError(f"no experiment {experiment!r}: {nearest(experiment, EXPERIMENTS)}")
-    carried_out = EXPERIMENTS[experiment]()
-    plan = carried_out.plan(quick)
+    published = EXPERIMENTS[experiment]()
+    plan = published.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
-    finish = _Finish(carried_out, report=not no_report)
-    call = call_campaign(replace(plan, experiment=experiment), out, workforce_of(workers, scheduler), finish)
+    finish = _Finish(published, report=not no_report)
+    call = call_campaign(replace(plan, experiment=experiment), out, pool_config(workers, scheduler), finish)
 
     from handover.scenarios.cli.claims_summary import print_results
 
-    print_results(carried_out, finish.results, call.folder)
+    print_results(published, finish.results, call.folder)
     sys.exit(call.status)
 
 
 class _Finish:
-    """Writes claims, figures and, if it is wanted, the page of a campaign, and keeps its `results`."""
+    """Writes claims, figures and, unless --no-report, the page of a campaign, and keeps its `results`."""
 
     results: PaperResults
 

@@ -1,4 +1,4 @@
-"""The command `handover report`."""
+"""The command `handover report`: writes the page of a run or of a campaign again."""
 
 from pathlib import Path
 
@@ -8,17 +8,16 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
-_HELP = """Write the page of what was run in DIR anew: one HTML file that opens offline.
+_HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
 
-DIR is the folder of a run or of a campaign. The page is made of what is in it, also of a run that was interrupted,
-killed, or that another version left: a run's record, or a campaign's table, is completed first, and the page holds what
-there is.
+The page is made of what is in DIR, also of a run that was interrupted or killed, or that another version wrote: a run's
+record, or a campaign's table, is completed first, and the page shows what there is.
 """
 
 
 @click.command("report", help=_HELP, short_help="Write the page of a run or of a campaign.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--figures", is_flag=True, help="Draw the figures anew too, as PNG and SVG, into DIR/figures.")
+@click.option("--figures", is_flag=True, help="Draw the figures again, too, as PNG and SVG, into DIR/figures.")
 @click.option(
     "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
 )
@@ -51,15 +50,15 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> N
     (write_campaign_report if figures else write_campaign_page)(campaign, page)
 
 
-def _write_of_run(left: RunFolder, page: Path, figures: bool) -> None:
+def _write_of_run(run: RunFolder, page: Path, figures: bool) -> None:
     from handover.scenarios.execution.resume import complete_signals
     from handover.scenarios.reporting.run_figures import draw_run
     from handover.scenarios.reporting.run_page import write_run_page
     from handover.scenarios.results.run_facts import RunFacts
 
-    with left.held():
-        RunFacts.read(left)  # before anything is completed: it may be no run's folder at all
-        complete_signals(left)
+    with run.held():
+        RunFacts.read(run)  # before anything is completed: it may be no run's folder at all
+        complete_signals(run)
         if figures:
-            draw_run(left)
-        write_run_page(left, page)
+            draw_run(run)
+        write_run_page(run, page)

@@ -1,4 +1,4 @@
-"""The command `handover run`."""
+"""The command `handover run`: one run of a scenario or of an SSP."""
 
 import contextlib
 import sys
@@ -14,10 +14,10 @@ import click
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
-from handover.scenarios.cli.listing import exit_with
+from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
-from handover.scenarios.cli.progress import progress_bar
+from handover.scenarios.cli.run_summary import exit_with
 from handover.scenarios.cli.ssp import reject_for_ssp, ssp_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
@@ -35,8 +35,8 @@ FILE.ssp is a system from another tool (SSP 1.0 or 2.0), or from `handover expor
 
 Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
 
-The run is a process of its own: a unit that crashes it is named, and the record completed. On Windows it is not, and
-such a unit ends the command.
+The run is a process of its own: if a unit crashes it, the unit is named and the record completed. On Windows it
+is not, and such a unit ends the command.
 """
 
 _record_option = partial(click.option, cls=HeadedOption, heading="Record")
@@ -56,7 +56,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     "formats",
     multiple=True,
     type=click.Choice(list(RECORD_FORMATS)),
-    help="Form of the record; may be given more than once. Parquet is always written.  [default: parquet]",
+    help="Format of the record; may be given more than once. Parquet is always written.  [default: parquet]",
 )
 @_record_option(
     "--checkpoint",
@@ -110,13 +110,13 @@ def run(
             presented=not no_report,
         )
         with progress_bar(sys.stderr) as progress:
-            ended = run_task(task, progress, interruption)
-    exit_with(ended, task)
+            result = run_task(task, progress, interruption)
+    exit_with(result, task)
 
 
 def _of_file(
     file: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
 ) -> tuple[Experiment[Any], NoParameters, Mapping[str, Any]]:
-    """Return an SSP as an experiment, its parameters, and what its run's folder has to say of it."""
+    """Return an SSP as an experiment, its parameters, and what the run's folder keeps of the file."""
     experiment, values = open_experiment(file, stop, step, opened), NoParameters()
     return experiment, values, source_of(file, experiment.stop_time(values), step)

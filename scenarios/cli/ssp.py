@@ -1,4 +1,4 @@
-"""What a call of `handover run` says of an SSP: until when, and at which step."""
+"""Options of `handover run` for an SSP: its stop time and its communication step."""
 
 from collections.abc import Callable
 from functools import partial
@@ -23,7 +23,7 @@ def ssp_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def reject_for_ssp(**given: Any) -> None:
-    """Refuse options that are for scenarios.
+    """Reject options that are for scenarios.
 
     Raises:
         UsageError: one of them is given.

@@ -1,4 +1,4 @@
-"""The command `handover sweep`."""
+"""The command `handover sweep`: a campaign over all combinations of parameters' values."""
 
 import sys
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.cli.campaign import call_campaign, workforce_of
+from handover.scenarios.cli.campaign import call_campaign, pool_config
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
@@ -37,8 +37,8 @@ success, metrics. The table is written as results come.
 
 However a campaign was ended, run the same command again to resume; nothing that is done is repeated. A run in which a
 unit fails is a row with its reason; a run that was lost, as with its machine, is tried again by the next call. A larger
---repeat adds runs. Without --out, the call goes on with its newest campaign in campaigns/ that is not complete, or
-begins one.
+--repeat adds runs. Without --out, the command resumes its newest campaign in campaigns/ if that is not complete, else
+it begins a new one.
 
 A run's seed follows from --seed, its point and its repetition.
 
@@ -82,7 +82,7 @@ def sweep(
     **coupling: Any,
 ) -> None:
     """Run a SCENARIO many times."""
-    pool = workforce_of(workers, scheduler)
+    pool = pool_config(workers, scheduler)
     if is_ssp(scenario):
         raise UsageError(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
     experiment = find_scenario(scenario)

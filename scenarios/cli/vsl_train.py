@@ -1,4 +1,4 @@
-"""The command `handover vsl-train`."""
+"""The command `handover vsl-train`: learned kinematics of the arm with variable-stiffness links."""
 
 import os
 import sys
@@ -15,7 +15,7 @@ from handover.cosim.exceptions import CosimError, UnitFailure
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
-from handover.scenarios.cli.progress import progress_bar
+from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.vsl.training import MIN_POINTS, Errors, NothingToLearn, VslTraining, file_text
@@ -26,7 +26,7 @@ _ELBOW = click.Choice([e.name.lower() for e in Elbow], case_sensitive=False)
 
 
 class _ArmFailed(click.ClickException):
-    """The arm failed while it was measured, told in one line."""
+    """The arm failed while it was measured; reported in one line."""
 
     exit_code = 3
 
@@ -72,8 +72,8 @@ def _table(errors: Errors) -> Generator[str, None, None]:
         ("forward: tip from the encoders' angles", errors.forward_model_based, errors.forward_hybrid),
         ("inverse: command for a measured tip", errors.inverse_model_based, errors.inverse_hybrid),
     )
-    for value, rigid, hybrid in rows:
-        yield f"{value:44}{rigid * 1000:12.2f}{hybrid * 1000:9.2f}{rigid / hybrid:8.1f}"
+    for heading, rigid, hybrid in rows:
+        yield f"{heading:44}{rigid * 1000:12.2f}{hybrid * 1000:9.2f}{rigid / hybrid:8.1f}"
 
 
 def _built() -> Path:

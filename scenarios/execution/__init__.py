@@ -1,1 +1,1 @@
-"""Carries out a run: task, runner, supervised process, interruption, resuming."""
+"""Runs an experiment once: runner, supervised child process, crashes, interruption, resuming, exit statuses."""

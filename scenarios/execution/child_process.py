@@ -1,4 +1,4 @@
-"""A process forked from this one to carry out what may end it.
+"""A forked child process for a command that may crash or hang.
 
 Only where processes can be forked, thus not on Windows. What is imported here is loaded before every run.
 """
@@ -15,17 +15,20 @@ from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
 
 _POLL_INTERVAL = 0.25  # s
 _GRACE = 5.0
-"""How much later than the child itself the parent gives up a call, s; only a child that cannot act is late."""
+"""How much later than the child itself the parent gives up a call, s.
+
+The child watches its calls too and reports what hung; the parent kills it only where it cannot act any more.
+"""
 
 
 class ChildEnd(NamedTuple):
     """How a child ended.
 
     Attributes:
-        signal: the signal that ended it, None where it ended itself.
-        status: its exit status then, else 0.
+        signal: the signal that killed it, None where it exited.
+        status: its exit status where it exited, else 0.
         cpu: seconds of CPU that it took.
-        hung: whether it was ended because a unit's call did not return.
+        hung: whether it was killed because a unit's call did not return.
     """
 
     signal: int | None
@@ -35,7 +38,9 @@ class ChildEnd(NamedTuple):
 
 
 class ForkedChild:
-    """Carries out a command in the main thread of a process group of its own, which dies with this process.
+    """Runs a command in the main thread of a process group of its own, which is killed when this process ends.
+
+    Two pipes, over which nothing is sent, tell each process of the other's end: their read ends become ready.
 
     Args:
         command: what the child does; it has to end the process.
@@ -44,7 +49,7 @@ class ForkedChild:
 
     def __init__(self, command: Callable[[], NoReturn], heartbeat: Heartbeat) -> None:
         self._heartbeat = heartbeat
-        self._alive, lives = os.pipe()
+        self._alive, child_lives = os.pipe()
         parent_alive, self._parent_lives = os.pipe()
         self.pid = os.fork()
         if self.pid == 0:
@@ -53,15 +58,15 @@ class ForkedChild:
             os.setpgid(0, 0)
             threading.Thread(target=_die_with_parent, args=(parent_alive,), daemon=True).start()
             command()
-        os.close(lives)
+        os.close(child_lives)
         os.close(parent_alive)
         with contextlib.suppress(OSError):  # it has done so itself, or is gone
             os.setpgid(self.pid, self.pid)
 
     def wait(self, watched: int | None = None) -> ChildEnd | None:
-        """Return how it ended, or None if it goes on when a watched file can be read.
+        """Return how it ended, or None if it still runs when the file descriptor `watched` becomes readable.
 
-        If a unit's call does not return, the child is killed.
+        If a unit's call does not return in time, the child is killed.
         """
         stall_timer = StallTimer(self._heartbeat, 2 * _POLL_INTERVAL)
         files = [self._alive] if watched is None else [self._alive, watched]
@@ -72,9 +77,9 @@ class ForkedChild:
             pid, status, spent = os.wait4(self.pid, 0 if gone else os.WNOHANG)
             if pid:
                 self._close()
-                ended_itself = os.WIFEXITED(status)
-                number = None if ended_itself else os.WTERMSIG(status)
-                code = os.WEXITSTATUS(status) if ended_itself else 0
+                exited = os.WIFEXITED(status)
+                number = None if exited else os.WTERMSIG(status)
+                code = os.WEXITSTATUS(status) if exited else 0
                 return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, hung)
             if ready:
                 return None
@@ -83,7 +88,7 @@ class ForkedChild:
                 os.kill(self.pid, signal.SIGKILL)
 
     def kill(self) -> None:
-        """End it and what it started, and wait until it is gone."""
+        """Kill it and what it started, and wait until it is gone."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         os.waitpid(self.pid, 0)

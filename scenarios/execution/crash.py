@@ -1,4 +1,4 @@
-"""How the process of a run died, and what it left, which is completed."""
+"""How the process of a run crashed, was killed or hung; completes the folder that it left."""
 
 import shutil
 import signal
@@ -17,17 +17,17 @@ from handover.scenarios.results.summary import ElapsedTime, RunResult, crashed_s
 
 
 class Crash:
-    """The death of a run's process. What the run had for its time alone is removed.
+    """The crash of a run's process. Scratch folders of the run are removed.
 
     Args:
-        heartbeat: what the run told while it lived.
+        heartbeat: what the run reported while it ran.
         end: how its process ended.
-        wall: seconds that it lived.
+        wall: seconds that it ran.
 
     Attributes:
-        failure: how the unit failed in whose call the process ended; None where it was not a unit.
-        told: what happened, in a line.
-        facts: what the run told for this case.
+        failure: how the unit failed in whose call the process ended; None where it was not in a unit's call.
+        message: what happened, in a line.
+        facts: what the run left in its heartbeat for this case: its folder, configuration and units.
         folder: of the run, None if there was none yet.
     """
 
@@ -56,7 +56,8 @@ class Crash:
         reason = self.message if failure is None else failure_reason(failure)
         with disk_errors_reported(folder.path):
             known = self.facts["configuration"], self.facts["units"]
-            summary = crashed_summary(*known, reason, data, _simulated(folder), ElapsedTime(self._wall, self._end.cpu))
+            simulated = _complete_record(folder)
+            summary = crashed_summary(*known, reason, data, simulated, ElapsedTime(self._wall, self._end.cpu))
             folder.write_summary(summary)
             folder.add_to_run(failure=data)
         return RunResult(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
@@ -70,11 +71,11 @@ def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFail
         return UnitHung(*call, heartbeat.limit, log)
     if end.signal == signal.SIGKILL:
         return None
-    how = f"it ended the process with status {end.status}" if end.signal is None else _meaning(end.signal)
+    how = f"it ended the process with status {end.status}" if end.signal is None else _signal_name(end.signal)
     return UnitCrashed(*call, how, log)
 
 
-def _meaning(number: int) -> str:
+def _signal_name(number: int) -> str:
     return (signal.strsignal(number) or f"signal {number}").lower()
 
 
@@ -82,22 +83,22 @@ def _crash_message(call: Call | None, t: float, end: ChildEnd) -> str:
     within = f", in {call.call} of {call.unit}" if call is not None else ", outside of its units"
     if end.signal == signal.SIGKILL:
         return f"the run was killed at t = {t:.6g} s{within}: by someone, or by the system for want of memory"
-    how = f"ended with status {end.status}" if end.signal is None else _meaning(end.signal)
+    how = f"ended with status {end.status}" if end.signal is None else _signal_name(end.signal)
     return f"the run crashed at t = {t:.6g} s{within}: {how}"
 
 
 def _data(call: Call | None, t: float, end: ChildEnd) -> dict[str, Any]:
     unit, name = (None, None) if call is None else (call.unit, call.call)
     kind = "killed" if end.signal == signal.SIGKILL else "crash"
-    status = f"status {end.status}" if end.signal is None else _meaning(end.signal)
+    status = f"status {end.status}" if end.signal is None else _signal_name(end.signal)
     return {"kind": kind, "instance": unit, "call": name, "time": t, "status": status, "log": []}
 
 
-def _simulated(folder: RunFolder) -> float:
+def _complete_record(folder: RunFolder) -> float:
     """Complete a record and return the time at which it ends, s."""
     try:
         complete_record(folder.signals)
-    except FileNotFoundError:  # it died before it recorded
+    except FileNotFoundError:  # it crashed before it recorded
         return 0.0
     time = Record(folder.signals).time
     return float(time[-1]) if len(time) else 0.0

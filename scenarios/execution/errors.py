@@ -1,7 +1,4 @@
-"""Calls of a command that cannot be carried out.
-
-Workers that cannot carry out a campaign.
-"""
+"""Errors that end a command: shown in one line, without a traceback, each with its exit status."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -13,21 +10,24 @@ from handover.scenarios.execution.exit_status import UNIT_FAILED, USAGE_ERROR
 
 
 class PoolError(ValueError):
-    """A cluster that cannot be reached, is none, has no workers, or has workers that would give other numbers."""
+    """A Dask cluster that cannot be reached, has no workers, or has workers that would compute other numbers.
+
+    Also an address where something else than a Dask scheduler answers.
+    """
 
 
 class ClusterLost(RuntimeError):
-    """The cluster has gone while runs were under way. What has ended is kept."""
+    """The cluster was lost while runs were under way. Runs that have ended are kept."""
 
 
 class UsageError(click.ClickException):
-    """A call that cannot be carried out, told in one line."""
+    """Invalid arguments or input files, reported in one line."""
 
     exit_code = USAGE_ERROR
 
 
 class UnitLost(click.ClickException):
-    """A unit that failed before anything ran, in another way than by refusing what it was given."""
+    """A unit that failed before anything ran, other than by rejecting its parameters."""
 
     exit_code = UNIT_FAILED
 
@@ -39,19 +39,18 @@ class RunNotWritten(click.ClickException):
 
 
 class WorkersLost(click.ClickException):
-    """A campaign whose workers have gone; what has ended is kept; run the same command again to resume."""
+    """A campaign whose workers were lost; runs that have ended are kept; run the same command again to resume."""
 
     exit_code = UNIT_FAILED
 
 
 @contextmanager
 def one_line_errors() -> Generator[None, None, None]:
-    """Tell what a user's input, or the lack of a compiler, leads to as UsageError, without a traceback.
+    """Report what a user's input, or a missing compiler, leads to as UsageError, without a traceback.
 
-    A unit that does not answer at all is told as UnitLost, a full disk as RunNotWritten,
-    a cluster that has gone as WorkersLost.
+    A unit's failure is reported as UnitLost, a full disk as RunNotWritten, a lost cluster as WorkersLost.
     """
-    from handover.fmus.binaries import NotCompiled  # what builds and records is loaded by commands that do it
+    from handover.fmus.binaries import NotCompiled  # loaded here: only commands that build units need it
     from handover.fmus.compile import CompilationError, UnknownPlatform
     from handover.scenarios.experiment.parameters import InvalidParameter
     from handover.scenarios.results.run_folder import InvalidRunFolder

@@ -1,9 +1,9 @@
-"""With which status the command `handover` ends: see its help."""
+"""Exit statuses of the command `handover`, which its help explains."""
 
 TASK_FAILED, USAGE_ERROR, UNIT_FAILED = 1, 2, 3
 
 INTERRUPTED = 1
-"""A campaign was ended by Ctrl-C: run the same command again to resume."""
+"""A campaign was interrupted by Ctrl-C: run the same command again to resume."""
 
 ABORTED = 130
-"""What Ctrl-C aborted, as shells have it."""
+"""Aborted by Ctrl-C: 128 + SIGINT, as shells have it."""

@@ -1,4 +1,4 @@
-"""Ctrl-C: before a run it aborts at once; during a run it first asks the run to end, then aborts it."""
+"""Ctrl-C: before a run it aborts at once; during a run the first ends the run after its step, the second aborts it."""
 
 import functools
 import os
@@ -16,21 +16,21 @@ _ENDING = [n for n in (signal.SIGTERM, getattr(signal, "SIGHUP", None)) if n is 
 """Signals that end a run after its step, as of a batch system or of a terminal that is closed."""
 
 _GRACE = 2.0
-"""How long Python gets to act on an interrupt before the process is ended, s; a unit's native code may never return."""
+"""How long Python gets to handle an interrupt before the process is ended, s; a unit's native code may never return."""
 
 
 class Interruption:
-    """Takes SIGINT, SIGTERM and SIGHUP over. Use it as a context manager in the main thread.
+    """Handles SIGINT, SIGTERM and SIGHUP. Use it as a context manager in the main thread.
 
-    If aborted it exits with 130. Of the other two, one that is ignored, as under nohup, stays so.
+    If aborted it exits with 130. SIGTERM or SIGHUP, where it is ignored, as under nohup, stays so.
 
     Until `begin` the first signal raises KeyboardInterrupt. After it the first only sets `asked`, so that the step
     under way is finished and the record stays whole; the second puts the former handler back and raises
     KeyboardInterrupt.
 
-    Python handles signals between its own instructions. A thread that hears of them at once therefore ends the process
-    if an abort is not handled in time, as when a unit's native code hangs. What was recorded stays beside
-    the record, which `complete_record` makes of it, as when the run is resumed.
+    Python handles signals between its own instructions. A thread that reads them from a wakeup socket therefore ends
+    the process if an abort is not handled in time, as when a unit's native code hangs. The stream of what was recorded
+    stays; `complete_record` makes the record of it, as when the run is resumed.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class Interruption:
         self._undo: list[Callable[[], Any]] = []
 
     def begin(self) -> None:
-        """Tell that there is something to keep from now on.
+        """Let the first signal end the run after its step instead of aborting: from here on there is something to keep.
 
         Raises:
             KeyboardInterrupt: as by `check`.
@@ -89,7 +89,7 @@ class Interruption:
             raise SystemExit(ABORTED) from None
 
     def _take(self, _number: int, _frame: FrameType | None) -> None:
-        if self._running and not self.asked and self._heard < 2:  # Python takes two that come at once for one
+        if self._running and not self.asked and self._heard < 2:  # Python reports two signals that come together as one
             self.asked = True
             return
         self._aborted = True

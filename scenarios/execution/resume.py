@@ -1,4 +1,4 @@
-"""A run that a process has left: whether it can go on, and how."""
+"""An interrupted run: completes its record, checks whether it can be resumed, and gives the task to resume."""
 
 import contextlib
 from collections.abc import Mapping
@@ -27,10 +27,11 @@ from handover.scenarios.results.task import Task
 
 
 def complete_signals(folder: RunFolder) -> int:
-    """Complete the record of a run that a process has left, as far as it goes; return its rows, 0 if there is none.
+    """Complete the record of an interrupted run as far as it goes; return its rows, 0 if there is none.
 
     Raises:
-        InvalidRunFolder: the run still goes on, or the record cannot be completed. RecordNotWritten: the disk is full.
+        InvalidRunFolder: the run is still under way, or the record cannot be completed.
+        RecordNotWritten: the disk is full.
     """
     try:
         return complete_record(folder.signals)
@@ -47,18 +48,18 @@ def complete_signals(folder: RunFolder) -> int:
 
 
 class InterruptedRun:
-    """A run's folder, whose record is completed as far as it goes; nothing else is changed.
+    """The folder of an interrupted run. Its record is completed as far as it goes; nothing else is changed.
 
     Raises:
-        InvalidRunFolder: it is not the folder of a run, or of one that goes on, or has ended, or is of other versions
-            than are installed. InvalidCheckpoint: it has no checkpoint that can be used.
+        InvalidRunFolder: it is not the folder of a run, or the run is under way, complete, or of other versions than
+            are installed. InvalidCheckpoint: it has no checkpoint that can be used.
     """
 
     def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
         self._description = folder.read_run()
         if folder.read_summary().get("complete"):
-            raise InvalidRunFolder(folder.path, "the run is complete; there is nothing to go on with")
+            raise InvalidRunFolder(folder.path, "the run is complete; there is nothing to resume")
         rows = complete_signals(folder)
         self._check_versions(self._object("versions"))
         self.resumption: Resumption = unpack(folder.checkpoint)
@@ -72,20 +73,20 @@ class InterruptedRun:
         Raises:
             InvalidRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
         """
-        value = self._description
+        description = self._description
         try:
             experiment = self._experiment(opened)
             fmus = {name: self._fmu(name, unit) for name, unit in experiment.units.items()}
-            every = value["checkpoint"]
+            every = description["checkpoint"]
             task = Task(
                 experiment=experiment,
                 parameters=self.resumption.parameters,
-                seed=int(value["seed"] or 0),
+                seed=int(description["seed"] or 0),
                 fmus=fmus,
                 folder=self.folder,
-                formats=tuple(value["formats"]),
+                formats=tuple(description["formats"]),
                 every=None if every is None else Fraction(every),
-                source=value["source"],
+                source=description["source"],
                 options=self.resumption.options,
             )
         except InvalidRunFolder:
@@ -96,10 +97,10 @@ class InterruptedRun:
         return task
 
     def _object(self, name: str) -> Mapping[str, Any]:
-        found = self._description.get(name, {})
-        if not isinstance(found, dict):
+        content = self._description.get(name, {})
+        if not isinstance(content, dict):
             raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
-        return cast(Mapping[str, Any], found)
+        return cast(Mapping[str, Any], content)
 
     def _check_versions(self, before: Mapping[str, str]) -> None:
         if other := version_differences(versions(), before):
@@ -119,7 +120,7 @@ class InterruptedRun:
         return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
 
     def _fmu(self, name: str, unit: str) -> Path:
-        """Return a unit's file, or the same unit built anew where the folder of built units was cleared."""
+        """Return a unit's file, or the same unit built again where the folder of built units was cleared."""
         path = Path(self._description["files"][name])
         return path if path.is_file() else cached(unit, 3)
 

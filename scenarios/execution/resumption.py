@@ -1,4 +1,4 @@
-"""What a run keeps of itself in its checkpoints, and where another process goes on from there."""
+"""What a run keeps in its checkpoints besides the units' states, so that another process can resume it."""
 
 import pickle
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from handover.scenarios.results.summary import ElapsedTime
 
 @dataclass(frozen=True, kw_only=True)
 class Resumption:
-    """Where a run goes on: its checkpoint, and what `pack` put into it."""
+    """What a run is resumed from: its checkpoint, and what `pack` put into it."""
 
     checkpoint: Checkpoint
     evaluator: Evaluator

@@ -1,4 +1,4 @@
-"""Carries out one run of a scenario: everything is checked, then the folder is made, then it runs and is reported."""
+"""Runs an experiment once: all is checked, then the folder is made, then it runs, then its results are written."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,13 +27,13 @@ from handover.scenarios.results.summary import (
 from handover.scenarios.results.task import Task
 
 Progress = Callable[[float, float], None]
-"""Told the simulated time and the time at which the run ends at the latest, in seconds."""
+"""Is called with the simulated time and the time at which the run ends at the latest, in seconds."""
 
 
 def run_task(
     task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None
 ) -> RunResult:
-    """Run a scenario to its end, its failure or its interruption and write its folder; or go on with a run.
+    """Run a scenario to its end, its failure or its interruption and write its folder; or resume a run.
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder: before anything
@@ -69,13 +69,15 @@ def run_task(
 
 @dataclass(frozen=True)
 class _Surroundings:
+    """What surrounds a run in the command: where progress goes, what interrupts it, and its clock."""
+
     progress: Progress
     interruption: Interruption
     clock: Callable[[], ElapsedTime]
 
 
 def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> None:
-    """Make the run's folder, and tell what has to be known of the run if this process dies."""
+    """Make the run's folder, and leave in the heartbeat what has to be known of the run if this process crashes."""
     if resumption is None:
         task.folder.make()
     else:
@@ -95,14 +97,14 @@ def _run(
     with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
         checkpoints = _checkpoints(task, master, recorder, evaluator, around.clock)
 
-        def tell(t: float, _signals: Signals) -> None:
+        def report_progress(t: float, _signals: Signals) -> None:
             around.progress(t, float(stop))
 
         observers: list[Observer] = [recorder, evaluator, *checkpoints]
         if resumption is not None:
             observers = [ObserveAfter(resumption.checkpoint.time, observe) for observe in observers]
         try:
-            master.run(stop, [*observers, tell], until=lambda: evaluator.over or interruption.asked)
+            master.run(stop, [*observers, report_progress], until=lambda: evaluator.over or interruption.asked)
             if interruption.asked and not evaluator.over:
                 for checkpointer in checkpoints:
                     master.call_units(checkpointer.write)
@@ -119,16 +121,16 @@ def _checkpoints(
     if task.every is None:
         return []
 
-    def keep() -> bytes:
+    def packed() -> bytes:
         return pack(evaluator, task.parameters, task.options, clock())
 
-    return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, keep)]
+    return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, packed)]
 
 
 def _conclude(
     task: Task, master: Master, evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, spent: ElapsedTime
 ) -> RunResult:
-    """Write what is known of a run at its end, and its report."""
+    """Write the summary of a run at its end, its pictures and its report."""
     outcome = _outcome(evaluator, failure, interrupted)
     complete = failure is None and (evaluator.over or not interrupted)
     summary = finished_summary(task, outcome, master, spent, failure, complete)

@@ -1,4 +1,4 @@
-"""What a call names: a scenario, and the FMUs that take the place of its units."""
+"""Finds what a command names: a scenario, and the FMUs that take the place of its units."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ def find_scenario(name: str) -> type[Experiment[Any]]:
     """Return the scenario of a name.
 
     Raises:
-        UsageError: there is none; with the nearest names.
+        UsageError: there is none; the nearest names are given.
     """
     if name not in SCENARIOS:
         if name in UNITS:
@@ -30,23 +30,23 @@ def replacement_fmus(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     Raises:
         UsageError: a text is of another form, or names no unit of the scenario.
     """
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for text in given:
         name, equals, file = text.partition("=")
         if not equals or not file:
             raise UsageError(f"--unit {text!r} is not of the form NAME=FILE")
         if name not in experiment.units:
             raise UsageError(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
-        if name in found:
+        if name in files:
             raise UsageError(f"--unit: {name} is given twice")
-        found[name] = Path(file)
-    return found
+        files[name] = Path(file)
+    return files
 
 
 def select_fmus(
     experiment: type[Experiment[Any]], others: Mapping[str, Path], built: Callable[[str], Path]
 ) -> dict[str, Path]:
-    """Return the FMU of each unit of a scenario: one of the others, or what `built` makes of the catalog's unit.
+    """Return the FMU of each unit of a scenario: one of the others, or the catalog's unit, which `built` builds.
 
     Raises:
         UsageError: the folder of built units cannot be used.

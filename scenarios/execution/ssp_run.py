@@ -1,4 +1,4 @@
-"""An SSP as an experiment: it runs until its stop time, and what it left is drawn."""
+"""An SSP as an experiment: it runs until its stop time, and its outputs are drawn."""
 
 import contextlib
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class NoParameters:
 
 
 class UntilStop(Evaluator):
-    """Lets a run go on to its stop time; reaching that is its success."""
+    """Lets a run continue to its stop time; it succeeds if it reaches that."""
 
     def __init__(self, stop: Fraction) -> None:
         self._stop, self._t = float(stop), 0.0
@@ -35,7 +35,7 @@ class UntilStop(Evaluator):
 
     @property
     def over(self) -> bool:
-        """Whether it has ended: never before its stop time."""
+        """False: a run does not end before its stop time."""
         return False
 
     def outcome(self) -> Outcome:
@@ -45,7 +45,7 @@ class UntilStop(Evaluator):
 
 
 def is_ssp(name: str) -> bool:
-    """Tell an SSP's file from a scenario's name."""
+    """Return whether a name is an SSP's file and not a scenario."""
     return Path(name).suffix.lower() == ".ssp"
 
 
@@ -88,7 +88,7 @@ def open_experiment(
     """Open an SSP as an experiment; `opened` closes it.
 
     Raises:
-        InvalidSsp: see `SspFile`. UsageError: neither the file nor the call says when it ends.
+        InvalidSsp: see `SspFile`. UsageError: neither the file nor the command gives a stop time.
     """
     ssp = opened.enter_context(SspFile(path, step))
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))
@@ -99,6 +99,6 @@ def open_experiment(
 
 
 def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
-    """Return what a run's folder says of an SSP, so that the run can go on: the file, and what was chosen of it."""
-    facts = {"stop": str(stop), "step": None if step is None else str(step)}
-    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **facts}
+    """Return what a run's folder keeps of an SSP so that the run can be resumed: the file, stop time and step."""
+    times = {"stop": str(stop), "step": None if step is None else str(step)}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **times}

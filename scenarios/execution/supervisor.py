@@ -1,4 +1,4 @@
-"""Runs a command in a child process, so that a unit which ends its process does not end what tells of it.
+"""Runs a command in a child process, so that a unit which crashes its process does not crash what reports it.
 
 Only where processes can be forked, thus not on Windows. What is imported here is loaded before every run.
 """
@@ -15,19 +15,19 @@ from typing import Any, NoReturn
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
 
-ORDERS = (
+TERMINATION_SIGNALS = (
     () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
 )
-"""Signals that ask a process to end: no crash."""
+"""Signals that ask a process to end: not a crash."""
 
 heartbeat = Heartbeat()
-"""Of the run in this process; a parent and its child share it."""
+"""Of the run in this process, in memory that a parent and its child share."""
 
 _in_child = False
 
 
 def heartbeat_of_run() -> Heartbeat:
-    """Return the heartbeat that a run in this process has to use: the one that the parent reads, if there is one."""
+    """Return the heartbeat for a run in this process: in a child the one that its parent reads, else a new one."""
     global heartbeat
     if not _in_child:
         heartbeat = Heartbeat()
@@ -35,35 +35,35 @@ def heartbeat_of_run() -> Heartbeat:
 
 
 def begin_child() -> None:
-    """Tell that this process is a child, whose parent reads `heartbeat`."""
+    """Note that this process is a child, whose parent reads `heartbeat`."""
     global _in_child
     _in_child = True
 
 
 def renew_heartbeat() -> Heartbeat:
-    """Return the heartbeat of the next run in a child of this process."""
+    """Return a new heartbeat, for the next run in a child of this process."""
     global heartbeat
     heartbeat = Heartbeat()
     return heartbeat
 
 
 def can_supervise() -> bool:
-    """Return whether this process can be forked: the system does it, and no thread would be lost."""
+    """Return whether this process can be forked: the system supports it, and no thread would be lost."""
     return hasattr(os, "fork") and threading.active_count() == 1
 
 
 def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
     """Run a command in a child process and end with its status.
 
-    If it dies, `report_crash` gets the heartbeat, how the child ended and the seconds that it lived; it completes what
-    the run left, says what happened and returns the exit status.
+    If the child crashes, `report_crash` gets the heartbeat, how the child ended and the seconds that it ran; it
+    completes what the run left, prints what happened and returns the exit status.
 
-    The child is a process group of its own: the parent alone hears of Ctrl-C and passes on what it hears, so that the
-    child hears of each once. If the parent dies, so does the child.
+    The child is a process group of its own: the parent alone receives Ctrl-C and forwards it, so that the child
+    receives each signal once. If the parent ends, the child is killed.
     """
     began = time.monotonic()
-    heard = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGCONT]
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
+    forwarded = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGCONT]
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, forwarded)
 
     def begin() -> NoReturn:
         begin_child()
@@ -72,7 +72,7 @@ def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, Chi
         run_to_end(command)
 
     child = ForkedChild(begin, heartbeat)
-    _pass_on(child.pid)
+    _forward_signals(child.pid)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     end = child.wait()
     assert end is not None  # it watched nothing else
@@ -103,27 +103,27 @@ def leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _pass_on(child: int) -> None:
-    def tell(number: int, _frame: Any) -> None:
+def _forward_signals(child: int) -> None:
+    def forward(number: int, _frame: Any) -> None:
         with contextlib.suppress(ProcessLookupError):
             os.kill(child, number)
 
     def stop(_number: int, _frame: Any) -> None:
-        tell(signal.SIGSTOP, None)
+        forward(signal.SIGSTOP, None)
         os.kill(os.getpid(), signal.SIGSTOP)
-        tell(signal.SIGCONT, None)
+        forward(signal.SIGCONT, None)
 
-    signal.signal(signal.SIGINT, tell)
-    signal.signal(signal.SIGTERM, tell)
+    signal.signal(signal.SIGINT, forward)
+    signal.signal(signal.SIGTERM, forward)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
-        signal.signal(signal.SIGHUP, tell)
+        signal.signal(signal.SIGHUP, forward)
     if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL:
         signal.signal(signal.SIGTSTP, stop)
 
 
 def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
-    """End as the child did; where it was not done, tell how it crashed."""
-    if end.signal is not None and end.signal in ORDERS:
+    """End as the child did; where it had not set its exit status, report how it crashed."""
+    if end.signal is not None and end.signal in TERMINATION_SIGNALS:
         signal.signal(end.signal, signal.SIG_DFL)
         os.kill(os.getpid(), end.signal)
     if heartbeat.status is not None:

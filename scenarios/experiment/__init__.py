@@ -1,1 +1,1 @@
-"""What a scenario is written with: parameters, wiring, evaluation, plots, replay, published values."""
+"""What scenarios are made of: parameters, wiring, evaluation, plots, replay, published values."""

@@ -1,4 +1,4 @@
-"""Units as one reads them in plots and tables: mm for small lengths, degrees for angles."""
+"""Display units of plots and tables: mm for small lengths, degrees for angles, kPa for high pressures."""
 
 import math
 from dataclasses import dataclass
@@ -9,27 +9,27 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class DisplayUnit:
-    """A unit to show values in: what an SI value is multiplied by, and how the unit is written; "" for pure numbers."""
+    """A unit to show values in: the factor from the SI value, and the unit's symbol, "" for pure numbers."""
 
     factor: float
     symbol: str
 
     def axis(self, quantity: str) -> str:
-        """Return an axis' title."""
+        """Return an axis's title: the quantity with the unit."""
         return f"{quantity} ({self.symbol})" if self.symbol else quantity
 
     def text(self, value: float) -> str:
         """Return a value with its unit, to four digits."""
         if not math.isfinite(value):
             return "–"
-        between = "" if self.symbol.startswith("°") else " "
-        return f"{value * self.factor:.4g}{between}{self.symbol}".rstrip()
+        space = "" if self.symbol.startswith("°") else " "
+        return f"{value * self.factor:.4g}{space}{self.symbol}".rstrip()
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     """Return the unit in which to show values of an SI unit, by the largest of them."""
-    x = np.abs(np.asarray(values, dtype=np.float64))
-    finite = x[np.isfinite(x)]
+    magnitudes = np.abs(np.asarray(values, dtype=np.float64))
+    finite = magnitudes[np.isfinite(magnitudes)]
     largest = float(finite.max()) if finite.size else 0.0
     smaller = {"m": (1.0, 1e3, "mm"), "m2": (1e-2, 1e6, "mm²"), "s": (0.1, 1e3, "ms"), "kg": (0.5, 1e3, "g")}
     if unit in smaller and largest < smaller[unit][0]:
@@ -46,5 +46,5 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
 
 
 def unit_symbol(unit: str) -> str:
-    """Return an SI unit as one writes it, such as "m²"; "" for pure numbers."""
+    """Return an SI unit as it is written, such as "m²"; "" for pure numbers."""
     return "" if unit == "1" else unit.replace(".", "·").replace("m2", "m²").replace("s2", "s²")

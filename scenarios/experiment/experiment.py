@@ -1,4 +1,8 @@
-"""What a scenario is: parameters, a system of units, a verdict, figures."""
+"""What a scenario is: parameters, a system of units, an evaluator of its runs, figures.
+
+Scenarios subclass `Experiment`. The engine runs the `System` that it builds, its `Evaluator` sees each communication
+point, and reports are made of what `time_figures`, `draw`, `replay` and `published` return.
+"""
 
 import abc
 from collections.abc import Callable, Mapping, Sequence
@@ -18,12 +22,12 @@ from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 
 FmuOf = Callable[[str], Path]
-"""Gives a unit's FMU by the unit's name in the system."""
+"""Returns the path of a unit's FMU by the unit's name in the system."""
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A figure of a run's summary."""
+    """A figure of merit in a run's summary."""
 
     value: float
     unit: str = "1"
@@ -32,7 +36,7 @@ class Metric:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a task ended: whether it succeeded, in a sentence why, and its figures."""
+    """How a task ended: whether it succeeded, why (in a sentence), and its metrics."""
 
     success: bool
     reason: str
@@ -40,22 +44,22 @@ class Outcome:
 
 
 class Evaluator(abc.ABC):
-    """Follows one run as the experimenter does, who sees everything: says when it is over and how it went."""
+    """Follows one run as the experimenter does, by ground truth: decides when the task is over and how it went."""
 
     @abc.abstractmethod
     def __call__(self, t: float, signals: Signals) -> None:
-        """Look at the signals at time t."""
+        """Take in the signals at time t."""
 
     @property
     @abc.abstractmethod
     def over(self) -> bool:
         """Whether the task has ended, well or not."""
 
-    def finish(self, signals: Signals) -> None:  # noqa: B027 (many watches need nothing of it)
-        """Look at the signals once more when the run has ended, however it did."""
+    def finish(self, signals: Signals) -> None:  # noqa: B027 (many evaluators need nothing of it)
+        """Take in the signals at the end of the run, however it ended."""
 
     def pictures(self) -> Sequence[CameraPicture]:
-        """Return what cameras saw at moments that tell of the run, in the order of time; none by default."""
+        """Return what cameras saw at the run's key moments, in chronological order; none by default."""
         return ()
 
     @abc.abstractmethod
@@ -67,7 +71,7 @@ AnyEvaluator = TypeVar("AnyEvaluator", bound=Evaluator)
 
 
 class Experiment(abc.ABC, Generic[AnyEvaluator]):
-    """A scenario. Subclasses name it, declare its parameters, wire its system and judge its runs."""
+    """A scenario. Subclasses name it, declare its parameters, wire its system and evaluate its runs."""
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -75,9 +79,9 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     units: ClassVar[Mapping[str, str]]
     """The catalogued unit behind each of the system's units, by name in the system."""
     headline: ClassVar[tuple[str, ...]]
-    """Names of the metrics that are told first, in their order; a run need not have all of them."""
+    """Names of the metrics that summaries list first, in this order; a run need not have all of them."""
     is_seeded: ClassVar[bool] = True
-    """Whether its random numbers follow from a seed."""
+    """Whether it draws random numbers, which follow from the seed."""
 
     @classmethod
     def parameters(cls) -> tuple[Variable, ...]:
@@ -94,18 +98,21 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
 
     @abc.abstractmethod
     def evaluator(self, parameters: Any) -> AnyEvaluator:
-        """Return an observer of one run."""
+        """Return the evaluator of one run."""
 
     def evaluator_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyEvaluator:  # noqa: ARG002
-        """Return an observer of a run that is seen again by its record, and by the pictures that its folder keeps."""
+        """Return an evaluator to which a finished run is replayed from its record.
+
+        A record holds no camera pictures: those that the run's folder keeps are given.
+        """
         return self.evaluator(parameters)
 
     @abc.abstractmethod
     def cycle(self) -> tuple[str, ...]:
-        """Return the units that make up one control cycle, whose CPU time the summary tells."""
+        """Return the units of one control cycle, whose CPU time per cycle is a metric."""
 
     def time_figures(self, parameters: Any, record: Record) -> Sequence[TimeFigure]:  # noqa: ARG002
-        """Return what is drawn over time, by the report before all other signals, and for papers; nothing by default.
+        """Return the figures over time, for the report and for papers; none by default.
 
         Raises:
             KeyError: the record has no signal that is to be drawn.
@@ -121,15 +128,15 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         return [plot for figure in self.time_figures(parameters, record) for plot in figure.plots]
 
     def draw(self, parameters: Any, evaluator: AnyEvaluator, record: Record, folder: Path) -> Sequence["Figure"]:  # noqa: ARG002
-        """Draw into a folder what is no curve over time, such as the scene; nothing by default."""
+        """Draw figures into a folder that are not curves over time, such as the scene; none by default."""
         return ()
 
     def replay(self, parameters: Any, record: Record) -> Replay | None:  # noqa: ARG002
-        """Return what the report shows in space; nothing by default."""
+        """Return the scene that the report animates; none by default."""
         return None
 
     def published(self, parameters: Any) -> Sequence[PublishedValue]:  # noqa: ARG002
-        """Return what the paper tells of runs with such parameters; nothing by default."""
+        """Return what the paper published of runs with such parameters; nothing by default."""
         return ()
 
 

@@ -1,6 +1,6 @@
-"""Reads a scenario's `paper.toml`: every value with its unit, its place in the paper, and its status.
+"""Values of a paper, read from a scenario's `paper.toml`: each with its unit, its place in the paper, and its status.
 
-A value that a paper tells of what a run measured.
+`paper_values` gives the constants that a scenario is built with; a `PublishedValue` stands beside what a run measured.
 """
 
 import functools
@@ -22,7 +22,7 @@ def paper_entry(scenario: str, group: str, name: str) -> dict[str, Any]:
     """Return a value of a scenario's `paper.toml` with its unit, its place in the paper (`where`) and its status.
 
     Raises:
-        KeyError: there is none of that name.
+        KeyError: there is no value of that name.
     """
     return dict(_read(scenario)[group][name])
 
@@ -39,13 +39,13 @@ class PublishedValue:
     """A published value beside a metric, both in the metric's unit.
 
     Attributes:
-        metric: the run's.
+        metric: name of the run's metric.
         paper: the package of `scenarios` whose `paper.toml` has the value.
         name: of the value in that file's group `published`.
-        index: of the one that belongs to the run, where the value is an array.
-        span: names of the least and the greatest of what was published, indexed alike; none if it was one value.
-        relation: how the two compare, such as "at most"; "" if they are of the same.
-        note: what else has to be known to compare them, in a sentence without its point.
+        index: of the element that belongs to the run, where the value is an array.
+        span: names of the published minimum and maximum, indexed alike; empty if one value was published.
+        relation: how the run's value relates to the published one, such as "at most"; "" if both measure the same.
+        note: what else has to be known to compare them, in a sentence without its full stop.
     """
 
     metric: str
@@ -59,12 +59,12 @@ class PublishedValue:
     @property
     def value(self) -> float:
         """The published value."""
-        return self._of(self.name)
+        return self._value_of(self.name)
 
     @property
     def limits(self) -> tuple[float, float] | None:
-        """The least and the greatest, where they were published."""
-        return (self._of(self.span[0]), self._of(self.span[1])) if self.span else None
+        """Minimum and maximum, where they were published."""
+        return (self._value_of(self.span[0]), self._value_of(self.span[1])) if self.span else None
 
     @property
     def where(self) -> str:
@@ -76,7 +76,7 @@ class PublishedValue:
         """Whether it was stated, derived, assumed or read off a figure."""
         return self._entry(self.name)["status"]
 
-    def _of(self, name: str) -> float:
+    def _value_of(self, name: str) -> float:
         return float(np.asarray(self._entry(name)["value"], dtype=np.float64)[tuple(self.index)])
 
     def _entry(self, name: str) -> dict[str, Any]:

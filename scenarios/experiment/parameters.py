@@ -1,4 +1,4 @@
-"""Turns `name=value` texts into a scenario's parameters; every fault is told at once, with what would be right."""
+"""Turns `name=value` texts into a scenario's parameters, and back; all faults are reported, with valid values."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
@@ -12,7 +12,7 @@ from handover.scenarios.experiment.experiment import Experiment
 
 
 class InvalidParameter(ValueError):
-    """Parameters that a scenario does not have, or values that they cannot take; `faults` lists them."""
+    """Unknown parameters, or values out of their range; `faults` lists them all."""
 
     def __init__(self, faults: Sequence[str]) -> None:
         super().__init__("; ".join(faults))
@@ -20,12 +20,12 @@ class InvalidParameter(ValueError):
 
 
 def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) -> Any:
-    """Return the scenario's parameters with the given ones set.
+    """Return the scenario's parameters with the given ones set, the others at their defaults.
 
-    Numbers are in SI units; arrays are numbers between commas; enumerations are given by name.
+    Numbers are in SI units; arrays are numbers separated by commas; enumerations are given by name.
 
     Raises:
-        InvalidParameter: with every fault of the given texts.
+        InvalidParameter: with all faults of the given texts.
     """
     known = {v.name: v for v in experiment.parameters()}
     texts, faults = texts_by_name(experiment, given)
@@ -42,12 +42,12 @@ def parse_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
 def texts_by_name(
     experiment: type[Experiment[Any]], given: Sequence[str], form: str = "name=value"
 ) -> tuple[dict[str, str], list[str]]:
-    """Return what stands behind `name=` by the parameters' names, and what is wrong with these.
+    """Return the text after `name=` by the parameters' names, and the faults of these names.
 
     Args:
         experiment: whose parameters they are.
         given: texts.
-        form: of each, as a fault tells it.
+        form: of each text, as a fault quotes it.
     """
     known = [v.name for v in experiment.parameters()]
     texts: dict[str, str] = {}
@@ -66,16 +66,16 @@ def texts_by_name(
 
 
 def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) -> Any:
-    """Return the scenario's parameters as `run.json` keeps them.
+    """Return the scenario's parameters from what `run.json` keeps of them.
 
     Raises:
-        InvalidParameter: it keeps some that the scenario does not have, or values that they cannot take.
+        InvalidParameter: some are unknown to the scenario or out of range, as in a run of another version.
     """
     return parse_parameters(experiment, [f"{name}={_as_text(value)}" for name, value in kept.items()])
 
 
 def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
-    """Return a parameter's value from its text, and what is wrong with it, saying what would be right, or None."""
+    """Return a parameter's value from its text, and its fault with the valid values, None if there is none."""
     value: Any = text
     if variable.kind is Kind.BOOLEAN:
         value = {"true": True, "false": False}.get(text.lower(), text)
@@ -93,16 +93,16 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
         value = next(e for e in variable.enumeration if e.name == str(text).upper())
     if fault is None and variable.kind is Kind.INTEGER:
         value = int(value)
-    wanted = range_of(variable)
-    if fault and wanted and wanted not in fault:
-        fault += f", {wanted}"
-    if fault and variable.items and "did you mean" in (near := nearest(text, [n.lower() for n, _ in variable.items])):
-        fault += f"; {near}"
+    valid_range = range_of(variable)
+    if fault and valid_range and valid_range not in fault:
+        fault += f", {valid_range}"
+    if fault and variable.items and "did you mean" in (hint := nearest(text, [n.lower() for n, _ in variable.items])):
+        fault += f"; {hint}"
     return value, fault
 
 
 def text_of(variable: Variable, value: Any) -> str:
-    """Return the text of a parameter's value, the same for all texts that `parse_value` takes for this value."""
+    """Return the canonical text of a parameter's value: one for all texts that `parse_value` reads as this value."""
     if variable.kind is Kind.STRING:
         return str(value)
     if variable.kind is Kind.BOOLEAN:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 QUALITY = 88
-"""Of the JPEG that is kept, of 100."""
+"""Quality of the JPEG that is kept, of 100."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,13 +32,13 @@ class Mark:
 
 @dataclass(frozen=True, kw_only=True)
 class CameraPicture:
-    """A picture of one camera at a time of the run, in the form in which it is kept.
+    """A picture of one camera at a time of the run, compressed as it is kept.
 
     Attributes:
         t: in seconds.
         camera: its name, such as "left".
-        role: what moment it is, such as "at the ball"; pictures of several cameras at one moment share it.
-        jpeg: the picture as a JPEG file's bytes: a tenth or less of its pixels, which a checkpoint holds too.
+        role: which moment it shows, such as "at the ball"; pictures of several cameras at one moment share it.
+        jpeg: bytes of a JPEG file: at most a tenth of the pixels' size, since checkpoints hold pictures too.
         width, height: in pixels.
         marks: what was detected in it.
     """
@@ -56,7 +56,7 @@ class CameraPicture:
         cls, *, t: float, camera: str, role: str, pixels: NDArray[np.uint8], marks: Sequence[Mark] = ()
     ) -> "CameraPicture":
         """Return a picture of pixels, shape (height, width, 3), blue green red."""
-        import cv2  # as below: every scenario knows pictures, most take none
+        import cv2  # imported here and below: every scenario imports this module, and most take no pictures
 
         height, width, _ = pixels.shape
         _, coded = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])

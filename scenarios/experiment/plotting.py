@@ -1,4 +1,4 @@
-"""The look of all figures by matplotlib, and curves over time as it draws them."""
+"""Figures for papers by matplotlib: the style that all of them share, and time plots drawn in it."""
 
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
@@ -42,9 +42,9 @@ _STROKES: dict[str, dict[str, Any]] = {
 _LEVELS = ((0, (7, 3)), (0, (7, 2, 1, 2)))
 
 _WIDTH, _ALONE, _STACKED = 8.0, 2.6, 1.6
-"""Width of a figure over time, height of one that is alone, and of one of several, in."""
+"""Width of a time figure, height of a single plot, and of each of several below each other, in."""
 _LETTER, _UPRIGHT = 5.2, 8.5
-"""Widths of a letter, and of an upright name over a phase, points."""
+"""Widths of a letter, and of a phase's name that stands upright, points."""
 
 
 @contextmanager
@@ -55,15 +55,15 @@ def figure(
     size: tuple[float, float] = (8.0, 3.2),
     heights: Sequence[float] | None = None,
 ) -> Generator[list[Axes], None, None]:
-    """Make a figure of `rows` x `columns` axes; on leaving save it as PNG and SVG beside each other.
+    """Make a figure of `rows` x `columns` axes, row by row; save it as PNG and SVG on leaving the context.
 
-    `path` is without suffix, `size` in inches; `heights` are the rows' relative ones.
+    `path` is without suffix, `size` in inches; `heights` are the rows' relative heights.
     """
     with plt.rc_context(STYLE):
         canvas, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, height_ratios=heights)
         try:
-            every: list[Axes] = axes.reshape(-1).tolist()
-            yield every
+            axes_by_row: list[Axes] = axes.reshape(-1).tolist()
+            yield axes_by_row
             _save(canvas, path)
         finally:
             plt.close(canvas)
@@ -71,18 +71,18 @@ def figure(
 
 def draw_time_figures(figures: Sequence[TimeFigure], time: Floats, folder: Path) -> list[Figure]:
     """Draw curves over the record's time, s, into a folder."""
-    for described in figures:
-        _draw_time_figure(described, time, folder / described.name)
-    return [Figure(described.name, described.caption) for described in figures]
+    for spec in figures:
+        _draw_time_figure(spec, time, folder / spec.name)
+    return [Figure(spec.name, spec.caption) for spec in figures]
 
 
-def _draw_time_figure(described: TimeFigure, time: Floats, path: Path) -> None:
-    plots, columns = described.plots, described.columns
+def _draw_time_figure(spec: TimeFigure, time: Floats, path: Path) -> None:
+    plots, columns = spec.plots, spec.columns
     rows = ceil(len(plots) / columns)
-    wide = 72.0 * 0.86 * _WIDTH / columns
+    width = 72.0 * 0.86 * _WIDTH / columns
     span = float(time[-1] - time[0])
-    above = max(_height_of_names(p.phases, span / wide) for p in plots) / 72.0
-    legends = sum(_legend_rows(p, wide) for p in plots[:rows]) * 0.18
+    above = max(_height_of_names(p.phases, span / width) for p in plots) / 72.0
+    legends = sum(_legend_rows(p, width) for p in plots[:rows]) * 0.18
     size = (_WIDTH, (_ALONE if rows == 1 else _STACKED * rows) + above + legends + 0.4)
     with figure(path, rows, columns, size) as grid:
         for k, plot in enumerate(plots):
@@ -91,12 +91,12 @@ def _draw_time_figure(described: TimeFigure, time: Floats, path: Path) -> None:
             is_last = row == rows - 1 or k == len(plots) - 1
             draw_time_plot(axes, plot, time)
             if row == 0 or plot.phases != plots[k - 1].phases:
-                name_phases(axes, plot.phases, span / wide)
+                name_phases(axes, plot.phases, span / width)
             if is_last:
                 axes.set_xlabel("time (s)")
             axes.tick_params(labelbottom=is_last)
             if plot.has_legend and (is_last or _entries(plot) != _entries(plots[k + 1])):
-                _legend_below(axes, plot, wide, 34.0 if is_last else 6.0)
+                _legend_below(axes, plot, width, 34.0 if is_last else 6.0)
         for axes in grid:
             axes.set_visible(axes.has_data())
         _canvas(grid[0]).align_ylabels()
@@ -120,9 +120,9 @@ def draw_time_plot(axes: Axes, plot: TimePlot, time: Floats) -> None:
 
 
 def name_phases(axes: Axes, phases: Sequence[Phase], per_point: float) -> None:
-    """Write the names of phases over axes, upright with a line to its phase where one has no room beside the others.
+    """Write the names of phases over axes: level where they fit, else upright with a line to the phase.
 
-    `per_point` is the time, s, that a point on paper stands for. The shortest go if there is no room for all.
+    `per_point` is the time, s, that a point on paper stands for. Without room for all, the shortest phases go unnamed.
     """
     if not phases:
         return
@@ -131,16 +131,16 @@ def name_phases(axes: Axes, phases: Sequence[Phase], per_point: float) -> None:
     for phase in levels:
         middle = (phase.begin + phase.end) / 2
         axes.text(middle, 1.02, phase.name, transform=axes.get_xaxis_transform(), ha="center", color=_SOFT)
-    room = max(int((high - low) / per_point / _UPRIGHT), 1)
-    kept = sorted(sorted(upright, key=lambda p: p.begin - p.end)[:room], key=lambda p: p.begin)
+    max_upright = max(int((high - low) / per_point / _UPRIGHT), 1)
+    kept = sorted(sorted(upright, key=lambda p: p.begin - p.end)[:max_upright], key=lambda p: p.begin)
     middles = [(p.begin + p.end) / 2 for p in kept]
-    places = _spread(middles, low, high, _UPRIGHT * per_point)
-    for phase, middle, place in zip(kept, middles, places, strict=True):
+    positions = _spread(middles, low, high, _UPRIGHT * per_point)
+    for phase, middle, position in zip(kept, middles, positions, strict=True):
         axes.annotate(
             phase.name,
             xy=(middle, 1.0),
             xycoords=axes.get_xaxis_transform(),
-            xytext=((place - middle) / per_point, 20.0 if levels else 8.0),
+            xytext=((position - middle) / per_point, 20.0 if levels else 8.0),
             textcoords="offset points",
             rotation=90,
             ha="center",
@@ -160,7 +160,7 @@ def name_phases(axes: Axes, phases: Sequence[Phase], per_point: float) -> None:
 
 
 def _named(phases: Sequence[Phase], per_point: float) -> tuple[list[Phase], list[Phase]]:
-    """Return the phases over which there is room for their names, and those over which there is none."""
+    """Return the phases whose names fit over them, and those whose names stand upright."""
     level: list[Phase] = []
     upright: list[Phase] = []
     for phase in phases:
@@ -171,45 +171,45 @@ def _named(phases: Sequence[Phase], per_point: float) -> tuple[list[Phase], list
 
 
 def _height_of_names(phases: Sequence[Phase], per_point: float) -> float:
-    """Return about how high the names of phases stand above axes, points."""
+    """Return the approximate height of the phases' names above axes, points."""
     levels, upright = _named(phases, per_point)
     return (14.0 if levels else 0.0) + max((4.0 * len(p.name) + 8.0 for p in upright), default=0.0)
 
 
-def _spread(places: Sequence[float], low: float, high: float, apart: float) -> list[float]:
-    """Return ascending places moved so that they are at least so far apart, between low and high."""
+def _spread(positions: Sequence[float], low: float, high: float, apart: float) -> list[float]:
+    """Return ascending positions moved so that neighbours keep a distance, between low and high."""
     spread: list[float] = []
-    for place in places:
-        spread.append(max(place, low + apart / 2, spread[-1] + apart if spread else low))
+    for position in positions:
+        spread.append(max(position, low + apart / 2, spread[-1] + apart if spread else low))
     for n in reversed(range(len(spread))):
         spread[n] = min(spread[n], high - apart * (len(spread) - n - 0.5))
     return spread
 
 
 def _entries(plot: TimePlot) -> tuple[Any, ...]:
-    """Return what the legend of a plot shows; two with the same share theirs."""
+    """Return what the legend of a plot shows; plots with equal entries share one legend."""
     return (*((c.label, c.stroke, k) for c, k in zip(plot.curves, plot.colours, strict=True)), *plot.level_labels)
 
 
-def _legend_columns(plot: TimePlot, wide: float) -> int:
-    """Return how many columns of a legend fit into a width, points, so that curves of one colour stand together."""
+def _legend_columns(plot: TimePlot, width: float) -> int:
+    """Return how many legend columns fit into a width, points, with curves of one colour in one column."""
     labels = [*(c.label for c in plot.curves), *plot.level_labels]
-    most = max(int(wide / (0.8 * _LETTER * max(len(label) for label in labels) + 42.0)), 1)
+    max_columns = max(int(width / (0.8 * _LETTER * max(len(label) for label in labels) + 42.0)), 1)
     together = max((plot.colours.count(k) for k in plot.colours), default=1)
-    rows = together * ceil(len(labels) / most / together)
+    rows = together * ceil(len(labels) / max_columns / together)
     return ceil(len(labels) / rows)
 
 
-def _legend_rows(plot: TimePlot, wide: float) -> int:
+def _legend_rows(plot: TimePlot, width: float) -> int:
     count = len(plot.curves) + len(plot.levels)
-    return ceil(count / _legend_columns(plot, wide)) if plot.has_legend else 0
+    return ceil(count / _legend_columns(plot, width)) if plot.has_legend else 0
 
 
-def _legend_below(axes: Axes, plot: TimePlot, wide: float, gap: float) -> None:
-    """Put the legend so many points below the axes, clear of what stands at the axis."""
+def _legend_below(axes: Axes, plot: TimePlot, width: float, gap: float) -> None:
+    """Put the legend below the axes, by a gap in points that keeps clear of the axis's labels."""
     below = axes.transAxes + ScaledTranslation(0.0, -gap / 72.0, _canvas(axes).dpi_scale_trans)
     axes.legend(
-        ncols=_legend_columns(plot, wide),
+        ncols=_legend_columns(plot, width),
         loc="upper center",
         bbox_to_anchor=(0.5, 0.0),
         bbox_transform=below,
@@ -219,9 +219,9 @@ def _legend_below(axes: Axes, plot: TimePlot, wide: float, gap: float) -> None:
 
 
 def _canvas(axes: Axes) -> Canvas:
-    found = axes.get_figure(root=True)
-    assert found is not None, "axes are drawn within a figure"
-    return found
+    canvas = axes.get_figure(root=True)
+    assert canvas is not None, "axes are drawn within a figure"
+    return canvas
 
 
 def _save(canvas: Canvas, path: Path) -> None:

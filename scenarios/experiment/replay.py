@@ -1,6 +1,7 @@
-"""What a run looked like in space: bodies and lines over time, in W.
+"""What a run looked like in space: bodies and lines over time, in W, with triangle meshes of simple bodies.
 
-Triangle meshes of simple bodies, in their own frames: hulls, balls, prisms, rods with rounded ends.
+A scenario returns a `Replay`, and the report animates it. Meshes (`hull`, `prism`, `ball`, `rod`) are in their body's
+frame.
 """
 
 from collections.abc import Sequence
@@ -20,25 +21,25 @@ class Mesh(NamedTuple):
     triangles: NDArray[np.int64]
 
     def moved(self, p: Floats) -> "Mesh":
-        """Return it at another place."""
+        """Return the mesh translated by p, shape (3,), m."""
         return Mesh(self.vertices + p, self.triangles)
 
 
 def hull(points: Floats) -> Mesh:
     """Return the convex hull of points, shape (n, 3)."""
-    from scipy.spatial import ConvexHull  # long to load, and meshes are named by scenarios that draw none yet
+    from scipy.spatial import ConvexHull  # slow to import, and scenarios import this module without making meshes
 
-    found = ConvexHull(points)
-    triangles = found.simplices.astype(np.int64)
+    convex = ConvexHull(points)
+    triangles = convex.simplices.astype(np.int64)
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), convex.equations[:, :3]) < 0.0
     triangles[inwards] = triangles[inwards][:, ::-1]
     kept = np.unique(triangles)
     return Mesh(points[kept], np.searchsorted(kept, triangles))
 
 
 def prism(outline: Floats, low: float, high: float) -> Mesh:
-    """Return a convex outline, shape (n, 2), drawn out along z from `low` to `high`, with sharp edges."""
+    """Return a convex outline, shape (n, 2), extruded along z from `low` to `high`, with sharp edges."""
     return faceted(hull(np.vstack([np.column_stack([outline, np.full(len(outline), z)]) for z in (low, high)])))
 
 
@@ -56,7 +57,7 @@ def ball(radius: float, finer: int = 2) -> Mesh:
 
 
 def rod(points: Floats, radii: Floats) -> Mesh:
-    """Return a chain of round rods with rounded ends through points, shape (n, 3), of radii there, shape (n,)."""
+    """Return a chain of rods with rounded ends through points, shape (n, 3), with the radii there, shape (n,)."""
     sphere = ball(1.0, finer=1).vertices
     ends = points[:, None] + np.asarray(radii)[:, None, None] * sphere
     apart = [k for k in range(len(points) - 1) if not np.array_equal(points[k], points[k + 1])]
@@ -64,14 +65,14 @@ def rod(points: Floats, radii: Floats) -> Mesh:
 
 
 def merged(meshes: Sequence[Mesh]) -> Mesh:
-    """Return meshes as one."""
+    """Return several meshes as one."""
     firsts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
     triangles = [m.triangles + first for m, first in zip(meshes, firsts, strict=False)]
     return Mesh(np.vstack([m.vertices for m in meshes]), np.vstack(triangles))
 
 
 def faceted(mesh: Mesh) -> Mesh:
-    """Return a mesh whose sides share no vertices, so that shading changes at their edges; coplanar triangles do."""
+    """Return a mesh whose faces share no vertices, for sharp edges in shading; coplanar triangles are one face."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     normals: Floats = np.cross(b - a, c - a)
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -92,7 +93,7 @@ class Line:
         width: of a line, in pixels.
         markers: whether the points of a line are drawn too.
         radii: of a tube at each of its points, shape (n,), m; None for a line.
-        trail: whether what is drawn is the way of a single point until the time, not a line at the time.
+        trail: whether the path of a single point up to the time is drawn, instead of a line at the time.
         opacity: from 0 to 1.
     """
 
@@ -133,10 +134,10 @@ class Replay:
     Attributes:
         lines, bodies: what moves; each has as many rows as the record, or one.
         fixed: lines that stay, of shape (1, n, 3), such as a path to follow or a table's edge.
-        eye: the side from which one looks at first, a direction in W; from as far as all that is shown is seen.
-        phases: an enumeration's signal whose value is told beside the time; "" for none.
+        eye: direction in W from the scene to the viewer at first; the distance follows from what is shown.
+        phases: an enumeration's signal whose value is shown beside the time; "" for none.
         notes: sentences below the scene.
-        window: least and greatest corner of what is shown, shape (2, 3), m; None: everything that is drawn.
+        window: minimum and maximum corner of what is shown, shape (2, 3), m; None: everything that is drawn.
     """
 
     lines: Sequence[Line] = ()

@@ -1,4 +1,4 @@
-"""What is to be drawn over time: curves with a unit, levels, phases. Pages draw it by Plotly, papers by matplotlib."""
+"""Declares time plots: curves with a unit, levels, phases. Pages draw them by Plotly, papers' figures by matplotlib."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,10 +11,10 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 
 COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
-"""Of curves, in the order in which they are given out; those of page.css by day, `var(--c0)` and on."""
+"""Colours of curves, in the order of use; the same as `var(--c0)` and on of page.css in its light scheme."""
 
 _MARGIN = 0.06
-"""Room between what is drawn and the end of an axis, in lengths of the axis."""
+"""Margin between what is drawn and the end of an axis, as a share of the axis."""
 
 Stroke = Literal["solid", "dashed", "dotted"]
 
@@ -26,8 +26,8 @@ class Curve:
     Attributes:
         label: what the legend says.
         values: in the plot's unit.
-        held: whether a value holds until the next one (a command, a sampled measurement), else they are joined.
-        stroke: dashed over a curve before it with which it may coincide; dotted is also thin, as of a reference.
+        held: whether each value holds until the next (a command, a sampled measurement), else they are joined by lines.
+        stroke: dashed for a curve that may coincide with one below it; dotted, which is thinner, for references.
         group: curves of one group have one colour; by default each has its own.
     """
 
@@ -63,11 +63,11 @@ class TimePlot:
         title: in a few words.
         quantity: what the vertical axis shows, such as "distance".
         unit: the unit of its values as one reads it, such as "mm"; "" for pure numbers.
-        curves, levels: what is drawn; a later curve over those before.
+        curves, levels: what is drawn; later curves lie over earlier ones.
         phases: every second of them is shaded.
         logarithmic: whether the vertical axis is.
-        limits: of the vertical axis unless it is logarithmic; None where what is drawn sets it.
-        palette: groups that have the first colours whether they are drawn here or not, for plots that share groups.
+        limits: of the vertical axis unless it is logarithmic; None: chosen by what is drawn.
+        palette: groups that get the first colours, drawn here or not, so that plots agree on a group's colour.
     """
 
     title: str
@@ -87,13 +87,13 @@ class TimePlot:
 
     @property
     def colours(self) -> tuple[int, ...]:
-        """Places of the curves' colours in `COLOURS`."""
+        """Indices of the curves' colours in `COLOURS`."""
         groups = list(dict.fromkeys([*self.palette, *(c.group or c.label for c in self.curves)]))
         return tuple(groups.index(c.group or c.label) % len(COLOURS) for c in self.curves)
 
     @property
     def level_labels(self) -> tuple[str, ...]:
-        """What the legend says of the levels: each with its value."""
+        """The levels' labels in the legend, each with its value."""
         return tuple(f"{level.label}: {level.value:.4g}{self.unit_after_value}" for level in self.levels)
 
     @property
@@ -103,14 +103,14 @@ class TimePlot:
 
     @property
     def shown_range(self) -> tuple[float, float] | None:
-        """The limits, where only one is given with the other a little beyond what is drawn; None if none is given."""
+        """The limits, None if neither is given; where one is given, the other lies a margin beyond what is drawn."""
         drawn = np.concatenate([*(c.values for c in self.curves), [level.value for level in self.levels]])
         drawn = drawn[np.isfinite(drawn)]
         if self.limits == (None, None) or not drawn.size:
             return None
         low, high = (
-            float(most) if limit is None else limit
-            for limit, most in zip(self.limits, (drawn.min(), drawn.max()), strict=True)
+            float(extreme) if limit is None else limit
+            for limit, extreme in zip(self.limits, (drawn.min(), drawn.max()), strict=True)
         )
         margin = _MARGIN * (high - low)
         return (low - margin if self.limits[0] is None else low, high + margin if self.limits[1] is None else high)
@@ -127,8 +127,8 @@ class TimeFigure:
 
     Attributes:
         name: of its file within the figures folder, without suffix.
-        caption: what is seen, in a sentence or two.
-        plots: from above; with more than one column, the second column follows the first.
+        caption: what it shows, in a sentence or two.
+        plots: from top to bottom, column by column.
     """
 
     name: str
@@ -138,9 +138,9 @@ class TimeFigure:
 
 
 def phases_of(record: Record, signal: str, names: Mapping[int, str] | None = None) -> tuple[Phase, ...]:
-    """Return when a signal had which value, by name; neighbours of one name are one phase.
+    """Return the spans of time in which a signal kept its value, named; adjacent spans of one name are one phase.
 
-    `names` are by value, by default those of the signal's enumeration.
+    `names` are by the signal's value, by default the items of its enumeration.
 
     Raises:
         KeyError: no such signal was recorded.
@@ -150,8 +150,9 @@ def phases_of(record: Record, signal: str, names: Mapping[int, str] | None = Non
         names = {value: name.replace("_", " ").lower() for value, name in record.items(signal).items()}
     changes = np.flatnonzero(np.diff(values)) + 1
     phases: list[Phase] = []
-    for a, b in pairwise([0, *changes.tolist(), len(time) - 1]):
-        phase = Phase(begin=float(time[a]), end=float(time[b]), name=names.get(int(values[a]), str(values[a])))
+    for first, last in pairwise([0, *changes.tolist(), len(time) - 1]):
+        name = names.get(int(values[first]), str(values[first]))
+        phase = Phase(begin=float(time[first]), end=float(time[last]), name=name)
         if phases and phases[-1].name == phase.name:
             phases[-1] = replace(phases[-1], end=phase.end)
         else:

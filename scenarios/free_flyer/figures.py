@@ -1,7 +1,4 @@
-"""The scene of a handover at some moments, and the transfers from near, for papers.
-
-The scene of a push at three moments, for papers.
-"""
+"""Figures of the scene, for papers: a handover at key moments with its transfers from near, and a push."""
 
 from pathlib import Path
 
@@ -18,18 +15,18 @@ from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, 
 def draw_scenes(evaluator: HandoverEvaluator, record: Record, folder: Path) -> list[Figure]:
     """Draw the scene, and the transfers from near, into a folder."""
     gap, rows = jaw_gap(record), _moments(evaluator, record)
-    seen = {title: robot_at(record, row, float(gap[row])) + person_at(record, row) for title, row in rows.items()}
-    scene = draw_scene(seen, "Blue: jaws; orange: object.", folder)
+    solids = {title: robot_at(record, row, float(gap[row])) + person_at(record, row) for title, row in rows.items()}
+    scene = draw_scene(solids, "Blue: jaws; orange: object.", folder)
     between = list(rows)[1:-1]
     if not between:
         return [scene]
     middle = (record["robot.p_WG"] + record["person.p_WH"]) / 2
     near = {title: middle[rows[title]] for title in between}
-    return [scene, draw_near({title: seen[title] for title in between}, near, folder)]
+    return [scene, draw_near({title: solids[title] for title in between}, near, folder)]
 
 
 def _moments(evaluator: HandoverEvaluator, record: Record) -> dict[str, int]:
-    """Return the rows of start, end, and when the robot felt the person or signalled in vain, by their titles."""
+    """Return the rows of the start, the end, and each pull or push that the robot felt or signalled for, by title."""
     times = [(0.0, "start")]
     for name, transfer in zip(("transfer", "return"), evaluator.transfers, strict=False):
         times += [(t, "failed reception") for t in transfer.in_vain]

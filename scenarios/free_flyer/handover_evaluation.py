@@ -1,6 +1,6 @@
-"""Judges a handover in microgravity by ground truth, which the robot's computer does not see.
+"""Evaluates a handover in microgravity by ground truth, which the robot's computer does not see.
 
-One passing of the object from robot to person or back, as the experimenter sees it.
+A handover has one or two transfers (`Transfer`): the object passes from robot to person, or back.
 """
 
 import math
@@ -20,13 +20,13 @@ class Transfer:
     Attributes:
         receiver: who is to have the object, `HAND` or `GRIPPER`.
         signalled: when the robot first gave the signal for it, s.
-        asked: when it last gave it, s; later than `signalled` after a failed reception.
-        felt: when the robot took the gripper's speed for a pull or a push since, s; None before.
-        in_vain: when it had done so in receptions that failed, s.
+        asked: when it last gave the signal, s; later than `signalled` after a failed reception.
+        felt: when, since then, it took the gripper's speed for a pull or a push, s; None before.
+        in_vain: times at which it had felt one in receptions that failed, s.
         speed: the gripper's speed when it was felt, m/s.
-        fastest: the greatest speed while the robot waited since it last asked, m/s.
-        farthest: how far the gripper was from its place at most, from the signal for as long as it yields, m.
-        farthest_along: the same along the axes of W.
+        fastest: maximum speed while the robot has been waiting since it last asked, m/s.
+        farthest: maximum distance of the gripper from its place, from the signal for as long as it yields, m.
+        farthest_along: the same along each axis of W.
         done: when the receiver had the object alone, s; None before.
     """
 
@@ -45,23 +45,23 @@ class Transfer:
         self.asked = self.signalled
 
     def asked_again(self, t: float) -> None:
-        """Take note that the robot signals once more: what it had felt was in vain."""
+        """Restart the transfer as the robot signals once more: what it had felt was in vain."""
         if self.felt is not None:
             self.in_vain.append(self.felt)
         self.asked, self.felt, self.fastest = t, None, 0.0
 
     def displaced(self, p_WG: tuple[float, float, float], place: tuple[float, float, float]) -> None:
-        """Take note of where the gripper is, and where it ought to be."""
+        """Update the displacement by the gripper's position and its handover place."""
         away = [abs(a - b) for a, b in zip(p_WG, place, strict=True)]
         self.farthest = max(self.farthest, math.hypot(*away))
         self.farthest_along = [max(pair) for pair in zip(self.farthest_along, away, strict=True)]
 
     def metrics(self, prefix: str) -> dict[str, Metric]:
-        """Return its figures under names with a prefix."""
+        """Return the transfer's metrics, their names with a prefix."""
         whom = "person" if self.receiver == "HAND" else "robot"
         touch = "pull" if self.receiver == "HAND" else "push"
         act = "let go" if self.receiver == "HAND" else "closed"
-        value = {
+        metrics = {
             "displacement": Metric(
                 self.farthest, "m", f"gripper from its handover place at most, while the {whom} takes the object"
             ),
@@ -75,11 +75,11 @@ class Transfer:
             },
         }
         if self.felt is not None:
-            value["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
+            metrics["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
         if self.done is not None:
             since = f"from the {'first ' if self.in_vain else ''}signal until the {whom} has the object"
-            value["time"] = Metric(self.done - self.signalled, "s", since)
-        return {f"{prefix}_{name}": metric for name, metric in value.items()}
+            metrics["time"] = Metric(self.done - self.signalled, "s", since)
+        return {f"{prefix}_{name}": metric for name, metric in metrics.items()}
 
 
 _SETTLING = 1.0
@@ -91,16 +91,16 @@ _PEOPLE = {"HAND": "the person", "GRIPPER": "the robot"}
 
 
 class HandoverEvaluator(Evaluator):
-    """Follows one run and tells how it ended.
+    """Follows one run and decides whether the handover succeeded.
 
     It is a success when the object reached each receiver in turn "without being supported anywhere else and always in
     contact with at least one of the participants" once it was held at all, [Fernandes2020] sec. 3.1.2, and the robot
     took an empty gripper for a failed reception as often as it had one.
 
     Attributes:
-        phases: phases of the robot and when they began, s, in the order of time; a phase may come again.
-        holders: who held the object from when on, likewise.
-        transfers: those that were signalled.
+        phases: phases of the robot and when they began, s, in chronological order; a phase may recur.
+        holders: who held the object and since when, likewise.
+        transfers: those that the robot signalled for.
     """
 
     def __init__(self, parameters: HandoverParameters, receivers: Sequence[str], failures: int = 0) -> None:
@@ -136,7 +136,7 @@ class HandoverEvaluator(Evaluator):
                 self.transfers[-1].fastest = max(self.transfers[-1].fastest, speed)
 
     def _change(self, t: float, signals: Signals, p_WG: tuple[float, float, float], speed: float) -> None:
-        """Take note of another phase or holder."""
+        """Handle a change of phase or holder."""
         if not self._stability:
             self._stability = stability_metrics(signals, ("impedance", "pose"))
         phase, holder = signals.text("decision.phase"), signals.text("person.holder")
@@ -185,7 +185,7 @@ class HandoverEvaluator(Evaluator):
         return self._phase in ("DONE", "GIVEN_UP") and self._t >= self.phases[-1][1] + _SETTLING
 
     def outcome(self) -> Outcome:
-        """Return whether the object changed hands as it should, why, and the figures."""
+        """Return whether the object changed hands as it should, why, and the metrics."""
         success = (
             self._lost is None
             and self._phase == "DONE"
@@ -196,41 +196,43 @@ class HandoverEvaluator(Evaluator):
         return Outcome(success=success, reason=self._reason(success), metrics=self._metrics())
 
     def _metrics(self) -> dict[str, Metric]:
-        value: dict[str, Metric] = {}
+        metrics: dict[str, Metric] = {}
         for prefix, transfer in zip(("transfer", "return"), self.transfers, strict=False):
-            value |= transfer.metrics(prefix)
+            metrics |= transfer.metrics(prefix)
         if "GRIPPER" in self.receivers:
             empty = "receptions after which the robot found its gripper empty"
-            value["failed_receptions"] = Metric(self._failed, "1", empty)
+            metrics["failed_receptions"] = Metric(self._failed, "1", empty)
         if self._arrival is not None:
-            value["arrival_error"] = Metric(
+            metrics["arrival_error"] = Metric(
                 self._arrival[0], "m", "gripper to its handover place when it arrived and began to yield"
             )
-            value["arrival_speed"] = Metric(
+            metrics["arrival_speed"] = Metric(
                 self._arrival[1], "m/s", "gripper's speed when it arrived there and began to yield"
             )
         share = self._saturated / max(self._steps, 1)
-        value["saturated_share"] = Metric(share, "1", "share of the time for which the thrusters were at their limits")
-        value |= self._stability
+        metrics["saturated_share"] = Metric(
+            share, "1", "share of the time for which the thrusters were at their limits"
+        )
+        metrics |= self._stability
         for phase, t in self.phases:
             words = phase.replace("_", " ").lower()
-            value.setdefault(
+            metrics.setdefault(
                 f"phase_{phase.lower()}", Metric(t, "s", f"time at which the robot first entered its phase {words!r}")
             )
-        return value
+        return metrics
 
     def _reason(self, success: bool) -> str:
         if success:
-            ways = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
+            received = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
             again = f" after {self._failed} failed reception" if self._failed else ""
-            return " and ".join(ways) + again + ", and it was never out of both hands"
+            return " and ".join(received) + again + ", and it was never out of both hands"
         if self._lost is not None:
             before = _PEOPLE.get(self.holders[-2][0], "both") if len(self.holders) > 1 else "nobody"
             return f"the object was lost at {self._lost:.1f} s in phase {self._phase}; {before} had held it"
-        return self._stuck()
+        return self._failure()
 
-    def _stuck(self) -> str:
-        """Tell why the robot did not get on, or ended otherwise than it should."""
+    def _failure(self) -> str:
+        """Return why the robot did not finish, or finished otherwise than it should."""
         transfer, before = self._under_way, self.phases[-2][0] if len(self.phases) > 1 else ""
         if self._phase not in ("DONE", "GIVEN_UP"):
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done; {self._where}"

@@ -1,12 +1,9 @@
-"""A free-flyer and a person pass an object to each other: what the four handovers have in common.
+"""A free-flyer and a person pass an object to each other: four handovers, and what they have in common.
 
-The robot gives an object, waits, and takes it back: it holds things for a person. [Fernandes2020] sec. 5.5, T3.
-
-A push without the object: the robot finds its gripper empty and asks again. [Fernandes2020] sec. 3.2.2, 4.3.2.
-
-A person puts an object into the robot's gripper, which closes when it is pushed. [Fernandes2020] sec. 4.3.2.
-
-The robot fetches an object, brings it to a person and lets go when the person pulls. [Fernandes2020] sec. 4.3.1.
+- `RobotToHuman`: the robot fetches an object and lets go when the person pulls. [Fernandes2020] sec. 4.3.1.
+- `HumanToRobot`: a person puts an object into the gripper, which closes when it is pushed. Sec. 4.3.2.
+- `FailedReception`: a push without the object: the robot finds its gripper empty and asks again. Sec. 3.2.2, 4.3.2.
+- `Collaborative`: the robot gives an object, waits, and takes it back: it holds things for a person. Sec. 5.5, T3.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +27,7 @@ from handover.scenarios.free_flyer.published import published_of_giving, publish
 from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_handover
 
 _FLIGHT = 120
-"""Time for flying, fetching and retreating, beside the waiting for the person, s (assumed)."""
+"""Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
 
 
 class FlyerHandover(Experiment[HandoverEvaluator]):
@@ -111,16 +108,16 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         return s
 
     def stop_time(self, parameters: HandoverParameters) -> Fraction:
-        """Return the robot's patience for each signal, and time for flying."""
+        """Return the robot's patience for each signal, plus time for flying."""
         waits = len(self.receivers) + self.failures
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
 
     def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
-        """Return the judge of one handover."""
+        """Return the evaluator of one handover."""
         return HandoverEvaluator(parameters, self.receivers, self.failures)
 
     def cycle(self) -> tuple[str, ...]:
-        """Return the robot's own computing: deciding and controlling."""
+        """Return the units that run on the robot's computer: decision and controllers."""
         return ("decision", "impedance", "pose")
 
     def draw(
@@ -131,7 +128,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         folder: Path,
     ) -> list[Figure]:
         """Draw the scene at three moments, and the transfers from near."""
-        from handover.scenarios.free_flyer.figures import draw_scenes  # what draws takes long to load
+        from handover.scenarios.free_flyer.figures import draw_scenes  # matplotlib is slow to import
 
         return draw_scenes(evaluator, record, folder)
 
@@ -149,13 +146,17 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
 
 
 def _check_reach(p_WG: Floats) -> None:
-    """Refuse a handover place from which the person's hand, at the object's other end, would be out of reach."""
+    """Reject a handover place where the person could not reach the object's other end.
+
+    Raises:
+        InvalidParameter: it is one.
+    """
     person = {name: np.array(value) for name, value in paper_values("free_flyer", "person").items()}
     p_WH = p_WG + person["p_OH"] - person["p_OG"]
-    away, reach = float(np.linalg.norm(p_WH - person["p_WH_0"])), float(person["arm_reach"])
-    if away > reach:
+    distance, reach = float(np.linalg.norm(p_WH - person["p_WH_0"])), float(person["arm_reach"])
+    if distance > reach:
         place = ", ".join(f"{x:g}" for x in p_WG)
-        text = f"the hand would be {away:.2f} m from where it rests, and can be {reach:g} m from it"
+        text = f"the hand would be {distance:.2f} m from where it rests, and can be {reach:g} m from it"
         raise InvalidParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {text}"])
 
 
@@ -204,5 +205,5 @@ class RobotToHuman(FlyerHandover):
     receivers: ClassVar[tuple[str, ...]] = ("HAND",)
 
     def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
-        """Return what sec. 4.1.2 and 4.3 tell."""
+        """Return the values of sec. 4.1.2 and 4.3."""
         return published_of_giving(parameters)

@@ -20,7 +20,7 @@ from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_c
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
-    """The thesis's validation of the impedance control: one pulse of force or torque, and the way back to rest."""
+    """The thesis's validation of the impedance control: one pulse of force or torque, and the return to rest."""
 
     name: ClassVar[str] = "flyer_impedance"
     title: ClassVar[str] = "a free-flyer yields to a push against its gripper and comes back"
@@ -76,26 +76,26 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         return s
 
     def stop_time(self, parameters: ImpedanceParameters) -> Fraction:
-        """Return the end of the push and the patience for the way back."""
+        """Return the end of the push, plus the patience for the return to rest."""
         return parameters.stop
 
     def evaluator(self, parameters: ImpedanceParameters) -> ImpedanceEvaluator:
-        """Return the judge of one push."""
+        """Return the evaluator of one push."""
         return ImpedanceEvaluator(parameters)
 
     def cycle(self) -> tuple[str, ...]:
-        """Return the robot's own computing."""
+        """Return the unit that runs on the robot's computer."""
         return ("impedance",)
 
     def published(self, parameters: ImpedanceParameters) -> Sequence[PublishedValue]:
-        """Return how far robot and impedance model differ at most."""
+        """Return the published bounds of the difference between robot and impedance model."""
         return published_of_push(parameters)
 
     def draw(
         self, parameters: ImpedanceParameters, evaluator: ImpedanceEvaluator, record: Record, folder: Path
     ) -> list[Figure]:
         """Draw the scene at three moments."""
-        from handover.scenarios.free_flyer.figures import draw_moments  # what draws takes long to load
+        from handover.scenarios.free_flyer.figures import draw_moments  # matplotlib is slow to import
 
         return [draw_moments(evaluator.errors(), parameters, record, folder)]
 

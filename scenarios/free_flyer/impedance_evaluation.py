@@ -1,6 +1,7 @@
-"""Judges by ground truth how the robot yields to a push and comes back.
+"""Evaluates by ground truth how the robot yields to a push and comes back to rest.
 
-The error that the impedance model calls for, from the motion that took place. [Fernandes2020] eqs. (3.26), (4.4).
+The gripper's pose error is compared with the one by the impedance model, [Fernandes2020] eqs. (3.26), (4.4), which
+`errors_of` computes from the actual motion.
 """
 
 import math
@@ -26,7 +27,7 @@ MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.
 
 @dataclass(frozen=True)
 class Motion:
-    """What was seen at communication points, one row each, in W and SI units; quaternions scalar first.
+    """The motion and the push at communication points, one row each, in W and SI units; quaternions scalar first.
 
     The wrench `f_G`, `tau_G` of a row acted on the gripper from the row before until this one.
     """
@@ -51,8 +52,8 @@ class Errors:
 
     Attributes:
         t: time, s.
-        p, p_model: position error as it was and as the model calls for, shape (rows, 3), in W, m.
-        R, R_model: orientation error likewise, as a rotation vector in W, rad; whole turns more or less do not count.
+        p, p_model: position error, actual and by the model, shape (rows, 3), in W, m.
+        R, R_model: orientation error likewise, as a rotation vector in W, rad, up to whole turns.
     """
 
     t: Floats
@@ -64,7 +65,7 @@ class Errors:
     @property
     def disagreement(self) -> tuple[float, float]:
         """Greatest difference along any axis, m and rad; of orientations, the turn from one to the other."""
-        from scipy.spatial.transform import Rotation  # long to load, and used when a run has ended
+        from scipy.spatial.transform import Rotation  # slow to import, and needed only after a run
 
         apart = Rotation.from_rotvec(-self.R) * Rotation.from_rotvec(self.R_model)
         turn: Floats = np.array(apart.as_rotvec())
@@ -72,7 +73,7 @@ class Errors:
 
     @property
     def without_jumps(self) -> tuple[Floats, Floats]:
-        """R, and of the rotation vectors that mean R_model the ones nearest to R; not a number where they turn over."""
+        """R, and of the rotation vectors that mean R_model the ones nearest to R; NaN where they jump by a turn."""
         both = np.array(self.R), _nearest(self.R_model, self.R)
         for turns in both:
             turns[1:][np.linalg.norm(np.diff(turns, axis=0), axis=1) > np.pi] = np.nan
@@ -83,8 +84,8 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     """Return the errors by eq. (4.4), k_D xt' = B_x x'' + (C_x + k_B) x' - f_ext, with rest at no rotation.
 
     Velocities are twists, so B_x x'' + C_x x' - f_ext is the propulsion's wrench, taken at the gripper: what changes
-    the body's momentum, less the push. It is got as the mean over a step, in which the push counts by its impulse. All
-    else is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
+    the body's momentum, less the push. It is computed as the mean over a step, with the push's impulse. All else
+    is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
     the mean is turned back by half the step's turn.
     """
     from scipy.spatial.transform import Rotation
@@ -143,14 +144,14 @@ _BAND = f"{1000 * _REST_POSITION:.0f} mm and {_REST_ANGLE:g} rad"
 _MODEL = "[Fernandes2020] eq. (4.4)"
 
 _RESTING = 5.0
-"""How long it must stay within them, s (assumed)."""
+"""How long the errors must stay below these, s (assumed)."""
 
 _SPINNING = 60.0
-"""Rate at which control counts as lost, rad/s: more than the greatest push can bring about (assumed)."""
+"""Angular speed at which control counts as lost, rad/s: more than the strongest push can cause (assumed)."""
 
 
 class ImpedanceEvaluator(Evaluator):
-    """Follows one push and tells whether the robot came back to rest and moved as the impedance model says.
+    """Follows one push and decides whether the robot came back to rest and moved as by the impedance model.
 
     Raises:
         KeyError: `paper.toml` lacks the place of rest.
@@ -199,11 +200,11 @@ class ImpedanceEvaluator(Evaluator):
         return max(0.0, self._astray - self.parameters.end)
 
     def errors(self) -> Errors:
-        """Return the errors as they were and as the model calls for."""
+        """Return the errors, actual and by the model."""
         return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour)
 
     def outcome(self) -> Outcome:
-        """Return whether the robot rests again and agreed with the model, why, and the figures."""
+        """Return whether the robot rests again and agreed with the model, why, and the metrics."""
         if len(self._rows) < 2:
             return Outcome(success=False, reason="stopped before the first step")
         by = self.errors().disagreement
@@ -238,7 +239,7 @@ class ImpedanceEvaluator(Evaluator):
         return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}"
 
     def _back(self) -> str:
-        """Tell whether the gripper came back to rest."""
+        """Return whether the gripper came back to rest, as a clause of the reason."""
         p = self.parameters
         if self._at_rest:
             return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after the push"

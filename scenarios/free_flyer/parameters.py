@@ -1,9 +1,4 @@
-"""Parameters of a handover in microgravity; origins of the defaults are in `paper.toml`.
-
-Parameters of a push against the robot's gripper; origins of the defaults are in `paper.toml`.
-
-How the robot answers a push at its gripper. [Fernandes2020] table 4.1.
-"""
+"""Parameters of the free-flyer's handovers, and of a push against its gripper; `paper.toml` has their origins."""
 
 import enum
 from dataclasses import dataclass
@@ -16,7 +11,7 @@ from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Second
 
 
 class Behaviour(enum.IntEnum):
-    """The two settings of the impedance controller."""
+    """Settings of the impedance controller: how the robot yields to a push. [Fernandes2020] table 4.1."""
 
     RIGID = 0
     COMPLIANT = 1
@@ -71,15 +66,15 @@ class ImpedanceParameters:
     duration: Second = parameter(0.5, "how long the push lasts", minimum=0.0, maximum=60.0)
     ideal: bool = parameter(True, "whether the thrusters have neither limits nor lag, as the published plots need")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
-    delay_known: bool = parameter(True, "whether the controller is told the delay, and refuses one it is unstable with")
+    delay_known: bool = parameter(True, "whether the controller knows the delay, and rejects one it is unstable with")
     patience: Second = parameter(60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0)
 
     @property
     def end(self) -> float:
-        """When the push ends, s."""
+        """Time at which the push ends, s."""
         return self.begin + self.duration
 
     @property
     def stop(self) -> Fraction:
-        """When a run ends at the latest, in seconds."""
+        """Time at which a run ends at the latest, in seconds."""
         return Fraction(round((self.end + self.patience) * 1000), 1000)

@@ -1,8 +1,7 @@
-"""Curves of a handover in microgravity over time, as in [Fernandes2020] figs. 4.29-4.38: paths, gripper, thrust.
+"""Curves over time of the free-flyer's handovers and pushes.
 
-Curves of a push over time: errors as in [Fernandes2020] figs. 4.5-4.16, the push, and thrust.
-
-Curves over time of the wrench that is commanded and of the one that the thrusters give.
+Of a handover: positions, orientations, gripper and thrust, as in [Fernandes2020] figs. 4.29-4.38. Of a push: errors, as
+in figs. 4.5-4.16, the push, and thrust. Both show the commanded wrench beside that of the thrusters (`plot_thrust`).
 """
 
 from collections.abc import Sequence
@@ -26,7 +25,7 @@ from handover.scenarios.free_flyer.impedance_evaluation import MOTION_SIGNALS, M
 from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Wrench
 
 _BEYOND = 2.0
-"""How far plots reach beyond what the thrusters give at most: a command may be twenty times as much."""
+"""Range of the plots, over the thrusters' maximum output: a command may be twenty times as much."""
 _QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N·m"))
 
 CAPTION = "Force and torque on the robot in B; dotted: as commanded, where the thrusters give less, cut off far beyond."
@@ -175,7 +174,7 @@ def _speed(parameters: HandoverParameters, record: Record, phases: Sequence[Phas
 
 
 def _threshold(parameters: HandoverParameters, record: Record, phases: Sequence[Phase]) -> Floats:
-    """Return the speed, m/s, that the robot takes for a pull or a push, not a number while it does not wait for it.
+    """Return the speed, m/s, that the robot takes for a pull or a push, NaN while it does not wait for it.
 
     It waits for a pull while it has the object, for a push else; who has it as the robot gives its signal decides.
     """
@@ -208,11 +207,11 @@ def _forces(record: Record) -> TimePlot:
 
 _PUSH_PALETTE = ("actual", "calculated")
 _AXES: dict[str, Stroke] = {"x": "solid", "y": "dashed", "z": "dotted"}
-"""Two of them have no part in the push."""
+"""Strokes by axis: two of the three curves are zero and coincide."""
 
 
 def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[TimeFigure]:
-    """Return errors beside those that the model calls for, thrust, and the push; nothing of a single instant."""
+    """Return the figures of actual and calculated errors, and of the push with thrust; none of a single instant."""
     if len(record.time) < 2:
         return []
     motion = Motion(record.time, *(record[name] for name in MOTION_SIGNALS))
@@ -223,8 +222,8 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
     return [
         TimeFigure(
             name="errors",
-            caption="Error of the gripper's pose, rest minus actual, in the whole run, and as [Fernandes2020] "
-            f"eq. (4.4) calls for; {_told(parameters)}.",
+            caption="Error of the gripper's pose, rest minus actual, in the whole run, and by [Fernandes2020] "
+            f"eq. (4.4); {_push_in_words(parameters)}.",
             plots=[
                 *_errors("position", "mm", 1000 * errors.p, 1000 * errors.p_model, phases),
                 *_errors("orientation", "°", turned, turned_model, phases),
@@ -248,7 +247,7 @@ def _phases(p: ImpedanceParameters, end: float) -> list[Phase]:
     ]
 
 
-def _told(p: ImpedanceParameters) -> str:
+def _push_in_words(p: ImpedanceParameters) -> str:
     what = f"pushed with {p.force:g} N along" if p.kind is Wrench.FORCE else f"twisted with {p.torque:g} N·m about"
     return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
 

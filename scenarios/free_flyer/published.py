@@ -1,23 +1,22 @@
-"""What the thesis tells of pushes and handovers with given parameters. [Fernandes2020] sec. 4.1, 4.3."""
+"""The thesis's results for pushes and handovers with given parameters. [Fernandes2020] sec. 4.1, 4.3."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from handover.scenarios.experiment.paper import PublishedValue
-from handover.scenarios.free_flyer.parameters import HandoverParameters, Wrench
-from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushParameters
+from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Wrench
 
 _PAPER = "free_flyer"
 
 
-def published_of_push(p: PushParameters) -> Sequence[PublishedValue]:
+def published_of_push(p: ImpedanceParameters) -> Sequence[PublishedValue]:
     """Return the bounds of how far robot and impedance model differ; nothing for other pushes than the published."""
-    given = PushParameters()
-    alike = p.force == given.force if p.kind is Wrench.FORCE else p.torque == given.torque
-    if not alike or not p.ideal or p.delay:
+    default = ImpedanceParameters()
+    same = p.force == default.force if p.kind is Wrench.FORCE else p.torque == default.torque
+    if not same or not p.ideal or p.delay:
         return ()
-    note = "over all pushes and twists; how long they lasted is not told"
+    note = "over all pushes and twists; how long they lasted is not stated"
     return [
         PublishedValue(
             metric=f"disagreement_{what}",
@@ -32,7 +31,7 @@ def published_of_push(p: PushParameters) -> Sequence[PublishedValue]:
 
 
 def published_of_giving(p: HandoverParameters) -> Sequence[PublishedValue]:
-    """Return what is told of handovers from robot to human at the published place."""
+    """Return the published values of handovers from robot to human at the published place."""
     if not _is_published(p):
         return ()
     return [
@@ -41,20 +40,20 @@ def published_of_giving(p: HandoverParameters) -> Sequence[PublishedValue]:
             paper=_PAPER,
             name="transfer_displacement_z",
             index=(int(p.behaviour),),
-            note="of one run; how strongly the person pulled is not told",
+            note="of one run; how strongly the person pulled is not stated",
         ),
         _threshold(p, "velocity_hand"),
         PublishedValue(
             metric="phase_move_to_handover",
             paper=_PAPER,
             name="fetched",
-            note="where the object is at first is not told; it was put where the robot has it about then",
+            note="the object's first place is not stated; it was chosen such that the robot has it about then",
         ),
     ]
 
 
 def published_of_receiving(p: HandoverParameters) -> Sequence[PublishedValue]:
-    """Return what is told of handovers from human to robot at the published place."""
+    """Return the published values of handovers from human to robot at the published place."""
     return [_threshold(p, "velocity_gripper")] if _is_published(p) else ()
 
 

@@ -10,11 +10,11 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, faceted, hull
 from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
 
-_PUSH, _TWIST, _WAY = "#d1602b", "#8357a8", "#b58a1b"
+_PUSH, _TWIST, _PATH = "#d1602b", "#8357a8", "#b58a1b"
 _PER_NEWTON, _PER_NEWTON_METRE = 0.04, 0.08
 """Lengths of arrows, m/N and m/(N m)."""
 _ARROW_HEAD, _CLEAR, _AXIS_LENGTH = 0.7, 0.035, 0.12
-"""Where along an arrow its head begins, how far from G it keeps, m, and length of the axes of a frame, m."""
+"""Share of an arrow before its head, its distance from G, m, and length of the axes of a frame, m."""
 _AXES = ("#c0392b", "#2e8b57", "#2f6db5")
 
 
@@ -35,10 +35,10 @@ def replay_push(record: Record) -> Replay:
         ("push", _PUSH, _PER_NEWTON * record["push.f_G"]),
         ("twist", _TWIST, _PER_NEWTON_METRE * record["push.tau_G"]),
     )
-    way = Line(label="way of the gripper", colour=_WAY, points=record["robot.p_WG"][:, None], trail=True)
+    path = Line(label="path of the gripper", colour=_PATH, points=record["robot.p_WG"][:, None], trail=True)
     return Replay(
         bodies=_robot(record, np.zeros(len(record.time))),
-        lines=[way, *(_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along))],
+        lines=[path, *(_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along))],
         fixed=_frame("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
         eye=(-1.0, -1.15, 0.6),
         notes=(f"Arrows: {1000 * _PER_NEWTON:.0f} mm a newton, {1000 * _PER_NEWTON_METRE:.0f} mm a newton metre.",),
@@ -49,15 +49,15 @@ def _robot(record: Record, gap: Floats) -> list[Body]:
     """Return cube, arm with palm, and jaws with a gap between them, shape (rows,), m."""
     p_WB, q_WB = record["robot.p_WB"], record["robot.q_WB"]
     cube, arm, palm, *jaws = robot_at(record, 0, 0.0)
-    made = [
+    bodies = [
         Body(label=label, colour=part.colour, mesh=_own(part, p_WB[0], q_WB[0]), p_WB=p_WB, q_WB=q_WB)
         for label, part in (("robot", cube), ("arm", arm), ("gripper", palm))
     ]
     z_B = Rotation.from_quat(q_WB, scalar_first=True).as_matrix()[:, :, 2]
     for jaw, side in zip(jaws, (0.5, -0.5), strict=True):
         p_WJ = p_WB + side * gap[:, None] * z_B
-        made.append(Body(label="gripper", colour=jaw.colour, mesh=_own(jaw, p_WB[0], q_WB[0]), p_WB=p_WJ, q_WB=q_WB))
-    return made
+        bodies.append(Body(label="gripper", colour=jaw.colour, mesh=_own(jaw, p_WB[0], q_WB[0]), p_WB=p_WJ, q_WB=q_WB))
+    return bodies
 
 
 def _person(record: Record) -> list[Body]:
@@ -81,16 +81,16 @@ def _fingers(record: Record) -> list[Line]:
     R_WH = Rotation.from_quat(record["person.q_WH"], scalar_first=True).as_matrix()
     bent = [finger_points(angles) for angles in record["person.finger"]]
     colour = person_at(record, 0)[1].colour
-    made: list[Line] = []
+    fingers: list[Line] = []
     for chain in zip(*bent, strict=True):
         points = p_WH[:, None] + np.einsum("rij,rnj->rni", R_WH, np.array(chain))
         radii = np.full(points.shape[1], FINGER_WIDTH / 2)
-        made.append(Line(label="hand", colour=colour, points=points, radii=radii))
-    return made
+        fingers.append(Line(label="hand", colour=colour, points=points, radii=radii))
+    return fingers
 
 
 def _own(solid: Solid, p_WB: Floats, q_WB: Floats) -> Mesh:
-    """Return a solid in the frame of a body that it belongs to, whose pose at the same time is given."""
+    """Return a solid's mesh in its body's frame, from the body's pose at the same time."""
     return faceted(hull(np.round((solid.corners - p_WB) @ rotation_of(q_WB), 9)))
 
 

@@ -1,6 +1,6 @@
-"""How the free-flyer's units are wired: the robot with its thrusters and one or two controllers that command them.
+"""Wiring that the free-flyer's scenarios share: the robot, its thrusters, and one or two controllers that command them.
 
-What the robot's controllers found out about their own closed loops at the start.
+Also the metrics of the controllers' closed loops, which they compute by their own models at the start.
 """
 
 import math
@@ -19,34 +19,34 @@ _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
 
 
 def arm() -> Floats:
-    """Return p_BG, m, which the robot and what its controllers know of it share."""
+    """Return p_BG, m, the same for the robot and for the controllers' models of it."""
     return np.array(paper_values("free_flyer", "robot")["p_BG"])
 
 
 def expected_lag(ideal: bool) -> float:
-    """Return the lag of the thrusters that the controllers reckon with, s."""
+    """Return the lag of the thrusters that the controllers assume, s."""
     return 0.0 if ideal else float(paper_values("free_flyer", "thrusters")["lag"])
 
 
 def wire_controller(s: System, controller: PlacedUnit, robot: PlacedUnit, thrusters: PlacedUnit) -> None:
-    """Let a controller see where the robot takes itself to be, and command the thrusters."""
+    """Connect the robot's estimate of its state to a controller, and the controller to the thrusters."""
     wire_estimate(s, robot, controller)
     for what in ("f", "tau"):
         s.connect(getattr(controller.y, f"{what}_cmd"), getattr(thrusters.u, f"{what}_{controller.name}"))
 
 
 def wire_estimate(s: System, robot: PlacedUnit, observer: PlacedUnit) -> None:
-    """Let a unit see where the robot takes itself to be."""
+    """Connect the robot's estimate of its state to a unit."""
     for name in _MEASURED:
         s.connect(getattr(robot.y, name), getattr(observer.u, name))
 
 
-def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, outside: PlacedUnit) -> None:
-    """Let thrust act on the robot, and something outside on its gripper."""
+def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, external: PlacedUnit) -> None:
+    """Connect the thrust to the robot, and an external wrench to its gripper."""
     for name in ("f_B", "tau_B"):
         s.connect(getattr(thrusters.y, name), getattr(robot.u, name))
     for name in ("f_G", "tau_G"):
-        s.connect(getattr(outside.y, name), getattr(robot.u, name))
+        s.connect(getattr(external.y, name), getattr(robot.u, name))
 
 
 def wire_handover(s: System) -> None:
@@ -67,26 +67,26 @@ def wire_handover(s: System) -> None:
         s.connect(getattr(decision.y, name), getattr(person.u, name))
 
 
-_SLOWEST = {"pose": "the slowest mode, the integrator's"}
+_SLOWEST_MODE = {"pose": "the slowest mode, the integrator's"}
 _PERIOD = 2 / 125
 """Period of the controllers, s."""
 
 
 def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str, Metric]:
     """Return the outermost pole's margin and decay, and the least damping ratio, of each controller's closed loop."""
-    made: dict[str, Metric] = {}
+    metrics: dict[str, Metric] = {}
     for name in controllers:
         radius, damping, frequency = (
             float(signals[f"{name}.{what}"]) for what in ("pole_radius", "damping_ratio", "pole_frequency")
         )
         text = f"{name} control, by its own model"
-        made[f"pole_margin_{name}"] = Metric(
+        metrics[f"pole_margin_{name}"] = Metric(
             1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {text}"
         )
         slowest = -_PERIOD / math.log(radius) if 0.0 < radius < 1.0 else math.inf
-        made[f"slowest_decay_{name}"] = Metric(
-            slowest, "s", f"time constant of {_SLOWEST.get(name, 'the slowest mode')}: {text}"
+        metrics[f"slowest_decay_{name}"] = Metric(
+            slowest, "s", f"time constant of {_SLOWEST_MODE.get(name, 'the slowest mode')}: {text}"
         )
-        made[f"damping_ratio_{name}"] = Metric(damping, "1", f"least damping ratio: {text}")
-        made[f"frequency_{name}"] = Metric(frequency, "rad/s", f"frequency of the least damped poles: {text}")
-    return made
+        metrics[f"damping_ratio_{name}"] = Metric(damping, "1", f"least damping ratio: {text}")
+        metrics[f"frequency_{name}"] = Metric(frequency, "rad/s", f"frequency of the least damped poles: {text}")
+    return metrics

@@ -1,4 +1,4 @@
-"""Pictures of cube, arm, gripper, hand and object, drawn to scale from the side and from above."""
+"""The free-flyer's scene as solids, drawn to scale from the side and from above: cube, arm, gripper, hand, object."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -42,8 +42,8 @@ _ROOTS = (
 _NEAR = np.array([0.20, 0.20, 0.20])
 """Half the sides of a window for pictures from near, m."""
 
-_MARGIN, _MAX_ASPECT_RATIO = 0.05, 3.0
-"""Room around a scene, and its greatest side that is shown as a whole, m."""
+_MARGIN, _MAX_SIDE = 0.05, 3.0
+"""Margin around a scene, and the longest side up to which it is shown as a whole, m."""
 
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _FACES = np.array([[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]])
@@ -109,7 +109,7 @@ def person_at(record: Record, row: int) -> list[Solid]:
 
 
 def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Path) -> Figure:
-    """Draw moments beside each other, by their titles, from the side and from above; the caption tells what is seen."""
+    """Draw moments beside each other, by their titles, from the side and from above; the caption gives colours."""
     windows = _windows(moments)
     sides = windows[0][1] - windows[0][0]
     heights = [float(sides[view.axes[1]]) for view in _VIEWS]
@@ -124,13 +124,13 @@ def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Pat
 
 
 def _windows(moments: Mapping[str, Sequence[Solid]]) -> list[tuple[Floats, Floats]]:
-    """Return the least and greatest corner of what each moment's pictures show, of the same sides for all.
+    """Return minimum and maximum corner of what each moment's pictures show, of equal size for all.
 
     It is the same part of the cabin if that is not too large, else a part of it around what is there.
     """
     corners = [np.concatenate([s.corners for s in solids]) for solids in moments.values()]
     lows, highs = np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
-    if np.all(highs.max(axis=0) - lows.min(axis=0) < _MAX_ASPECT_RATIO):
+    if np.all(highs.max(axis=0) - lows.min(axis=0) < _MAX_SIDE):
         return [(lows.min(axis=0) - _MARGIN, highs.max(axis=0) + _MARGIN)] * len(corners)
     half = (highs - lows).max(axis=0) / 2 + _MARGIN
     return [((low + high) / 2 - half, (low + high) / 2 + half) for low, high in zip(lows, highs, strict=True)]
@@ -153,18 +153,18 @@ def finger_points(finger: Floats) -> list[Floats]:
     Args:
         finger: angles of the joints, shape (14,), rad.
     """
-    made: list[Floats] = []
+    chains: list[Floats] = []
     for (root, along, lengths), angles in zip(_ROOTS, _split(finger), strict=True):
         bent = np.cumsum(angles)[:, None]
         ahead = np.cos(bent) * np.array(along) - np.sin(bent) * np.array([0.0, 0.0, 1.0])
         first = _PALM_OF_HAND + np.array(root)
-        made.append(np.vstack([first, first + np.cumsum(np.array(lengths)[:, None] * ahead, axis=0)]))
-    return made
+        chains.append(np.vstack([first, first + np.cumsum(np.array(lengths)[:, None] * ahead, axis=0)]))
+    return chains
 
 
 def _fingers(p_WH: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
     """Return the segments of thumb and fingers."""
-    made: list[Solid] = []
+    segments: list[Solid] = []
     for points, (_, along, _) in zip(finger_points(finger), _ROOTS, strict=True):
         side = np.cross([0.0, 0.0, 1.0], along)
         for start, end in pairwise(points):
@@ -172,8 +172,8 @@ def _fingers(p_WH: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
             ahead = (end - start) / length
             R_HF = np.column_stack([ahead, side, np.cross(ahead, side)])
             middle = p_WH + R_WH @ ((start + end) / 2)
-            made.append(_box(middle, R_WH @ R_HF, (length, FINGER_WIDTH, FINGER_WIDTH), _SKIN))
-    return made
+            segments.append(_box(middle, R_WH @ R_HF, (length, FINGER_WIDTH, FINGER_WIDTH), _SKIN))
+    return segments
 
 
 def _split(finger: Floats) -> list[Floats]:
@@ -185,7 +185,7 @@ def _box(p_WX: Floats, R_WX: Floats, sides: tuple[float, float, float], colour: 
 
 
 def _draw(axes: Axes, solids: Sequence[Solid], view: _View, low: Floats, high: Floats) -> None:
-    """Draw the faces that look at the eye, the farthest first, the darker the more they turn away."""
+    """Draw the faces that are turned to the viewer, the farthest first, the darker the more oblique."""
     i, j = view.axes
     faces: list[tuple[Floats, Solid]] = [(np.take(s.corners, f, axis=0), s) for s in solids for f in _FACES]
     drawn: list[tuple[float, Floats, tuple[float, ...]]] = []

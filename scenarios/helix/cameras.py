@@ -1,6 +1,6 @@
-"""The two calibrated cameras of the experiment: what the camera unit takes pictures by and the detector measures by.
+"""The two calibrated cameras of the experiment: the camera unit and the detector get the same calibration.
 
-The thesis calibrates with a box of known corners and gets both cameras' places from it ([Vervloet2025] sec. 3.2.2);
+The thesis calibrates with a box of known corners and gets both cameras' poses from it ([Vervloet2025] sec. 3.2.2);
 here the calibration is taken as perfect, which is an assumption. The values are those of `paper.toml`.
 """
 
@@ -14,15 +14,15 @@ from handover.scenarios.experiment.paper import paper_values
 
 def calibration() -> dict[str, Any]:
     """Return both cameras' calibration under the names of the units' parameters."""
-    facts = {name: np.array(value) for name, value in paper_values("helix", "camera").items()}
-    found: dict[str, Any] = {}
+    camera = {name: np.array(value) for name, value in paper_values("helix", "camera").items()}
+    parameters: dict[str, Any] = {}
     for i, side in enumerate(("left", "right")):
-        p_WC = facts["p_WC"][i]
-        found[f"p_WC_{side}"] = p_WC
-        found[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, facts["looked_at"]))
-        found[f"intrinsics_{side}"] = facts["intrinsics"][i]
-        found[f"distortion_{side}"] = facts["distortion"][i]
-    return found
+        p_WC = camera["p_WC"][i]
+        parameters[f"p_WC_{side}"] = p_WC
+        parameters[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, camera["looked_at"]))
+        parameters[f"intrinsics_{side}"] = camera["intrinsics"][i]
+        parameters[f"distortion_{side}"] = camera["distortion"][i]
+    return parameters
 
 
 def camera_of(side: str) -> Pinhole:

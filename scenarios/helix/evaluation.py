@@ -1,8 +1,7 @@
-"""Judges a Helix handover by ground truth, which the arm's controller does not see.
+"""Evaluates a Helix handover by ground truth, which the arm's controller does not see.
 
-How far the controller's model of the arm is from the arm that the cameras see. [Vervloet2025] sec. 4.2, fig. 9.
-
-What both cameras saw at one moment, with what vision found in it and where the controller took things to be.
+Besides the verdict, `HandoverEvaluator` measures how far the controller's model of the arm is from the arm that
+the cameras see ([Vervloet2025] sec. 4.2, fig. 9), and keeps marked pictures of both cameras.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,7 +26,7 @@ _W_FROM_B = np.array([1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1)
 
 
 class ModelMismatch(NamedTuple):
-    """Distances of fig. 9, m: of gripper and model from where the gripper hangs after calibration, and between them."""
+    """Distances of fig. 9, m: of gripper and model from the gripper's position after calibration, and between them."""
 
     arm_travel: float
     model_travel: float
@@ -41,17 +40,17 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
         q_sys: commanded state, shape (9,), rad and m.
         p_WG_est: filtered measured position of the gripper in W, shape (3,), m.
     """
-    stated = paper_values("helix", "servo")
-    d_gripper = float(stated["d_gripper"])
+    servo = paper_values("helix", "servo")
+    d_gripper = float(servo["d_gripper"])
     p_WG_sys = _W_FROM_B * forward_kinematics(q_sys, d_gripper)[3:]
-    p_WG_calib = np.array([0.0, 0.0, -sum(stated["l_calib"]) - d_gripper])
+    p_WG_calib = np.array([0.0, 0.0, -sum(servo["l_calib"]) - d_gripper])
     between = (p_WG_est - p_WG_calib, p_WG_sys - p_WG_calib, p_WG_sys - p_WG_est)
     return ModelMismatch(*(float(np.linalg.norm(d)) for d in between))
 
 
 MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
 _PERIOD = Fraction(1, 30)
-"""Of camera and vision, s."""
+"""Period of camera and vision, s."""
 
 _SHAPE = (720, 1280, 3)
 _SHAPES = {"p_WO": ("ball", "circle"), "p_WR": ("wrist", "cross"), "p_WG": ("gripper", "plus")}
@@ -59,9 +58,9 @@ _SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.se
 
 
 def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals) -> list[CameraPicture]:
-    """Return the pictures of both cameras that hold at a time, with marks.
+    """Return the current pictures of both cameras at a time, with marks.
 
-    Vision looks at a picture at the instant at which it is taken, so what it says is of the pictures that hold with it.
+    Vision processes a picture at the instant at which it is taken, so its measurements belong to the current pictures.
     The controller's estimates are those of its last period.
     """
     return [
@@ -77,7 +76,7 @@ def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals)
 
 
 def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
-    """Return whether a lens was covered when the picture that holds at time t was taken."""
+    """Return whether a lens was covered when the picture that is current at time t was taken."""
     begin, end = parameters.covered(side)
     taken = float(int(t / float(_PERIOD) + 1e-6) * _PERIOD)
     return begin <= taken < end
@@ -99,7 +98,7 @@ def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
 def _mark(side: Cover, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
     """Yield the mark of a point, unless it is behind the camera."""
     from handover.controllers.helix.handover_vision import (
-        Params as Vision,  # long to load for who only lists parameters
+        Params as Vision,  # slow to import, and listing parameters imports this module
     )
 
     camera = _camera(side)
@@ -127,14 +126,14 @@ _COVERED = "lens covered"
 
 
 class HandoverEvaluator(Evaluator):
-    """Follows one handover, keeps pictures of moments that tell of it, and tells how it ended.
+    """Follows one handover, keeps pictures of its key moments, and decides whether it succeeded.
 
     Attributes:
         phases: the controller's phases and when each was first entered, in s.
 
     Args:
         parameters: the scenario's.
-        pictures: what the cameras saw, where signals hold no pictures; else they are taken.
+        pictures: those that were kept, where a record is evaluated, which has no pictures; None: they are taken.
     """
 
     def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
@@ -169,7 +168,7 @@ class HandoverEvaluator(Evaluator):
             self._keep(_MOMENTS[phase], signals)
         if phase == "GRASP" and phase not in self.phases:
             self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"])
-        if self._hides(t):
+        if self._is_first_covered(t):
             self._keep(_COVERED, signals)
         self.phases.setdefault(phase, t)
         if holder == "GRIPPER" and self._released_at is None:
@@ -183,7 +182,7 @@ class HandoverEvaluator(Evaluator):
     def pictures(self) -> Sequence[CameraPicture]:
         """Return what the cameras saw at the start, on first entering a phase, through a covered lens, and at the end.
 
-        Moments that did not come, or came at the time of another, are not there.
+        Moments that were not reached, or that coincide with another, are left out.
         """
         return tuple(self._pictures)
 
@@ -191,8 +190,8 @@ class HandoverEvaluator(Evaluator):
         if self._takes and all(picture.t != self._t for picture in self._pictures):
             self._pictures += take_pictures(self._t, role, self.parameters, signals)
 
-    def _hides(self, t: float) -> bool:
-        """Return whether a lens is covered in the pictures that hold at t, for the first time."""
+    def _is_first_covered(self, t: float) -> bool:
+        """Return whether a lens is covered in the current pictures, for the first time."""
         p = self.parameters
         if p.cover is Cover.NONE or any(picture.role == _COVERED for picture in self._pictures):
             return False
@@ -220,17 +219,17 @@ class HandoverEvaluator(Evaluator):
         return float(np.linalg.norm(self._p_WG - self._p_WO))
 
     def outcome(self) -> Outcome:
-        """Return whether the gripper has the ball, why, and the figures."""
+        """Return whether the gripper has the ball, why, and the metrics."""
         success = self._holder == "GRIPPER"
-        begun = self.phases.get("GRASP")
+        grasp_began = self.phases.get("GRASP")
         metrics = {
             "final_distance": Metric(self.distance, "m", "gripper to ball at the end, ground truth"),
         }
         if np.isfinite(self._nearest):  # else the controller never saw ball and arm, and its error means nothing
             metrics["controller_error"] = Metric(self._error, "m", "error that the controller saw last")
-        if begun is not None:
-            steps = round(begun / float(self.parameters.period)) + 1
-            metrics["arm_time"] = Metric(begun, "s", "from the start until the gripper begins to close")
+        if grasp_began is not None:
+            steps = round(grasp_began / float(self.parameters.period)) + 1
+            metrics["arm_time"] = Metric(grasp_began, "s", "from the start until the gripper begins to close")
             metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
         if self._released_at is not None:
             metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the hand lets go")

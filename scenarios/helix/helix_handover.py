@@ -1,6 +1,6 @@
 """A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1.
 
-What the thesis tells of a handover with given parameters. [Vervloet2025] table 1, sec. 5.2.
+The thesis's own results for such a handover are those of table 1 and sec. 5.2 (`published_of`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,27 +25,29 @@ _PAPER = "helix"
 
 
 def published_of(p: Parameters) -> Sequence[PublishedValue]:
-    """Return the times and steps of table 1 for its step sizes, and for the least of them how far its model was off.
+    """Return the times and steps of table 1 for its step sizes, and for the smallest of them the model's error.
 
-    Nothing for other step sizes, where the ball is elsewhere, or where a lens is covered.
+    Nothing for other step sizes, another place of the ball, or a covered lens.
     """
-    entries, given = paper_values(_PAPER, "experiment"), Parameters()
-    fits = np.flatnonzero(np.isclose(entries["alpha"], p.alpha))
-    if not len(fits) or (p.radius, p.height) != (given.radius, given.height) or p.cover is not Cover.NONE:
+    published, default = paper_values(_PAPER, "experiment"), Parameters()
+    matches = np.flatnonzero(np.isclose(published["alpha"], p.alpha))
+    if not len(matches) or (p.radius, p.height) != (default.radius, default.height) or p.cover is not Cover.NONE:
         return ()
-    k = int(fits[0])
+    k = int(matches[0])
     period = paper_values(_PAPER, "published")["timestep_mean"][k]
-    apart = [] if np.isclose(p.control_period, period) else [f"its control period was {period:g} s"]
-    apart += [] if p.tuning is Tuning.THESIS else ["its settings were those of tuning=thesis"]
-    note = " and ".join(apart)
+    differences = [] if np.isclose(p.control_period, period) else [f"its control period was {period:g} s"]
+    differences += [] if p.tuning is Tuning.THESIS else ["its settings were those of tuning=thesis"]
+    note = " and ".join(differences)
     span = ("arm_time_min", "arm_time_max")
     values = [
         PublishedValue(metric="arm_time", paper=_PAPER, name="arm_time_median", index=(k,), span=span, note=note),
-        PublishedValue(metric="steps", paper=_PAPER, name="steps_median", index=(k,), note=" and ".join(apart[-1:])),
+        PublishedValue(
+            metric="steps", paper=_PAPER, name="steps_median", index=(k,), note=" and ".join(differences[-1:])
+        ),
     ]
     if k == 0:
         values += [
-            PublishedValue(metric=metric, paper=_PAPER, name=metric, note="of one run, whose place is not told")
+            PublishedValue(metric=metric, paper=_PAPER, name=metric, note="of one run, whose place is not stated")
             for metric in ("model_mismatch", "arm_travel", "model_travel")
         ]
     return values
@@ -121,28 +123,28 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         return s
 
     def stop_time(self, parameters: Parameters) -> Fraction:
-        """Return the patience for the approach and time for closing the gripper."""
+        """Return the end of the patience for the approach, plus time for closing the gripper."""
         return Fraction(round(parameters.patience)) + 15
 
     def evaluator(self, parameters: Parameters) -> HandoverEvaluator:
-        """Return the judge of one handover."""
+        """Return the evaluator of one handover."""
         return HandoverEvaluator(parameters)
 
     def evaluator_of_record(self, parameters: Parameters, pictures: Sequence[CameraPicture]) -> HandoverEvaluator:
-        """Return an observer with the pictures that the run's folder keeps."""
+        """Return an evaluator with the pictures that the run's folder keeps."""
         return HandoverEvaluator(parameters, pictures)
 
     def cycle(self) -> tuple[str, ...]:
-        """Return the robot's own computing: seeing and controlling."""
+        """Return the units that run on the robot's computer: vision and control."""
         return ("vision", "servo")
 
     def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
-        """Return what table 1 and fig. 9 tell."""
+        """Return the values of table 1 and fig. 9."""
         return published_of(parameters)
 
     def draw(self, parameters: Parameters, evaluator: HandoverEvaluator, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
         """Draw the camera pictures of some moments."""
-        from handover.scenarios.helix.plots import draw_pictures  # what draws takes long to load
+        from handover.scenarios.helix.plots import draw_pictures  # matplotlib is slow to import
 
         pictures = evaluator.pictures()
         return [draw_pictures(pictures, folder)] if pictures else []

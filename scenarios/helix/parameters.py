@@ -35,7 +35,7 @@ class Cover(enum.IntEnum):
 
 
 class Tuning(enum.IntEnum):
-    """Settings of the controller that belong together; `paper.toml` lists them."""
+    """Sets of the controller's parameters; `paper.toml` lists their values."""
 
     OWN = 0
     THESIS = 1
@@ -70,7 +70,7 @@ class Parameters:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Return the controller's parameters that the tuning stands for."""
+        """The controller's parameters of the tuning."""
         return paper_values("helix", self.tuning.name.lower())
 
     def covered(self, side: Cover) -> tuple[float, float]:

@@ -1,7 +1,4 @@
-"""Curves of a Helix handover over time: distance to the goal, positions true and estimated, tendons, the gripper.
-
-The camera pictures of some moments of a Helix handover, for papers.
-"""
+"""Figures of a Helix handover: distance, positions, tendons and gripper over time, and camera pictures."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,14 +25,14 @@ from handover.scenarios.experiment.time_plot import (
 from handover.scenarios.helix.parameters import Parameters
 
 _FOLLOWED = (("gripper", "arm.p_WG", "servo.p_WG_est"), ("ball", "hand.p_WO", "servo.p_WO_est"))
-"""What is followed, where it is in truth, and where the controller has it."""
+"""Name, signal of the true position, and signal of the controller's estimate."""
 _PALETTE = ("gripper", "goal", "ball")
 _STROKES: tuple[Stroke, ...] = ("solid", "dashed", "dotted")
-"""Of a segment's tendons."""
+"""Strokes of a segment's three tendons."""
 
 
 def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigure]:
-    """Return distance to the goal, positions true and estimated, tendons and gripper."""
+    """Return the figures of the distance to the goal, of true and estimated positions, and of tendons and gripper."""
     phases = phases_of(record, "servo.phase")
     change, tension = 1000 * record["servo.dl_t"], record["arm.tension"]
     return [
@@ -63,7 +60,7 @@ def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigu
 
 
 def _known(record: Record, values: Floats) -> Floats:
-    """Return what the controller holds, not a number before it has seen ball and arm, when it means nothing."""
+    """Return values of the controller, NaN before it has seen ball and arm, when they are meaningless."""
     return np.where(record["servo.phase"] > 0, values, np.nan)
 
 
@@ -105,7 +102,7 @@ def _position(record: Record, axis: int, phases: Sequence[Phase]) -> TimePlot:
 
 
 def _tendons(title: str, quantity: str, unit: str, values: Floats, phases: Sequence[Phase], *, held: bool) -> TimePlot:
-    """Return three tendons of three segments each, from the base, which a segment's colour holds together."""
+    """Return a plot of three tendons in each of three segments, from the base; a segment has one colour."""
     curves = [
         Curve(
             label=f"segment {k // 3 + 1}, {120 * (k % 3)}°",
@@ -133,10 +130,11 @@ def _gripper(record: Record, phases: Sequence[Phase]) -> TimePlot:
 
 
 _SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
+"""The part of the pictures that is shown, px."""
 
 
 def draw_pictures(pictures: Sequence[CameraPicture], folder: Path) -> Figure:
-    """Draw what both cameras saw into a folder, the moments beside each other."""
+    """Draw the pictures of both cameras into a folder, the moments side by side."""
     moments = list(dict.fromkeys(p.t for p in pictures))
     n = len(moments)
     with figure(folder / "pictures", 2, n, size=(3.2 * n, 3.9)) as axes:

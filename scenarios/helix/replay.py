@@ -1,4 +1,4 @@
-"""A Helix handover in space: arm, gripper, ball, hand, the cameras, and where the controller took ball and gripper."""
+"""A Helix handover in space: arm, gripper, ball, hand, the cameras, and the estimates of ball and gripper."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.helix.shapes import Limb, gripper, hand
 from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.tendon_design import Params as ArmParams
+from handover.plants.helix.tendon_parameters import Params as ArmParams
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, merged, prism, rod
 from handover.scenarios.helix.cameras import camera_of
 
@@ -18,10 +18,12 @@ _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#7773
 _SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8357a8", "#d1602b"
 
 _PLATE_THICKNESS, _PLATE_RADIUS = 0.008, 1.15
-"""m, and over the arm's radius (assumed)."""
+"""Thickness, m, and radius over that of the arm (assumed)."""
 
 _FRUSTUM = 0.09
-"""Length of a camera's frustum as it is drawn, m."""
+"""Length at which a camera's frustum is drawn, m."""
+_PICTURE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+"""Corners of a picture, in halves of its width and height from its middle."""
 
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 _OCTAGON = np.radians(np.arange(22.5, 360.0, 45.0))
@@ -48,17 +50,17 @@ def _ball(record: Record) -> Body:
 
 
 def _plates(record: Record) -> list[Body]:
-    """Return the plates that end the arm's segments: where they are along the calibrated arm, square to it."""
+    """Return the plates at the ends of the arm's segments, placed as on the calibrated arm, normal to the backbone."""
     backbone, lengths = record["arm.backbone"], ArmParams().tendon_length
     ends = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / float(np.sum(lengths)) * (backbone.shape[1] - 1)
     radius = _PLATE_RADIUS * CameraParams().arm_radius
     outline = radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
     mesh = prism(outline, -_PLATE_THICKNESS / 2, _PLATE_THICKNESS / 2)
-    made: list[Body] = []
+    plates: list[Body] = []
     for k in np.rint(ends).astype(int):
         along = backbone[:, k + 1] - backbone[:, max(k - 1, 0)]
-        made.append(Body(label="arm", colour=_PLATE, mesh=mesh, p_WB=backbone[:, k], q_WB=_turned_to(along)))
-    return made
+        plates.append(Body(label="arm", colour=_PLATE, mesh=mesh, p_WB=backbone[:, k], q_WB=_turned_to(along)))
+    return plates
 
 
 def _turned_to(along: Floats) -> Floats:
@@ -94,12 +96,12 @@ def _fingers(record: Record) -> list[Line]:
     record_at = {name: record[f"arm.{name}"] for name in ("p_WR", "p_WG", "q_WG", "grip")}
     seen = _followed(limbs, len(record.time))  # (rows, 9, 3, 3): root to joint, joint to pad, pad to tip, three times
     first = limbs(0)
-    made: list[Line] = []
+    fingers: list[Line] = []
     for k in range(0, len(first), 3):
         points = np.stack([seen[:, k, 0], seen[:, k, 2], seen[:, k + 2, 2]], axis=1)
         radii = np.array([first[k].radii[0], first[k].radii[2], first[k + 2].radii[2]])
-        made.append(Line(label="gripper", colour=_FINGER, points=points, radii=radii))
-    return made
+        fingers.append(Line(label="gripper", colour=_FINGER, points=points, radii=radii))
+    return fingers
 
 
 def _hand_body(record: Record) -> list[Body]:
@@ -124,7 +126,7 @@ def _forearm(record: Record) -> list[Line]:
 
 
 def _estimates(record: Record) -> list[Line]:
-    """Return where the controller took ball and gripper to be, from when it knew."""
+    """Return the controller's estimates of ball and gripper, from when it has them."""
     known = (record["servo.phase"] > 0)[:, None]
     named = (("ball, estimated", "servo.p_WO_est"), ("gripper, estimated", "servo.p_WG_est"))
     return [
@@ -134,17 +136,14 @@ def _estimates(record: Record) -> list[Line]:
 
 
 def _frustum(side: str) -> Line:
-    """Return the edges of what a camera sees, near to it."""
+    """Return the edges of the front part of a camera's frustum."""
     camera = camera_of(side)
     u, v = camera.c
-    depth = _FRUSTUM * np.array([[s * u / camera.f[0], t * v / camera.f[1], 1.0] for s, t in _CORNERS])
+    depth = _FRUSTUM * np.array([[s * u / camera.f[0], t * v / camera.f[1], 1.0] for s, t in _PICTURE_CORNERS])
     corners = camera.p_WC + depth @ np.transpose(camera.R_WC)
     eye, (a, b, c, d) = camera.p_WC, corners
-    way = np.array([[eye, a, b, eye, c, d, eye, a, d, c, b]])
-    return Line(label="cameras", colour=_CAMERA, points=way, width=2.0)
-
-
-_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+    edges = np.array([[eye, a, b, eye, c, d, eye, a, d, c, b]])
+    return Line(label="cameras", colour=_CAMERA, points=edges, width=2.0)
 
 
 def _followed(limbs: Callable[[int], list[Limb]], rows: int) -> Floats:

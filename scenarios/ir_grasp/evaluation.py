@@ -1,4 +1,4 @@
-"""Judges an infrared grasp by ground truth, which the hand's controller does not see."""
+"""Evaluates an infrared grasp by ground truth, which the hand's controller does not see."""
 
 import math
 
@@ -10,7 +10,7 @@ from handover.cosim.system.signals import Signals
 from handover.plants.ir_grasp.objects import SOLIDS
 from handover.plants.ir_grasp.parameters import SEES_NOTHING
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.ir_grasp.parameters import Parameters, asked_for
+from handover.scenarios.ir_grasp.parameters import Parameters, pregrasp_position
 
 _SETTLING = 0.3
 """How long the hand rests after the shake, s (assumed)."""
@@ -29,10 +29,10 @@ _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
 
 
 class GraspEvaluator(Evaluator):
-    """Follows one grasp and tells how it ended.
+    """Follows one grasp and decides whether it succeeded.
 
     Attributes:
-        moments: times of `start`, `before closing`, `end`, in s; those that came.
+        moments: times of `start`, `before closing`, `end`, in s, as far as the run reached them.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -58,24 +58,25 @@ class GraspEvaluator(Evaluator):
         self._t, phase = t, signals.text("reflex.phase")
         if not self.moments:
             self.moments["start"], self._p_WO_start = t, signals["scene.p_WO"]
-            self._at_start = self._unknown_to_vision(signals)
+            self._at_start = self._vision_errors(signals)
         if phase != self._phase:
             self._enter(phase, signals)
         if phase in self._moves:
             self._count(phase, signals)
         elif phase in _AFTER_CLOSING:
-            self._look(signals)
+            self._measure(signals)
             self._lost_in = "" if self._held else self._lost_in or phase
 
-    def _unknown_to_vision(self, signals: Signals) -> dict[str, Metric]:
-        """Return what vision did not see: it saw the object at W's origin in its reference pose, and asked for a pose.
+    def _vision_errors(self, signals: Signals) -> dict[str, Metric]:
+        """Return how far the object was moved after vision saw it, and the errors of the pre-grasp pose by vision.
 
-        The hand begins a run-up behind the pose that it was asked for, and with that pose's heading.
+        Vision saw the object at W's origin in its reference pose. The hand starts a run-up behind the pre-grasp pose,
+        with that pose's heading.
         """
         p, yaw = self.parameters, float(signals["scene.yaw"])
         pregrasp = signals["scene.p_WH"] + p.run_up * np.array([math.cos(yaw), math.sin(yaw)])
         turned = float(signals["scene.yaw_O"]) - SOLIDS[p.thing].yaw
-        off = float(np.linalg.norm(pregrasp - asked_for(p.thing, p.standoff)))
+        off = float(np.linalg.norm(pregrasp - pregrasp_position(p.thing, p.standoff)))
         moved = float(np.linalg.norm(signals["scene.p_WO"]))
         return {
             "moved": Metric(moved, "m", "how far the object was moved after vision saw it"),
@@ -90,10 +91,10 @@ class GraspEvaluator(Evaluator):
         if phase == "CLOSE":
             self._close(self._t, signals)
         elif phase == "PULL":
-            self._look(signals)
+            self._measure(signals)
             self._p_HO_closed, self._touching_closed = self._p_HO, self._touching
 
-    def _look(self, signals: Signals) -> None:
+    def _measure(self, signals: Signals) -> None:
         self._touching = int(signals["scene.touching"])
         d_x, d_y = (signals["scene.p_WO"] - signals["scene.p_WH"]).tolist()
         yaw = float(signals["scene.yaw"])
@@ -107,7 +108,7 @@ class GraspEvaluator(Evaluator):
         seen, true = signals["reflex.distance"], signals["scene.range"]
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
         stop = int(signals["reflex.stop"])
-        value = {
+        metrics = {
             "final_cost": Metric(float(signals["reflex.cost"]), "m2", _COST),
             "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
@@ -115,12 +116,12 @@ class GraspEvaluator(Evaluator):
             "stop": Metric(stop, "1", f"number of why the refinement ended: {stop} is {self._stop}"),
         }
         for i, finger in enumerate(("thumb", "index", "ring")):
-            whole = f"{finger} to object as the hand began to close"
+            what = f"{finger} to object as the hand began to close"
             unseen = " (sees nothing)" if seen[i] >= ReflexParams().distance_max else ""
             unmet = " (meets nothing)" if true[i] >= SEES_NOTHING else ""
-            value[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{whole}, by [Luberto] eq. (11){unseen}")
-            value[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{whole}, true along the beam{unmet}")
-        self._at_closing = value
+            metrics[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{what}, by [Luberto] eq. (11){unseen}")
+            metrics[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{what}, true along the beam{unmet}")
+        self._at_closing = metrics
 
     def _count(self, phase: str, signals: Signals) -> None:
         command = (
@@ -133,7 +134,7 @@ class GraspEvaluator(Evaluator):
         self._command = command
 
     def finish(self, signals: Signals) -> None:  # noqa: ARG002
-        """Note the time."""
+        """Keep the time of the end."""
         self.moments["end"] = self._t
 
     @property
@@ -151,7 +152,7 @@ class GraspEvaluator(Evaluator):
         return self._touching >= _BODIES and self._left_behind <= _LEFT_BEHIND
 
     def outcome(self) -> Outcome:
-        """Return whether the object came along and is still in the hand, why, and the figures."""
+        """Return whether the object came along and is still in the hand, why, and the metrics."""
         metrics = {**self._at_closing, **self._at_start}
         for phase, what in (("PROBE", "probing"), ("RECOVER", "recovering"), ("APPROACH", "approaching")):
             metrics[f"{what}_moves"] = Metric(self._moves[phase], "1", f"{what} moves")

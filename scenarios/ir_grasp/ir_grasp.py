@@ -1,6 +1,6 @@
 """A soft hand corrects its grasp by infrared reflexes, closes, pulls and shakes. [Luberto] sec. V.
 
-What the paper tells of a grasp with given parameters. [Luberto] table II.
+The paper's table II gives the fingers' distances from the object for such a grasp (`published_of`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,11 +22,11 @@ from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation
 
 FINGERS = ("thumb", "index", "ring")
-"""As table II is kept in `paper.toml`."""
+"""Columns of table II, in the order in which `paper.toml` has them."""
 
 
 def published_of(p: Parameters) -> Sequence[PublishedValue]:
-    """Return table II's distances of the object in such a pose; nothing for other strategies than the reflex."""
+    """Return table II's distances for the object and the pose; nothing for other strategies than the reflex."""
     if p.strategy is not Strategy.REFLEX or p.literal:
         return ()
     pose = "perturbed" if p.perturbed else "nominal"
@@ -37,7 +37,7 @@ def published_of(p: Parameters) -> Sequence[PublishedValue]:
             paper="ir_grasp",
             name=f"final_distance_{pose}_{thing}",
             index=(k,),
-            note="of several grasps together; how they were summed up is not told",
+            note="of several grasps together; how they were summarized is not stated",
         )
         for k, finger in enumerate(FINGERS)
     ]
@@ -115,15 +115,15 @@ class IrGrasp(Experiment[GraspEvaluator]):
         return s
 
     def stop_time(self, parameters: Parameters) -> Fraction:  # noqa: ARG002
-        """Return a time that no run came near: of 140 by reflex the longest, with the printed equations, took 26 s."""
+        """Return a time far above any run's: of 140 by reflex the longest, with the printed equations, took 26 s."""
         return Fraction(90)
 
     def evaluator(self, parameters: Parameters) -> GraspEvaluator:
-        """Return the judge of one grasp."""
+        """Return the evaluator of one grasp."""
         return GraspEvaluator(parameters)
 
     def cycle(self) -> tuple[str, ...]:
-        """Return the robot's own computing."""
+        """Return the unit that runs on the robot's computer."""
         return ("reflex",)
 
     def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
@@ -132,7 +132,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
 
     def draw(self, parameters: Parameters, evaluator: GraspEvaluator, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments."""
-        from handover.scenarios.ir_grasp.plots import draw_scene  # what draws takes long to load
+        from handover.scenarios.ir_grasp.plots import draw_scene  # matplotlib is slow to import
 
         return [draw_scene(parameters, evaluator.moments, record, folder)]
 

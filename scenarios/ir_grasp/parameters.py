@@ -1,6 +1,6 @@
-"""Parameters of the infrared grasp; origins of the defaults are in `paper.toml`.
+"""Parameters of the infrared grasp, and the situation that a seed draws from them; see `paper.toml` for the defaults.
 
-Where object and hand are before a grasp: what vision saw, and what became of it since.
+A `Situation` is where object and hand are before the grasp: what vision saw, and how the object was moved since.
 """
 
 import math
@@ -54,7 +54,7 @@ _PALM_FRONT = max(x for x, _ in PALM)
 
 @dataclass(frozen=True)
 class Situation:
-    """Drawn by a seed, in W: the object's place and turn from its reference pose, the pre-grasp pose, the hand's start.
+    """Drawn by a seed, in W: the object's shift and turn from its reference pose, the pre-grasp pose, the hand's start.
 
     Vision saw the object at the origin of W in its reference pose, hence a hand that comes along x.
     """
@@ -67,14 +67,14 @@ class Situation:
 
     @classmethod
     def draw(cls, p: Parameters, seed: int) -> "Situation":
-        """Draw one; the numbers do not depend on the strategy, and of the parameters only what they scale."""
+        """Draw a situation: the same for any strategy, and other parameters only scale the random numbers."""
         rng = np.random.default_rng(seed)
         distance, direction, turn = rng.random(3)
-        miss = rng.standard_normal(3)
+        error = rng.standard_normal(3)
         shift = p.shift_least + (p.shift_most - p.shift_least) * distance
         angle = p.shift_spread * (2.0 * direction - 1.0)
-        yaw = p.vision_yaw * float(miss[2])
-        pregrasp = asked_for(p.thing, p.standoff) + p.vision_position * miss[:2]
+        yaw = p.vision_yaw * float(error[2])
+        pregrasp = pregrasp_position(p.thing, p.standoff) + p.vision_position * error[:2]
         return cls(
             p_WO=shift * np.array([math.cos(angle), math.sin(angle)]) if p.perturbed else np.zeros(2),
             turn=p.turn_most * (2.0 * float(turn) - 1.0) if p.perturbed else 0.0,
@@ -84,8 +84,8 @@ class Situation:
         )
 
 
-def asked_for(thing: Thing, standoff: float) -> Floats:
-    """Return the wrist's place before the middle of the object's width, its palm a standoff from its nearest point."""
+def pregrasp_position(thing: Thing, standoff: float) -> Floats:
+    """Return the wrist's position before the middle of the object's width, its palm a standoff from the object."""
     yaw = SOLIDS[thing].yaw
     R_WO = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     points: Floats = np.vstack([outline @ np.transpose(R_WO) for outline in outlines(thing)])

@@ -1,7 +1,4 @@
-"""Curves of an infrared grasp over time: distances, cost, and what is commanded of wrist, heading and closure.
-
-The scene of an infrared grasp from above, at three moments.
-"""
+"""Figures of an infrared grasp: distances, cost and commands over time, and the scene from above at three moments."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,17 +27,29 @@ from handover.scenarios.ir_grasp.parameters import Parameters
 
 FINGER_NAMES = ("thumb", "index", "ring")
 FINGER_COLOURS = COLOURS[:3]
-"""Of the fingers wherever they are drawn, as of their curves."""
-_NAMES = {0: "reach", 1: "look", 2: "look", 3: "look", 4: "probe", 5: "step", 6: "close", 7: "pull", 8: "shake", 9: ""}
-"""Of phases: a look may include approaching and recovering motions."""
+"""Colours of the fingers' curves, of the fingers in the scene and in the replay."""
+_PHASE_NAMES = {
+    0: "reach",
+    1: "look",
+    2: "look",
+    3: "look",
+    4: "probe",
+    5: "step",
+    6: "close",
+    7: "pull",
+    8: "shake",
+    9: "",
+}
+"""Phase names as plotted: a look may include approaching and recovering motions."""
 _WRIST = ("reflex.p_WH_cmd", "scene.p_WH")
+"""The wrist's position as commanded and as measured."""
 _MIN_COST = 0.1
-"""What is drawn of a smaller cost, mm²: a logarithm has no zero."""
+"""Smaller costs are drawn as this, mm², since a logarithmic axis has no zero."""
 
 
 def figures_of_grasp(parameters: Parameters, record: Record) -> list[TimeFigure]:
-    """Return distances seen and true with the cost, and what is commanded and measured."""
-    phases = phases_of(record, "reflex.phase", _NAMES)
+    """Return the figures of distances (seen and true) with the cost, and of commanded and measured motion."""
+    phases = phases_of(record, "reflex.phase", _PHASE_NAMES)
     caption = (
         "Distances as the controller sees them, [Luberto] eq. (11), and along the beams in truth (dotted), where "
         "there are any in the sensors' range, and the cost f of thumb and ring, [Luberto] eq. (4), in mm² (1e-6 m²), "
@@ -62,7 +71,7 @@ def figures_of_grasp(parameters: Parameters, record: Record) -> list[TimeFigure]
 
 
 def _in_sight(record: Record, signal: str) -> Floats:
-    """Return distances of the three fingers, shape (rows, 3), mm; not a number where there is nothing in range."""
+    """Return distances of the three fingers, shape (rows, 3), mm; NaN where nothing is in range."""
     return np.where(record[signal] < ReflexParams().distance_max, 1000 * record[signal], np.nan)
 
 
@@ -175,7 +184,7 @@ def _frame(record: Record, rows: list[int]) -> tuple[Floats, Floats]:
 
 
 def _capsule(a: Floats, b: Floats, radius: float) -> Floats:
-    """Return the outline of a phalanx, (18, 2)."""
+    """Return the outline of a phalanx, shape (18, 2)."""
     heading = float(np.arctan2(b[1] - a[1], b[0] - a[0]))
     angles = heading + np.linspace(-np.pi / 2, np.pi / 2, 9)
     arc = radius * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -13,13 +13,13 @@ from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES, PALM
 
 _BEAM = "#8357a8"
 _HEIGHT, _PALM_LOW, _PALM_HIGH, _THING_HIGH = 0.025, 0.012, 0.038, 0.055
-"""Of the fingers' middles above the table, of the palm's faces and of the object, m: the scene is planar (assumed)."""
+"""Heights above the table of fingers' axes, palm's faces and object, m: the scene is planar, so these are assumed."""
 
 
 def replay_grasp(parameters: Parameters, record: Record) -> Replay:
     """Return hand, object and beams over a run's time."""
     parts = [prism(outline, 0.0, _THING_HIGH) for outline in outlines(parameters.thing)]
-    fingers, beams = _moving(record)
+    fingers, beams = _fingers_and_beams(record)
     return Replay(
         bodies=[
             _turning("palm", PALM_COLOUR, prism(np.array(PALM), _PALM_LOW, _PALM_HIGH), record, "p_WH", "yaw"),
@@ -28,24 +28,24 @@ def replay_grasp(parameters: Parameters, record: Record) -> Replay:
         lines=[*fingers, *beams],
         eye=(-0.35, -0.7, 1.35),
         phases="reflex.phase",
-        notes=("The scene is planar; heights above the table are only drawn. Beams end at what they meet.",),
+        notes=("The scene is planar; heights above the table are for display only. Beams end at what they meet.",),
     )
 
 
 def _turning(label: str, colour: str, mesh: Mesh, record: Record, place: str, yaw: str) -> Body:
     p, half = record[f"scene.{place}"], record[f"scene.{yaw}"] / 2.0
-    none = np.zeros(len(p))
+    zero = np.zeros(len(p))
     return Body(
         label=label,
         colour=colour,
         mesh=mesh,
-        p_WB=np.column_stack([p, none]),
-        q_WB=np.column_stack([np.cos(half), none, none, np.sin(half)]),
+        p_WB=np.column_stack([p, zero]),
+        q_WB=np.column_stack([np.cos(half), zero, zero, np.sin(half)]),
     )
 
 
-def _moving(record: Record) -> tuple[list[Line], list[Line]]:
-    """Return the fingers, and the beams as far as they reach."""
+def _fingers_and_beams(record: Record) -> tuple[list[Line], list[Line]]:
+    """Return the fingers, and the beams up to what they meet or to the end of their range."""
     p_WH, yaw, q = record["scene.p_WH"], record["scene.yaw"], record["scene.q"]
     hands = [finger_points(p_WH[k], float(yaw[k]), q[k]) for k in range(len(yaw))]
     rays = [sensor_rays(p_WH[k], float(yaw[k]), q[k]) for k in range(len(yaw))]

@@ -1,1 +1,1 @@
-"""Published experiments: the campaigns behind papers' tables, and what came out beside what was published."""
+"""Published experiments: campaigns that repeat papers' tables, with published values and verdicts beside ours."""

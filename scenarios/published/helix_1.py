@@ -1,4 +1,4 @@
-"""Table 1 of [Vervloet2025]: how long the Helix takes to a ball by step size, and whether it gets it."""
+"""Table 1 of [Vervloet2025]: how long the Helix takes to reach a ball by step size, and whether it takes it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,14 +19,15 @@ _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s: as long as the scenario allows; the longest published is 214.9."""
 
 _QUICK_PLACES = (Place.FRONT, Place.LEFT, Place.BACK_LEFT)
-"""Where a quick one offers the ball: as few as intervals can be told of."""
+"""Where a quick plan offers the ball: as many places as a bootstrap needs values (`MIN_SAMPLES`)."""
 
 
 class Helix1(PublishedExperiment):
     """Three step sizes, four places, two runs each, with the thesis's settings; and the same with ours beside it.
 
     The claims are judged on the runs with the thesis's settings. The control period is what the thesis's loop took at
-    each step size. A quick one is a run with the thesis's settings at each of three places: three minutes on two cores.
+    each step size. The quick plan is a run with the thesis's settings at each of three places: three
+    minutes on two cores.
     """
 
     name: ClassVar[str] = "helix-1"
@@ -35,8 +36,8 @@ class Helix1(PublishedExperiment):
 
     def plan(self, quick: bool) -> CampaignPlan:
         """Return alpha x place for the thesis's settings and ours, each twice; if quick, a part of it."""
-        entries, published = paper_values(self.scenario, "experiment"), paper_values(self.scenario, "published")
-        repetitions = int(published["runs"]) // len(entries["places"])
+        setup, published = paper_values("helix", "experiment"), paper_values("helix", "published")
+        repetitions = int(published["runs"]) // len(setup["places"])
         points = [
             {
                 "tuning": tuning.name.lower(),
@@ -45,7 +46,7 @@ class Helix1(PublishedExperiment):
                 "place": place.name.lower(),
             }
             for tuning in ((Tuning.THESIS,) if quick else (Tuning.THESIS, Tuning.OWN))
-            for alpha, period in zip(entries["alpha"], published["timestep_mean"], strict=True)
+            for alpha, period in zip(setup["alpha"], published["timestep_mean"], strict=True)
             for place in (_QUICK_PLACES if quick else Place)
         ]
         return CampaignPlan(
@@ -65,7 +66,7 @@ class Helix1(PublishedExperiment):
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return table 1, its steps, its times by place and the lengths of fig. 9, for both settings."""
         arms = [Helix1Arm.of(table, tuning) for tuning in (Tuning.THESIS, Tuning.OWN)]
-        return [made(arm) for arm in arms if arm.tried for made in (table_1, steps, by_place, fig_9)]
+        return [table_of(arm) for arm in arms if arm.tried for table_of in (table_1, steps, by_place, fig_9)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
         """Draw the times by step size, and the error over time as in fig. 8."""

@@ -1,6 +1,7 @@
-"""What `helix-1` says of the claims about table 1 and fig. 9 of [Vervloet2025]; each rule was laid down before runs.
+"""Claims about table 1 and fig. 9 of [Vervloet2025], judged on the runs of `helix-1`.
 
-What `helix-1` says of the claims about the arm's time, table 1 of [Vervloet2025].
+Each rule was laid down before the runs. `time_claims` are those about the arm's time; the others are about success, the
+model's mismatch, and our own settings.
 """
 
 from itertools import pairwise
@@ -14,6 +15,19 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.published.helix_1_runs import Helix1Arm, missing, published, too_few
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.verdicts import format_p_value, ratio_interval
+
+_READING = 0.01
+"""Resolution of the lengths of fig. 9, m."""
+
+
+def thesis_claims(arm: Helix1Arm) -> list[Claim]:
+    """Judge the thesis's claims on the runs with its settings."""
+    return [_closes(arm), _succeeds(arm), *time_claims(arm), _mismatch(arm), _timestep(arm)]
+
+
+def own_claims(thesis: Helix1Arm, own: Helix1Arm) -> list[Claim]:
+    """Judge this project's claims about its own settings, if there are runs with them."""
+    return [_own_success(own), _nearer(thesis, own)] if own.tried else []
 
 
 def time_claims(arm: Helix1Arm) -> list[Claim]:
@@ -73,8 +87,8 @@ def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
 
 
 def _takes(arm: Helix1Arm, alpha: float) -> Claim:
-    told_there, i = published(), arm.alphas.index(alpha)
-    mean, std, median = (told_there[f"arm_time_{name}"][i] for name in ("mean", "std", "median"))
+    printed, i = published(), arm.alphas.index(alpha)
+    mean, std, median = (printed[f"arm_time_{name}"][i] for name in ("mean", "std", "median"))
     facts: dict[str, Any] = {
         "claim": f"At step size {alpha} the arm takes {mean} s on average",
         "published": f"{mean} ± {std} s (median {median} s)",
@@ -85,7 +99,7 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
     if interval is None:
         return too_few(facts, f"{len(x)} runs")
     ours = float(np.mean(x)), float(np.std(x, ddof=1))
-    p = float(ttest_ind_from_stats(*ours, len(x), mean, std, told_there["runs"], equal_var=False).pvalue)
+    p = float(ttest_ind_from_stats(*ours, len(x), mean, std, printed["runs"], equal_var=False).pvalue)
     return Claim(
         **facts,
         measured=f"{ours[0]:.1f} ± {ours[1]:.1f} s (median {np.median(x):.1f} s)",
@@ -93,13 +107,13 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
         unit="s",
         verdict=Verdict.REPRODUCED if p >= LEVEL else Verdict.NOT_REPRODUCED,
         reason=f"Reproduced if Welch's test does not tell the two means apart: p = {format_p_value(p)}, {len(x)} runs "
-        f"against {told_there['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
+        f"against {printed['runs']}. The interval is the mean's ({interval.method}).{missing(arm, alpha)}"
         f"{_stall(arm, alpha)}",
     )
 
 
 def _stall(arm: Helix1Arm, alpha: float) -> str:
-    """Tell of a step size at which the error can stall above the threshold."""
+    """Return a sentence on a step size at which the error can stall above the threshold; "" for the others."""
     settings = paper_values("helix", arm.tuning.name.lower())
     stall = round(settings["epsilon_pose_bound"] / alpha, 6)
     if settings["epsilon_control"] > settings["epsilon_pose_bound"] or stall < settings["threshold_grasp"]:
@@ -137,20 +151,6 @@ def _spread(values: Any, axis: int = -1) -> Any:
     return np.std(values, axis=axis, ddof=1)
 
 
-_READING = 0.01
-"""What the lengths of fig. 9 are told to, m."""
-
-
-def thesis_claims(arm: Helix1Arm) -> list[Claim]:
-    """Judge the thesis's claims on the runs with its settings."""
-    return [_closes(arm), _succeeds(arm), *time_claims(arm), _mismatch(arm), _timestep(arm)]
-
-
-def own_claims(thesis: Helix1Arm, own: Helix1Arm) -> list[Claim]:
-    """Judge what this project says of its own settings, if there are runs with them."""
-    return [_own_success(own), _nearer(thesis, own)] if own.tried else []
-
-
 def _closes(arm: Helix1Arm) -> Claim:
     return _rate(arm, "The arm reaches the ball and the gripper begins to close in every run", arm.closed)
 
@@ -176,18 +176,18 @@ def _rate(arm: Helix1Arm, claim: str, successes: int) -> Claim:
 
 
 def _mismatch(arm: Helix1Arm) -> Claim:
-    there, alpha = published(), arm.alphas[0]
+    printed, alpha = published(), arm.alphas[0]
     named = ("model_mismatch", "arm_travel", "model_travel")
     facts: dict[str, Any] = {
         "claim": "At the goal the model's gripper is far from the measured one",
-        "published": "{:.2f} m (arm {:.2f} m, model {:.2f} m from the start)".format(*(there[n] for n in named)),
+        "published": "{:.2f} m (arm {:.2f} m, model {:.2f} m from the start)".format(*(printed[n] for n in named)),
         "where": "sec. 5.2, fig. 9",
     }
     values = [arm.metric(name, alpha) for name in named]
     interval = time_interval(values[0], np.mean)
     if interval is None:
         return too_few(facts, f"{len(values[0])} runs at step size {alpha}")
-    agrees = interval.low - _READING <= there["model_mismatch"] <= interval.high + _READING
+    agrees = interval.low - _READING <= printed["model_mismatch"] <= interval.high + _READING
     return Claim(
         **facts,
         measured="{:.3f} m (arm {:.3f} m, model {:.3f} m from the start)".format(*map(np.mean, values)),
@@ -196,8 +196,8 @@ def _mismatch(arm: Helix1Arm) -> Claim:
         verdict=Verdict.NOT_COMPARABLE if agrees else Verdict.NOT_REPRODUCED,
         reason="The arm's stiffness and masses were chosen such that it is as far off as in fig. 9 in one state at "
         "rest, so that agreement would prove nothing and would not be comparable. Not reproduced if the interval of "
-        f"the mean, widened by {_READING} m as the figure is told, leaves the published length out. Where the ball is "
-        "offered is assumed, and with it how far the arm goes.",
+        f"the mean, widened by the figure's resolution of {_READING} m, leaves the published length out. Where the "
+        "ball is offered is assumed, and with it how far the arm goes.",
     )
 
 
@@ -207,7 +207,7 @@ def _timestep(arm: Helix1Arm) -> Claim:
     return Claim(
         claim="A control step takes about 1.4 s",
         published=", ".join(f"{m} ± {s}" for m, s in zip(mean, std, strict=True)) + " s",
-        measured=", ".join(f"{p:.2f}" for facts in periods.values() for p in facts) + " s (as set)",
+        measured=", ".join(f"{p:.2f}" for of_alpha in periods.values() for p in of_alpha) + " s (as set)",
         verdict=Verdict.NOT_COMPARABLE,
         reason="The published time is what the thesis's program took to compute a step on its laptop; here it is the "
         "control period that runs are given.",

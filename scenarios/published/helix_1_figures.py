@@ -63,18 +63,18 @@ def draw_errors(arms: Sequence[Helix1Arm], runs: Path, folder: Path) -> list[Fig
         axes[-1].set_xlabel("time (s)")
     caption = (
         "Distance to the goal that the controller sees, over wrist and gripper, until the gripper begins to close, "
-        "like fig. 8. Thick: mean of the runs that still go on, up to the median length, with its standard deviation; "
+        "like fig. 8. Thick: mean of the runs still under way, up to the median length, with its standard deviation; "
         "thin: the runs. The error jumps where the goal changes from above the ball to the ball."
     )
     return [Figure("errors", caption)]
 
 
 def _published_times(axis: Axes, i: int) -> None:
-    there = published()
+    printed = published()
     x, width = i - 0.2, 0.22
-    low, high = there["arm_time_min"][i], there["arm_time_max"][i]
+    low, high = printed["arm_time_min"][i], printed["arm_time_max"][i]
     axis.bar(x, high - low, width, bottom=low, color="#d5dae2", lw=0, zorder=1)
-    axis.plot([x - width / 2, x + width / 2], [there["arm_time_median"][i]] * 2, color=_PUBLISHED, lw=2.0)
+    axis.plot([x - width / 2, x + width / 2], [printed["arm_time_median"][i]] * 2, color=_PUBLISHED, lw=2.0)
 
 
 def _our_times(axis: Axes, i: int, arm: Helix1Arm, alpha: float) -> None:
@@ -99,26 +99,26 @@ def _times_legend() -> list[Line2D]:
 
 
 def _range_of_times(arms: Sequence[Helix1Arm]) -> tuple[float, float]:
-    there = published()
+    printed = published()
     ours = np.concatenate([arm.times(alpha) for arm in arms for alpha in arm.alphas])
-    every = np.concatenate([ours, there["arm_time_min"], there["arm_time_max"]])
+    every = np.concatenate([ours, printed["arm_time_min"], printed["arm_time_max"]])
     return 0.85 * float(every.min()), 1.15 * float(every.max())
 
 
 def _errors(arm: Helix1Arm, alpha: float, runs: Path) -> list[Floats]:
     """Return the error at each control step, m, of each run that has a record, until the gripper began to close."""
-    found: list[Floats] = []
+    errors: list[Floats] = []
     for row in arm.rows[alpha]:
         path = runs / row["run"] / "signals.parquet"
         if row.get("arm_time") is None or not path.exists():
             continue
         record = Record(path)
-        amid = (np.arange(round(row["steps"]), dtype=np.float64) + 0.5) * row["control_period"]  # between two updates
-        after = np.asarray(np.searchsorted(record.time, amid), dtype=np.int64)
+        middle = (np.arange(round(row["steps"]), dtype=np.float64) + 0.5) * row["control_period"]  # between updates
+        after = np.asarray(np.searchsorted(record.time, middle), dtype=np.int64)
         index = np.minimum(after, len(record.time) - 1)
         seen: NDArray[np.bool_] = record["servo.phase"][index] != int(Phase.WAIT)
-        found.append(np.where(seen, record["servo.error"][index], np.nan))
-    return found
+        errors.append(np.where(seen, record["servo.error"][index], np.nan))
+    return errors
 
 
 def _mean_error(axis: Axes, runs: Sequence[Floats], period: float, style: tuple[str, str]) -> None:
@@ -127,10 +127,10 @@ def _mean_error(axis: Axes, runs: Sequence[Floats], period: float, style: tuple[
     for run in runs:
         axis.plot(period * np.arange(len(run)), 1000 * run, color=colour, lw=0.6, alpha=0.4)
     length = int(np.median([len(run) for run in runs]))
-    lined = np.full((len(runs), length), np.nan)
-    for line, run in zip(lined, runs, strict=True):
+    padded = np.full((len(runs), length), np.nan)
+    for line, run in zip(padded, runs, strict=True):
         line[: len(run)] = run[:length]
-    known: NDArray[np.int64] = np.flatnonzero(~np.all(np.isnan(lined), axis=0))
-    mean, deviation = 1000 * np.nanmean(lined[:, known], axis=0), 1000 * np.nanstd(lined[:, known], axis=0)
+    known: NDArray[np.int64] = np.flatnonzero(~np.all(np.isnan(padded), axis=0))
+    mean, deviation = 1000 * np.nanmean(padded[:, known], axis=0), 1000 * np.nanstd(padded[:, known], axis=0)
     axis.fill_between(period * known, mean - deviation, mean + deviation, color=colour, alpha=0.18, lw=0)
     axis.plot(period * known, mean, color=colour, lw=2.0, label=label)

@@ -1,7 +1,4 @@
-"""The runs of `helix-1` with one of the controller's settings.
-
-What the claims of `helix-1` are told with.
-"""
+"""The runs of `helix-1` with one of the controller's settings, the published values, and phrases for claims."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,12 +16,12 @@ from handover.scenarios.published.verdicts import nothing_measured
 
 @dataclass(frozen=True)
 class Helix1Arm:
-    """Rows of a campaign's table that are of one tuning and were carried out, by step size.
+    """Rows of a campaign's table of runs that came to their end with one tuning, by step size.
 
     Attributes:
         tuning: the settings.
         rows: rows by alpha, in the plan's order: by place, then repetition.
-        broken: runs that a unit's failure, a crash or a lost worker ended: they say nothing of the arm.
+        broken: runs that a unit's failure, a crash or a lost worker ended: they do not count.
     """
 
     tuning: Tuning
@@ -100,11 +97,11 @@ def published() -> dict[str, Any]:
 
 
 def too_few(facts: dict[str, Any], what: str) -> Claim:
-    """Return the claim, told but for what came out, as one that so few runs say nothing of."""
+    """Return a claim, given by its fields without a result, as not comparable for too few runs."""
     return nothing_measured(**facts, reason=f"Too few runs to tell: {what}.")
 
 
 def missing(arm: Helix1Arm, *alphas: float) -> str:
-    """Tell how many runs have no time, as their gripper never began to close; nothing if all have one."""
+    """Return a sentence on how many runs have no time, as the gripper never began to close; "" if all have one."""
     number = sum(len(arm.rows[alpha]) - len(arm.times(alpha)) for alpha in alphas)
     return f" Without {number} runs in which the gripper never began to close." if number else ""

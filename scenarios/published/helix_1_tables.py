@@ -20,19 +20,19 @@ _ON_EQUAL_BOUNDS = (
 
 def table_1(arm: Helix1Arm) -> ComparisonTable:
     """Return the times for the arm's movement by step size, published beside ours."""
-    there = published()
+    printed = published()
     header = ["α", *(f"{alpha} {whose}" for alpha in arm.alphas for whose in ("published", "ours"))]
     rows = [
-        _row("Minimum", there["arm_time_min"], arm, lambda x: _figure(x, np.min)),
-        _row("Median", there["arm_time_median"], arm, lambda x: format_median(x, 1)),
-        _row("Maximum", there["arm_time_max"], arm, lambda x: _figure(x, np.max)),
-        _row("Mean", _plus_minus(there["arm_time_mean"], there["arm_time_std"]), arm, _mean),
+        _row("Minimum", printed["arm_time_min"], arm, lambda x: _figure(x, np.min)),
+        _row("Median", printed["arm_time_median"], arm, lambda x: format_median(x, 1)),
+        _row("Maximum", printed["arm_time_max"], arm, lambda x: _figure(x, np.max)),
+        _row("Mean", _plus_minus(printed["arm_time_mean"], printed["arm_time_std"]), arm, _mean),
         ["Timestep"],
         ["Gripper began to close"],
         ["Handover succeeded"],
     ]
-    for alpha, timestep in zip(arm.alphas, _plus_minus(there["timestep_mean"], there["timestep_std"]), strict=True):
-        tried, runs = len(arm.rows[alpha]), there["runs"]
+    for alpha, timestep in zip(arm.alphas, _plus_minus(printed["timestep_mean"], printed["timestep_std"]), strict=True):
+        tried, runs = len(arm.rows[alpha]), printed["runs"]
         succeeded = sum(bool(row["success"]) for row in arm.rows[alpha])
         rows[4] += [timestep, ", ".join(sorted({f"{row['control_period']:.2f}" for row in arm.rows[alpha]}))]
         rows[5] += [f"{runs} of {runs}", f"{len(arm.times(alpha))} of {tried}"]
@@ -46,13 +46,13 @@ def table_1(arm: Helix1Arm) -> ComparisonTable:
 
 def steps(arm: Helix1Arm) -> ComparisonTable:
     """Return how many control steps the arm takes, which does not depend on the time of a step."""
-    there = published()
+    printed = published()
     rows: list[Sequence[str]] = []
     for i, alpha in enumerate(arm.alphas):
-        x, step = arm.metric("steps", alpha), there["timestep_mean"][i]
-        ends = [f"{there[f'arm_time_{end}'][i] / step:.0f}" for end in ("min", "max")]
+        x, step = arm.metric("steps", alpha), printed["timestep_mean"][i]
+        ends = [f"{printed[f'arm_time_{end}'][i] / step:.0f}" for end in ("min", "max")]
         ours = ["–".join(_figure(x, end, 0) for end in (np.min, np.max)) if len(x) else ""]
-        rows.append([str(alpha), str(there["steps_median"][i]), "–".join(ends), format_median(x, 0), *ours])
+        rows.append([str(alpha), str(printed["steps_median"][i]), "–".join(ends), format_median(x, 0), *ours])
     header = ["α", "published median", "published range", "our median", "our range"]
     note = "Published: times of table 1 over its mean time steps. In brackets: 95 % interval by bootstrap."
     if arm.tuning is Tuning.THESIS:
@@ -61,7 +61,7 @@ def steps(arm: Helix1Arm) -> ComparisonTable:
 
 
 def by_place(arm: Helix1Arm) -> ComparisonTable:
-    """Return the times at each place, of which the paper tells nothing."""
+    """Return the times at each place, which the paper does not give."""
     rows = [
         [place.name.lower().replace("_", "-"), *(_at(arm, place, alpha) for alpha in arm.alphas)] for place in Place
     ]
@@ -72,10 +72,11 @@ def by_place(arm: Helix1Arm) -> ComparisonTable:
 
 def fig_9(arm: Helix1Arm) -> ComparisonTable:
     """Return how far the model is from the arm at the end, in the words of sec. 5.2."""
-    there, entries = published(), (("model to arm", "model_mismatch"), ("arm", "arm_travel"), ("model", "model_travel"))
+    printed = published()
+    lengths = (("model to arm", "model_mismatch"), ("arm", "arm_travel"), ("model", "model_travel"))
     rows = [
-        [name, f"{there[metric]:.2f}", *(_figure(arm.metric(metric, alpha), np.mean, 3) for alpha in arm.alphas)]
-        for name, metric in entries
+        [name, f"{printed[metric]:.2f}", *(_figure(arm.metric(metric, alpha), np.mean, 3) for alpha in arm.alphas)]
+        for name, metric in lengths
     ]
     header = ["m", "α = 0.1, published", *(f"α = {alpha}, ours" for alpha in arm.alphas)]
     note = (
@@ -86,9 +87,9 @@ def fig_9(arm: Helix1Arm) -> ComparisonTable:
     return ComparisonTable(title=f"Model and arm as in fig. 9, {arm.title}", header=header, rows=rows, note=note)
 
 
-def _row(name: str, entries: Sequence[float | str], arm: Helix1Arm, text: Callable[[Floats], str]) -> list[str]:
+def _row(name: str, printed: Sequence[float | str], arm: Helix1Arm, text: Callable[[Floats], str]) -> list[str]:
     ours = [text(arm.times(alpha)) for alpha in arm.alphas]
-    return [name, *(str(cell) for pair in zip(entries, ours, strict=True) for cell in pair)]
+    return [name, *(str(cell) for pair in zip(printed, ours, strict=True) for cell in pair)]
 
 
 def _at(arm: Helix1Arm, place: Place, alpha: float) -> str:

@@ -1,4 +1,4 @@
-"""Tables I and II of Luberto et al.: grasps by infrared reflex, blind, and by going forward without looking."""
+"""Tables I and II of Luberto et al.: grasps by infrared reflex, blind, and by going forward without sensing."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,8 +32,9 @@ class IrTable(PublishedExperiment):
     """Five things in nominal and perturbed poses, grasped in four ways in the same scenes.
 
     Besides the paper's two ways, IR-guided (`reflex`) and blind, a control arm goes forward from the pre-grasp pose
-    without looking, and closes: by 35 mm, about as far as the reflex goes in nominal poses, and by 55 mm, with which
-    it did as well as the reflex in the scenes that the scenario was tuned in. What it holds, needs no sensing.
+    without sensing, and closes: by 35 mm, about as far as the reflex goes in nominal poses, and by 55 mm, with which
+    it did as well as the reflex in the scenes that the scenario was tuned in. Grasps in which it succeeds
+    need no sensing.
 
     The ways share their scenes, so that they are compared run by run; things and repetitions do not, so that they are
     counted together.
@@ -44,7 +45,7 @@ class IrTable(PublishedExperiment):
     scenario: ClassVar[str] = IrGrasp.name
 
     def plan(self, quick: bool) -> CampaignPlan:
-        """Return 16 runs of a cell, as many as in the paper if `quick`."""
+        """Return 16 runs of a cell, three as in the paper if `quick`."""
         points = [
             {"thing": thing.name.lower(), "perturbed": perturbed, **arm.parameters}
             for perturbed in ("false", "true")
@@ -62,10 +63,10 @@ class IrTable(PublishedExperiment):
         )
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
-        """Return the claims of tables I and II and of sec. V-D, and what the control arm says beyond the paper."""
+        """Return the claims of tables I and II and of sec. V-D, and those of the control arm beyond the paper."""
         runs = IrTableRuns(table)
-        given = (rate_claims, order_claims, closing_claims, distance_claims, further_claims)
-        return [claim for claims in given for claim in claims(runs)]
+        groups = (rate_claims, order_claims, closing_claims, distance_claims, further_claims)
+        return [claim for claims in groups for claim in claims(runs)]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return successes, exact tests, how refinements ended, and distances."""

@@ -1,6 +1,6 @@
-"""Claims of Luberto et al. on the successes of table I, with verdicts by rules laid down before the runs.
+"""Claims of Luberto et al. on successes (table I) and distances (table II), judged on the runs of `ir-table`.
 
-Claims of Luberto et al. on the distances of table II, with verdicts by rules laid down before the runs.
+Each verdict follows from a rule that was laid down before the runs.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ _PUSHED = 0.001
 """How far an object must have moved before the hand closed to count as touched, m."""
 
 _BLIND_SELECTED = (
-    "The paper does not tell how far the hand is from the object before it closes, nor how far objects were moved: "
+    "The paper does not say how far the hand is from the object before it closes, nor how far objects were moved: "
     "both were chosen so that the blind hand fails about as often as in table I, so agreement is no evidence."
 )
 
@@ -68,7 +68,7 @@ def order_claims(runs: IrTableRuns) -> list[Claim]:
 
 
 def _order(runs: IrTableRuns, sentence: str, first: Way, second: Way) -> Claim:
-    """Return a claim of order, and what the paper's own counts, which are not paired, say of it."""
+    """Return a claim of order, with a test of the paper's own counts, which are not paired."""
     theirs = [count for count in (runs.published(*first), runs.published(*second)) if count is not None]
     printed = f"{format_rate(*theirs[0])} against {format_rate(*theirs[1])}"
     note = f"The paper's own counts give p = {format_p_value(two_proportions(*theirs[0], *theirs[1]))} (Fisher)."
@@ -83,7 +83,7 @@ def closing_claims(runs: IrTableRuns) -> list[Claim]:
         "sec. V-D",
         "most",
         runs.count(FORWARD_35, False),
-        "The paper does not tell from which part of the hand it measures. Taken here: from the palm, which in "
+        "The paper does not say from which part of the hand it measures. Taken here: from the palm, which in "
         "nominal poses is 35 mm off, as vision asks for 70 mm and the hand goes 35 mm forward.",
     )
     displaced = np.concatenate([runs.metric("displacement", REFLEX, perturbed) for perturbed in POSES])
@@ -98,7 +98,7 @@ def closing_claims(runs: IrTableRuns) -> list[Claim]:
 
 
 def further_claims(runs: IrTableRuns) -> list[Claim]:
-    """Return what the control arm says beyond the paper, as the scenario's tuning had it."""
+    """Return claims about the control arm, beyond the paper; they were observed while the scenario was tuned."""
     claims = [
         no_worse_claim(
             f"In {pose} poses a hand that goes 55 mm forward without looking does no worse than the IR-guided one.",
@@ -172,7 +172,7 @@ def _without_verdict(runs: IrTableRuns, fingers: tuple[str, ...], perturbed: boo
 
 
 def _within_runs(runs: IrTableRuns) -> Claim:
-    """Judge the perturbed distances of thumb and ring, of which the paper tells neither number nor spread."""
+    """Judge the perturbed distances of thumb and ring, of which the paper gives neither number nor spread."""
     sentence, printed = _sentence(runs, _IN_COST, True), _span(_printed(runs, _IN_COST, True))
     inside: list[bool] = []
     medians: list[float] = []
@@ -185,7 +185,7 @@ def _within_runs(runs: IrTableRuns) -> Claim:
             inside.append(bool(low <= runs.published_distances(name, True)[finger] <= high))
             medians.append(float(np.median(values)))
     reason = (
-        "The paper tells neither of how many runs its figures are nor how they spread. Reproduced if each of the six "
+        "The paper says neither of how many runs its figures are nor how they spread. Reproduced if each of the six "
         f"lies between the {_SPAN_OF_MOST_RUNS[0]:g}th and {_SPAN_OF_MOST_RUNS[1]:g}th percentile of our runs, so that "
         f"it could be a run's: {sum(inside)} of {len(inside)} do."
     )
@@ -209,12 +209,12 @@ def _centred(runs: IrTableRuns) -> Claim:
         ]
     )
     sentence = "Thumb and ring are well centred with respect to the object."
-    output, where, interval = f"{_span(printed)} apart", "table II, sec. V-D", time_interval(unlike)
+    apart, where, interval = f"{_span(printed)} apart", "table II, sec. V-D", time_interval(unlike)
     if interval is None:
-        return nothing_measured(sentence, where, output, reason=_TOO_FEW)
+        return nothing_measured(sentence, where, apart, reason=_TOO_FEW)
     return Claim(
         claim=sentence,
-        published=output,
+        published=apart,
         measured=f"{1000 * float(np.median(unlike)):.1f} mm apart (median)",
         interval=(interval.low, interval.high),
         unit="m",

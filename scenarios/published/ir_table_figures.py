@@ -13,7 +13,7 @@ from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 from handover.scenarios.published.ir_table_runs import ARMS, OBJECTS, POSES, REFLEX, Count, IrTableRuns
 
 _OURS, _THEIRS = COLOURS[0], COLOURS[1]
-_APART = 0.13
+_OFFSET = 0.13
 """Half the distance between ours and theirs, in places on the axis."""
 
 _SPREAD = 0.16
@@ -30,7 +30,7 @@ def _rates(runs: IrTableRuns, folder: Path) -> Figure:
         for axes, (perturbed, pose) in zip(panels, POSES.items(), strict=True):
             for n, arm in enumerate(ARMS):
                 published = runs.published(arm, perturbed)
-                shift = 0.0 if published is None else _APART
+                shift = 0.0 if published is None else _OFFSET
                 _rate(axes, n - shift, runs.count(arm, perturbed), _OURS, "o")
                 if published is not None:
                     _rate(axes, n + shift, published, _THEIRS, "s")
@@ -78,14 +78,14 @@ def _distances(runs: IrTableRuns, folder: Path) -> Figure:
         _legend(panels[0])
     caption = (
         "Distances between fingertips and object at the last step of the IR-guided grasp: points are our runs, as the "
-        "sensors tell them (65 mm: sees nothing), squares the figures of [Luberto] table II. Thumb and ring enter the "
-        "cost; their target of 10 mm was taken from the table's nominal poses."
+        "sensors measure them (65 mm: sees nothing), squares the figures of [Luberto] table II. Thumb and ring enter "
+        "the cost; their target of 10 mm was taken from the table's nominal poses."
     )
     return Figure("final_distances", caption)
 
 
 def _legend(axes: Axes) -> None:
-    """Write what axes have labels for above all panels, which keeps these alike."""
+    """Put the legend of one panel above all panels, so that these keep the same size."""
     handles, labels = axes.get_legend_handles_labels()
     canvas: Any = axes.get_figure(root=True)
     canvas.legend(handles, labels, loc="outside upper center", ncols=len(labels))

@@ -22,7 +22,7 @@ OBJECTS: Mapping[str, tuple[Thing, ...]] = {
     "baby_cup": (Thing.BABY_CUP_A, Thing.BABY_CUP_B),
     "paper_box": (Thing.PAPER_BOX_A, Thing.PAPER_BOX_B),
 }
-"""Rows of table II, which does not tell poses apart."""
+"""Rows of table II, which does not distinguish the poses (a) and (b)."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ Count = tuple[int, int]
 
 
 class IrTableRuns:
-    """What came out, cell by cell, and what was published. Runs that were not carried out to their end do not count."""
+    """Our results, cell by cell, and the published ones. Runs that did not come to their end do not count."""
 
     def __init__(self, table: CampaignTable) -> None:
         self._rows = table.rows

@@ -1,4 +1,4 @@
-"""Tables I and II of Luberto et al. beside the campaign's, and what else its runs tell."""
+"""Tables I and II of Luberto et al. beside ours, with exact tests and how the hand came to close."""
 
 from collections import Counter
 
@@ -62,12 +62,12 @@ def _cells(runs: IrTableRuns, perturbed: bool, thing: Thing | None) -> list[str]
     cells: list[str] = []
     for arm in ARMS:
         ours, theirs = runs.count(arm, perturbed, thing), runs.published(arm, perturbed, thing)
-        value = _with_interval(ours) if thing is None else _format_count(ours)
+        cell = _with_interval(ours) if thing is None else _format_count(ours)
         if theirs is not None:
             apart = ours[1] and two_proportions(*ours, *theirs) < LEVEL
             cells.append(_with_interval(theirs) if thing is None else _format_count(theirs))
-            value += " *" if apart else ""
-        cells.append(value)
+            cell += " *" if apart else ""
+        cells.append(cell)
     return cells
 
 
@@ -137,7 +137,7 @@ def _distances(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
         title=f"Table II, {POSES[perturbed]} poses: distances at the last step (mm)",
         header=header,
         rows=rows,
-        note="Ours: medians of the IR-guided runs with bootstrapped intervals, 95 %, as the sensors tell them; 65 mm "
-        "stands for a finger that sees nothing. Thumb and ring enter the cost. The poses of an object are "
+        note="Ours: medians of the IR-guided runs with bootstrapped intervals, 95 %, as the sensors measure them; "
+        "65 mm stands for a finger that sees nothing. Thumb and ring enter the cost. The poses of an object are "
         "taken together.",
     )

@@ -1,12 +1,7 @@
-"""An experiment of a paper: the campaign that it needs, and what its runs say of the paper's claims.
+"""An experiment of a paper: its campaign's plan, claims with verdicts, tables beside the published, and figures.
 
-What a paper claims, and how the campaign's runs bear on it.
-
-A table of published values beside the campaign's.
-
-What a campaign's runs say of the paper that it is of.
-
-What a published experiment leaves in its campaign's folder.
+An experiment subclasses `PublishedExperiment`. `PaperResults` holds its claims and tables for a campaign's table of
+runs; `write_claims` and `draw_figures` write what it leaves in the campaign's folder.
 """
 
 import abc
@@ -49,7 +44,7 @@ class Claim:
         published: the figure as printed, with its unit.
         measured: the campaign's figure, with its unit.
         verdict: what became of it.
-        reason: by which rule the verdict, in sentences.
+        reason: the rule behind the verdict, in sentences.
         interval: confidence interval of what was measured, in `unit`; None if there is none.
         unit: of the interval.
         where: place in the paper.
@@ -72,7 +67,7 @@ class Claim:
         return _BEYOND[self.verdict] if self.beyond else self.verdict.value
 
     def as_data(self) -> dict[str, Any]:
-        """Return it as JSON can hold it."""
+        """Return it as JSON data."""
         return {
             "claim": self.claim,
             "published": self.published,
@@ -87,31 +82,31 @@ class Claim:
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> "Claim":
-        """Return the claim that `as_data` told.
+        """Return the claim from what `as_data` returned.
 
         Raises:
             KeyError, TypeError, ValueError: it is of another form.
         """
         interval = data["interval"]
-        rest: dict[str, Any] = {k: v for k, v in data.items() if k not in ("interval", "verdict")}
+        other_fields: dict[str, Any] = {k: v for k, v in data.items() if k not in ("interval", "verdict")}
         low_high = None if interval is None else (float(interval[0]), float(interval[1]))
-        return cls(interval=low_high, verdict=Verdict(data["verdict"]), **rest)
+        return cls(interval=low_high, verdict=Verdict(data["verdict"]), **other_fields)
 
 
 def verdict_counts(claims: Sequence[Claim], beyond: bool) -> Sequence[tuple[int, Verdict, str]]:
     """Return how many of a paper's claims, or of those beyond it, have each verdict that occurs, with its words."""
-    entries = [(c.verdict, c.verdict_text) for c in claims if c.beyond is beyond]
-    return [(entries.count(t), *t) for t in sorted(set(entries), key=lambda t: list(Verdict).index(t[0]))]
+    verdicts = [(c.verdict, c.verdict_text) for c in claims if c.beyond is beyond]
+    return [(verdicts.count(v), *v) for v in sorted(set(verdicts), key=lambda v: list(Verdict).index(v[0]))]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComparisonTable:
-    """Rows of texts below a header of as many.
+    """A table of texts, in which published values stand beside ours.
 
     Attributes:
         title: what it compares.
         header: names of the columns; the first column names what a row is of.
-        rows: texts; "" where there is nothing to tell.
+        rows: texts; "" where there is no value.
         note: how its figures were made, in sentences.
 
     Raises:
@@ -191,7 +186,7 @@ def draw_figures(experiment: PublishedExperiment, table: CampaignTable, runs: Pa
     """Draw the figures into a folder, of runs whose folders are in `runs`; return them in the order of a page.
 
     Raises:
-        RecordNotWritten: there is no room.
+        RecordNotWritten: the disk is full.
     """
     with disk_errors_reported(folder):
         folder.mkdir(exist_ok=True)

@@ -1,11 +1,9 @@
-"""Rules by which claims get their verdicts. They were laid down before the runs; every reason tells its rule.
+"""Rules by which claims get their verdicts. They were laid down before the runs; every reason states its rule.
 
 A verdict is given only if the runs could have led to either: where so few can never meet a rule, or never break it, the
 claim is not comparable.
 
-Writes rates, intervals, medians and p-values for claims and tables.
-
-The bootstrap's interval of a ratio of two groups.
+Besides: rates, intervals, medians and p-values as texts, and the bootstrap interval of a ratio.
 """
 
 import math
@@ -28,35 +26,6 @@ from handover.scenarios.campaign.statistics import (
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
-
-def format_rate(successes: int, n: int) -> str:
-    """Return such as `11/15 (73 %)`."""
-    return f"{successes}/{n} ({format_share(successes / n)})"
-
-
-def format_share(share: float) -> str:
-    """Return such as `73 %`."""
-    return f"{100 * share:.0f} %"
-
-
-def format_interval(low: float, high: float) -> str:
-    """Return the interval of a rate such as `45 to 92 %`."""
-    return f"{100 * low:.0f} to {format_share(high)}"
-
-
-def format_p_value(p: float) -> str:
-    """Return a p-value, such as `0.031` or `2e-12`."""
-    return f"{p:.2g}"
-
-
-def format_median(values: Floats, digits: int) -> str:
-    """Return a median with its interval by bootstrap, such as `5.2 (4.8 to 6.1)`; "" of no values."""
-    if not len(values):
-        return ""
-    interval, entries = time_interval(values), f"{np.median(values):.{digits}f}"
-    return entries if interval is None else f"{entries} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
-
-
 FEW = 0.10
 """Share of runs below which something counts as not happening."""
 
@@ -68,7 +37,7 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
     """Judge a rate of success, each given as successes and trials.
 
     It is reproduced if Fisher's exact test of both counts, two-sided, does not reject at 5 % that the rates are equal.
-    The reason tells which counts the test would have let pass; not comparable if these are all.
+    The reason states which counts the test would have let pass; if these are all counts, it is not comparable.
     """
     if not measured[1]:
         return nothing_measured(claim, where, format_rate(*published))
@@ -120,7 +89,7 @@ def order_claim(
         published=published,
         measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
         verdict=_verdict(test.first_is_better, could_be_either=n >= _MIN_DIFFERING),
-        reason=_with_want(reason, n, _MIN_DIFFERING),
+        reason=_with_shortfall(reason, n, _MIN_DIFFERING),
         where=where,
         beyond=beyond,
     )
@@ -147,8 +116,8 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
         published="",
         measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
         interval=(interval.low, interval.high),
-        verdict=_verdict(interval.high < FEW, could_be_either=n >= fewest_for(FEW)),
-        reason=_with_want(reason, n, fewest_for(FEW)),
+        verdict=_verdict(interval.high < FEW, could_be_either=n >= min_trials_for(FEW)),
+        reason=_with_shortfall(reason, n, min_trials_for(FEW)),
         beyond=True,
     )
 
@@ -157,22 +126,22 @@ def majority_claim(claim: str, where: str, published: str, measured: tuple[int, 
     """Judge that most trials succeed: it is reproduced if the rate's interval lies above one half."""
     if not measured[1]:
         return nothing_measured(claim, where, published)
-    interval, fewest = success_interval(*measured), fewest_for(0.5)
+    interval, min_trials = success_interval(*measured), min_trials_for(0.5)
     rule = f"Reproduced if the rate's interval (Clopper-Pearson) lies above one half. {note}"
     met = interval.low > 0.5
-    return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
+    return _of_rate(claim, where, published, measured, interval, rule, met=met, min_trials=min_trials)
 
 
 def rare_claim(claim: str, where: str, published: str, measured: tuple[int, int], note: str = "") -> Claim:
     """Judge that something does not happen, given how often it did: it is reproduced if its interval is below 10 %."""
     if not measured[1]:
         return nothing_measured(claim, where, published)
-    interval, fewest = success_interval(*measured), fewest_for(FEW)
+    interval, min_trials = success_interval(*measured), min_trials_for(FEW)
     rule = (
         f"Reproduced if the interval of how often it happens (Clopper-Pearson) lies below {format_share(FEW)}. {note}"
     )
     met = interval.high < FEW
-    return _of_rate(claim, where, published, measured, interval, rule, met=met, fewest=fewest)
+    return _of_rate(claim, where, published, measured, interval, rule, met=met, min_trials=min_trials)
 
 
 def nothing_measured(
@@ -191,7 +160,7 @@ def nothing_measured(
 
 
 def without_verdict(claim: Claim, reason: str) -> Claim:
-    """Return a claim that a rule has judged, without its verdict, for a reason that stands before the rule's."""
+    """Return a claim that a rule has judged as not comparable, with a reason that stands before the rule's."""
     text = f"{reason} For what it is worth: {claim.reason}"
     return replace(claim, verdict=Verdict.NOT_COMPARABLE, reason=text)
 
@@ -204,15 +173,15 @@ def _of_rate(
     interval: Interval,
     rule: str,
     met: bool,
-    fewest: int,
+    min_trials: int,
 ) -> Claim:
     return Claim(
         claim=claim,
         published=published,
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
-        verdict=_verdict(met, could_be_either=measured[1] >= fewest),
-        reason=_with_want(rule, measured[1], fewest),
+        verdict=_verdict(met, could_be_either=measured[1] >= min_trials),
+        reason=_with_shortfall(rule, measured[1], min_trials),
         where=where,
     )
 
@@ -223,7 +192,7 @@ def _verdict(met: bool, could_be_either: bool) -> Verdict:
     return Verdict.REPRODUCED if met else Verdict.NOT_REPRODUCED
 
 
-def fewest_for(share: float) -> int:
+def min_trials_for(share: float) -> int:
     """Return how many trials it takes until none that fails leaves an interval below a share.
 
     The interval of Clopper and Pearson then ends at 1 - (LEVEL / 2)^(1 / n).
@@ -231,10 +200,40 @@ def fewest_for(share: float) -> int:
     return math.floor(math.log(LEVEL / 2) / math.log1p(-share)) + 1
 
 
-def _with_want(reason: str, n: int, fewest: int) -> str:
+def _with_shortfall(reason: str, n: int, min_trials: int) -> str:
     """Add to a reason that the trials are too few for its rule to be met, if they are."""
-    want = f"With {n} runs nothing could have met this rule: it takes at least {fewest}." if n < fewest else ""
-    return f"{reason.strip()} {want}".strip()
+    shortfall = (
+        f"With {n} runs nothing could have met this rule: it takes at least {min_trials}." if n < min_trials else ""
+    )
+    return f"{reason.strip()} {shortfall}".strip()
+
+
+def format_rate(successes: int, n: int) -> str:
+    """Return a text such as `11/15 (73 %)`."""
+    return f"{successes}/{n} ({format_share(successes / n)})"
+
+
+def format_share(share: float) -> str:
+    """Return a text such as `73 %`."""
+    return f"{100 * share:.0f} %"
+
+
+def format_interval(low: float, high: float) -> str:
+    """Return the interval of a rate such as `45 to 92 %`."""
+    return f"{100 * low:.0f} to {format_share(high)}"
+
+
+def format_p_value(p: float) -> str:
+    """Return a p-value, such as `0.031` or `2e-12`."""
+    return f"{p:.2g}"
+
+
+def format_median(values: Floats, digits: int) -> str:
+    """Return a median with its interval by bootstrap, such as `5.2 (4.8 to 6.1)`; "" of no values."""
+    if not len(values):
+        return ""
+    interval, median = time_interval(values), f"{np.median(values):.{digits}f}"
+    return median if interval is None else f"{median} ({interval.low:.{digits}f} to {interval.high:.{digits}f})"
 
 
 def ratio_interval(x: Floats, y: Floats, statistic: Statistic) -> tuple[float, float] | None:

@@ -1,1 +1,1 @@
-"""Report pages: one HTML file of a run or of a campaign that opens offline."""
+"""Report pages of runs, and the parts that pages of campaigns share: one HTML file that opens offline."""

@@ -1,4 +1,4 @@
-"""Tells which unit of a run took how much CPU time."""
+"""The section of a page that shows the CPU time of each unit of a run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, template
 
 _MAX_BARS = 24
-"""Units that have a bar of their own; the cheapest of more share one."""
+"""Units that have a bar of their own; of more, the cheapest share one."""
 
 _REST = "master, recording and other"
 
@@ -24,25 +24,25 @@ class _Bar:
 
 
 def cpu_section(summary: Mapping[str, Any]) -> Section | None:
-    """Return CPU seconds by unit with what the master took besides; None where nothing of it is known.
+    """Return CPU seconds by unit, and the master's beside them; None where they are unknown.
 
     Args:
         summary: what is in `summary.json`.
     """
     units = [u for u in summary.get("units", ()) if u.get("cpu_seconds") is not None]
-    whole = summary.get("cpu_seconds")
-    if not units or whole is None:
+    of_process = summary.get("cpu_seconds")
+    if not units or of_process is None:
         return None
-    rest = max(0.0, whole - sum(u["cpu_seconds"] for u in units))
-    in_all = sum(u["cpu_seconds"] for u in units) + rest
-    if in_all <= 0.0:
+    rest = max(0.0, of_process - sum(u["cpu_seconds"] for u in units))
+    total = sum(u["cpu_seconds"] for u in units) + rest
+    if total <= 0.0:
         return None
     bars = [*_bars(units), _Bar(label=_REST, seconds=rest, colour="var(--soft)")]
     html = template("cpu.html").render(
-        plot=_plot(bars, in_all),
-        rows=[(u, _per_step(u), _share(u["cpu_seconds"], in_all)) for u in units],
-        rest=(_REST, rest, _share(rest, in_all)),
-        in_all=in_all,
+        plot=_plot(bars, total),
+        rows=[(u, _per_step(u), _share(u["cpu_seconds"], total)) for u in units],
+        rest=(_REST, rest, _share(rest, total)),
+        total=total,
         simulated=summary["simulated_seconds"],
     )
     return Section(anchor="cpu", title="CPU time", html=Markup(html))
@@ -57,15 +57,15 @@ def _bars(units: Sequence[Mapping[str, Any]]) -> list[_Bar]:
     return bars
 
 
-def _plot(bars: Sequence[_Bar], in_all: float) -> Markup:
+def _plot(bars: Sequence[_Bar], total: float) -> Markup:
     seconds = [b.seconds for b in bars]
-    entries = [f"{s:.3g} s, {_share(s, in_all)}" for s in seconds]
+    texts = [f"{s:.3g} s, {_share(s, total)}" for s in seconds]
     bar = go.Bar(
         x=seconds,
         y=[_in_two_lines(b.label) for b in bars],
         orientation="h",
         marker={"color": [b.colour for b in bars]},
-        text=entries,
+        text=texts,
         textposition="auto",
         insidetextanchor="end",
         insidetextfont={"color": "var(--page)"},
@@ -82,7 +82,7 @@ def _plot(bars: Sequence[_Bar], in_all: float) -> Markup:
         },
     )
     return plot_html(figure, height=80 + 32 * len(bars), label="CPU time by unit: " + "; ".join(
-        f"{b.label} {text}" for b, text in zip(bars, entries, strict=True)
+        f"{b.label} {text}" for b, text in zip(bars, texts, strict=True)
     ))  # fmt: skip
 
 
@@ -90,8 +90,8 @@ def _in_two_lines(label: str) -> str:
     return label.replace(", ", ",<br>", 1)
 
 
-def _share(seconds: float, in_all: float) -> str:
-    percent = 100.0 * seconds / in_all
+def _share(seconds: float, total: float) -> str:
+    percent = 100.0 * seconds / total
     return f"{percent:.0f} %" if percent >= 9.95 else f"{percent:.1f} %"
 
 

@@ -1,6 +1,7 @@
-"""Draws the units of a run and what flows between them.
+"""The section of a page that draws a run's units and the signals between them, with a table of connections.
 
-Places the units of a system so that signals flow around, and bends the lines between them.
+First the layout (`places`, `bent`): few units stand around a circle, in the order in which signals flow; many by a
+force-directed layout. Then what is drawn of it.
 """
 
 import itertools
@@ -19,18 +20,19 @@ from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, template
 
 Pair = tuple[str, str]
+"""Names of the units that signals go from and to."""
 
 _MAX_ON_A_CIRCLE = 8
 _BEND = 0.16
-"""How far a line's middle lies beside the straight one, as a share of its length."""
+"""Offset of a bent line's middle from the straight line, as a share of its length."""
 _POINTS = 21
 
 
 def places(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
-    """Return each unit's place, shape (2,), within -1 and 1 each way; the same for the same system.
+    """Return each unit's position, shape (2,), within -1 and 1 each way; the same for the same system.
 
-    Few units lie on a circle, clockwise from the top, in the order in which signals have the least way to go around;
-    two lie beside each other. Many lie so that connected ones are near each other.
+    Few units lie on a circle, clockwise from the top, in the order that minimizes the total distance of signals around
+    it; two lie side by side. Of many units, connected ones lie near each other.
     """
     if len(units) <= 2:
         return {name: np.array([2.0 * k - (len(units) - 1.0), 0.0]) for k, name in enumerate(units)}
@@ -40,7 +42,7 @@ def places(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
 
 
 def bent(a: Floats, b: Floats) -> Floats:
-    """Return points of a line from a to b that bends to its left, shape (n, 2): there and back lie apart."""
+    """Return points of a line from a to b bent to its left, shape (n, 2): both directions are seen apart."""
     along = b - a
     middle = (a + b) / 2.0 + 2.0 * _BEND * np.array([-along[1], along[0]])
     s = np.linspace(0.0, 1.0, _POINTS)[:, np.newaxis]
@@ -48,7 +50,7 @@ def bent(a: Floats, b: Floats) -> Floats:
 
 
 def _flow(units: Sequence[str], pairs: Collection[Pair]) -> list[str]:
-    """Return the order in which the steps clockwise from source to target are least in sum; the first unit is first."""
+    """Return the order with the least sum of clockwise steps from source to target; the first unit stays first."""
     first, *others = units
 
     def steps(order: tuple[str, ...]) -> int:
@@ -64,38 +66,38 @@ def _around(order: Sequence[str]) -> dict[str, Floats]:
 
 
 def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
-    """Return places by Kamada and Kawai, from a circle on, that fill the square."""
+    """Return positions by Kamada and Kawai's layout, started from a circle, that fill the square."""
     graph = cast(Any, nx).Graph()
     graph.add_nodes_from(units)
     graph.add_edges_from(pairs)
-    found = cast(dict[str, Floats], nx.kamada_kawai_layout(graph, pos=cast(Any, nx).circular_layout(graph)))
-    points: Floats = np.array([found[name] for name in units])
+    layout = cast(dict[str, Floats], nx.kamada_kawai_layout(graph, pos=cast(Any, nx).circular_layout(graph)))
+    points: Floats = np.array([layout[name] for name in units])
     low, high = points.min(axis=0), points.max(axis=0)
-    return {name: 2.0 * (found[name] - low) / np.maximum(high - low, 1e-9) - 1.0 for name in units}
+    return {name: 2.0 * (layout[name] - low) / np.maximum(high - low, 1e-9) - 1.0 for name in units}
 
 
 _MAX_UNITS = 40
 _MAX_ROWS = 1000
-_MAX_REPORTED = 14
-"""Signals of a line that are told where one points at it."""
+_MAX_LISTED = 14
+"""Signals that a line's tooltip lists."""
 _FEW = 8
-"""Units beyond which a box has room for the name alone."""
+"""Number of units up to which a box has room for more than the name."""
 
 
 class _Signal(NamedTuple):
-    """A connection: the ports at its ends, and what `run.json` tells of it."""
+    """A connection: the ports at its ends, and its entry in `run.json`."""
 
-    out: str
-    into: str
+    output: str
+    input: str
     description: Mapping[str, Any]
 
 
-_Bundles = Mapping[tuple[str, str], Sequence[_Signal]]
+_Bundles = Mapping[Pair, Sequence[_Signal]]
 """Signals by the units that they go from and to."""
 
 
 def graph_section(run: Mapping[str, Any]) -> Section | None:
-    """Return the graph of a run's system with a table of its connections; a table alone of a large one.
+    """Return the graph of a run's system with tables of units and connections; only the tables of a large system.
 
     Args:
         run: what is in `run.json`; without `system` there is no section.
@@ -116,22 +118,22 @@ def graph_section(run: Mapping[str, Any]) -> Section | None:
 
 
 def rate(unit: Mapping[str, Any]) -> str:
-    """Return how often a unit steps, as one reads it, such as "33.3 ms, sampled"."""
+    """Return a unit's step as text, such as "33.3 ms, sampled"."""
     period = unit["period"]
     text = "steps vary" if period is None else f"{period:.3g} s" if period >= 1.0 else f"{1000.0 * period:.3g} ms"
     return text + (", sampled" if unit["sampled"] else "")
 
 
 def _bundled(names: Collection[str], connections: Sequence[Mapping[str, Any]]) -> _Bundles:
-    bundles: dict[tuple[str, str], list[_Signal]] = {}
+    bundles: dict[Pair, list[_Signal]] = {}
     for c in connections:
-        (source, out), (target, into) = (_parted(c[end], names) for end in ("source", "target"))
-        bundles.setdefault((source, target), []).append(_Signal(out=out, into=into, description=c))
+        (source, output), (target, input_) = (_split_port(c[end], names) for end in ("source", "target"))
+        bundles.setdefault((source, target), []).append(_Signal(output=output, input=input_, description=c))
     return bundles
 
 
-def _parted(port: str, names: Collection[str]) -> tuple[str, str]:
-    """Return unit and port of a port's whole name; both may have dots in them."""
+def _split_port(port: str, names: Collection[str]) -> tuple[str, str]:
+    """Return unit and port of a port's qualified name; both may have dots in them."""
     dots = [k for k, letter in enumerate(port) if letter == "."]
     at = next((k for k in reversed(dots) if port[:k] in names), dots[0])
     return port[:at], port[at + 1 :]
@@ -154,14 +156,14 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
         {
             "xaxis": {**axis, "range": [-1.6, 1.6]},
             "yaxis": {**axis, "range": [-1.25, 1.25]},
-            "annotations": [_box(u, at[u["name"]], colour[u["name"]], few=len(units) <= _FEW) for u in units],
+            "annotations": [_box(u, at[u["name"]], colour[u["name"]], detailed=len(units) <= _FEW) for u in units],
             "showlegend": False,
             "hovermode": "closest",
             "dragmode": False,
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
     )
-    text = "; ".join(f"{a} to {b}: {', '.join(s.out for s in signals)}" for (a, b), signals in bundles.items())
+    text = "; ".join(f"{a} to {b}: {', '.join(s.output for s in signals)}" for (a, b), signals in bundles.items())
     height = 230 if len(units) <= 2 else 280 + 40 * min(len(units), 10)
     return plot_html(figure, height=height, label=f"Graph of {len(units)} units. {text}")
 
@@ -172,7 +174,7 @@ def _line(points: Floats, colour: str) -> Any:
 
 
 def _head(points: Floats, text: str, colour: str) -> Any:
-    """Return an arrow's head in the middle of its line, where boxes of any size leave it free, with its signals."""
+    """Return an arrow's head with its tooltip, in the middle of the line, which boxes of any size leave free."""
     middle = len(points) // 2
     ends = points[middle - 1 : middle + 1]
     return go.Scatter(
@@ -195,16 +197,16 @@ def _head(points: Floats, text: str, colour: str) -> Any:
 
 def _signal_text(source: str, target: str, signals: Sequence[_Signal]) -> str:
     lines = [f"<b>{escape(source)} → {escape(target)}</b>"]
-    for s in signals[:_MAX_REPORTED]:
-        port = s.out if s.out == s.into else f"{s.out} → {s.into}"
+    for s in signals[:_MAX_LISTED]:
+        port = s.output if s.output == s.input else f"{s.output} → {s.input}"
         lines.append(f"{escape(port)}{escape(_form(s.description))}")
-    if len(signals) > _MAX_REPORTED:
-        lines.append(f"and {len(signals) - _MAX_REPORTED} more")
+    if len(signals) > _MAX_LISTED:
+        lines.append(f"and {len(signals) - _MAX_LISTED} more")
     return "<br>".join(lines)
 
 
 def _form(c: Mapping[str, Any]) -> str:
-    """Return kind, unit and size of a signal, where they say something, such as " (m, x 3)"."""
+    """Return kind, unit and size of a signal, without the usual ones, such as " (m, x 3)"."""
     kind = [] if c["kind"] == "real" else [c["kind"]]
     unit = [c["unit"]] if c["unit"] not in ("", "1") else []
     size = [f"x {c['size']}"] if c["size"] != 1 else []
@@ -212,15 +214,15 @@ def _form(c: Mapping[str, Any]) -> str:
     return f" ({text})" if text else ""
 
 
-def _box(unit: Mapping[str, Any], at: Floats, colour: str, *, few: bool) -> dict[str, Any]:
+def _box(unit: Mapping[str, Any], at: Floats, colour: str, *, detailed: bool) -> dict[str, Any]:
     name, model = escape(unit["name"]), escape(unit["model"])
-    rest = f"FMI {escape(unit['fmi'])}, {escape(rate(unit))}"
-    lines = rest.replace(", sampled", "<br>sampled")  # narrow, for phones
+    details = f"FMI {escape(unit['fmi'])}, {escape(rate(unit))}"
+    lines = details.replace(", sampled", "<br>sampled")  # narrow, for phones
     return {
         "x": float(at[0]),
         "y": float(at[1]),
-        "text": f"<b>{name}</b><br>{model}<br>{lines}" if few else f"<b>{name}</b>",
-        "hovertext": f"{name}: {model}, {rest}",
+        "text": f"<b>{name}</b><br>{model}<br>{lines}" if detailed else f"<b>{name}</b>",
+        "hovertext": f"{name}: {model}, {details}",
         "showarrow": False,
         "bgcolor": "var(--card)",
         "bordercolor": colour,

@@ -1,7 +1,4 @@
-"""Puts a Plotly figure into a page: the page's script draws it in the page's colours and width.
-
-A table of a page.
-"""
+"""HTML that pages are made of: Plotly figures, which the page's script draws in its colours and width, and tables."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,17 +20,16 @@ def plot_html(figure: go.Figure, height: int = 320, label: str = "") -> Markup:
     Args:
         figure: a Plotly figure.
         height: in pixels; the legend comes below.
-        label: what one hears who cannot see it.
+        label: for screen readers.
     """
-    value = cast(dict[str, Any], figure.to_dict())
-    value["layout"].pop("template", None)  # of paper-white figures
-    return Markup(
-        f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{json_html(value)}</div>'
-    )
+    content = cast(dict[str, Any], figure.to_dict())
+    content["layout"].pop("template", None)  # has colours of its own, on white
+    data = json_html(content)
+    return Markup(f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{data}</div>')
 
 
 def json_html(content: Any, name: str = "") -> Markup:
-    """Return data for a page's scripts: nothing in it ends the element. Arrays are packed as Plotly does.
+    """Return data for a page's scripts, escaped so as not to end the element; Plotly packs arrays.
 
     `name` is the element's class, if it has one.
     """
@@ -44,7 +40,7 @@ def json_html(content: Any, name: str = "") -> Markup:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell: what it says, and by which number it is sorted, if not by what it says."""
+    """A cell: its text, and the number that it is sorted by, if not by its text."""
 
     text: str | Markup
     key: float | None = None
@@ -60,15 +56,15 @@ def rows_table(
 ) -> Markup:
     """Return a table as HTML, which scrolls within itself where a page is narrow.
 
-    One that is sortable takes as much of the window as it needs, also beside the text.
+    A sortable table may be wider than the page's text, as wide as the window.
 
     Args:
         header: names of the columns.
         rows: as many cells each.
-        numbers: columns of numbers, which stand to the right.
-        caption: what it is, above it.
+        numbers: columns of numbers, which are aligned right.
+        caption: the title above the table.
         sortable: whether a click on a column's name sorts by it; the page then needs `campaign.js`.
-        cards: whether each row is a block of lines on a phone, each cell with its column's name before it.
+        cards: whether each row is a block of lines on narrow screens, each cell with its column's name before it.
     """
     kind = Markup(' class="number"')
     kinds = [kind if k in numbers else Markup() for k in range(len(header))]

@@ -1,8 +1,7 @@
-"""Writes a page: one HTML file with scripts, style and data inside, that opens offline and asks for nothing.
+"""Writes a page of sections: one HTML file with scripts, style and data inside, which opens offline.
 
-A part of a page.
-
-Keeps numbers and their units together where a line breaks.
+Its Content-Security-Policy lets it run its own scripts only and forbids network requests. In its text, line breaks do
+not separate numbers from their units (`non_breaking`).
 """
 
 import base64
@@ -23,12 +22,12 @@ from handover.scenarios.results.run_folder import write_whole
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A heading and what stands below it.
+    """A part of a page under a heading.
 
     Attributes:
         anchor: its name in links, such as "replay".
         title: the heading.
-        html: what stands below.
+        html: the content.
         scripts: names of files in `scenarios/reporting/page/` that it needs, without `page.js`, which is always there.
     """
 
@@ -60,28 +59,28 @@ def _non_breaking(text: str) -> str:
 _SCRIPT = "page.js"
 
 
-def write_page(path: Path, title: str, lead: Markup, sections: Sequence[Section]) -> None:
+def write_page(path: Path, title: str, header: Markup, sections: Sequence[Section]) -> None:
     """Write a page, whole or not at all.
 
-    A browser lets it run its own scripts, which it knows by their hashes, and lets nothing in it ask a network.
+    The browser runs the page's own scripts only, known by their hashes, and lets nothing in it use the network.
 
     Args:
         path: the HTML file.
         title: the heading.
-        lead: what stands under the heading.
-        sections: what stands below, in this order; those with plots or scripts bring Plotly with them.
+        header: what stands under the heading.
+        sections: in order of appearance; Plotly is included if one of them has plots or scripts.
 
     Raises:
         RecordNotWritten: it cannot be written.
     """
     names = [_SCRIPT, *dict.fromkeys(name for s in sections for name in s.scripts)]
-    drawn = any(s.scripts or 'class="plot"' in s.html for s in sections)
-    scripts = [*([_plotly()] if drawn else []), *map(asset, names)]
+    has_plots = any(s.scripts or 'class="plot"' in s.html for s in sections)
+    scripts = [*([_plotly()] if has_plots else []), *map(asset, names)]
     write_whole(
         path,
         template("page.html").render(
             title=title,
-            lead=Markup(non_breaking(lead)),
+            header=Markup(non_breaking(header)),
             sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
             style=Markup(asset("page.css")),
             scripts=[Markup(s) for s in scripts],
@@ -91,7 +90,7 @@ def write_page(path: Path, title: str, lead: Markup, sections: Sequence[Section]
 
 
 def template(name: str) -> jinja2.Template:
-    """Return a template of `scenarios/reporting/page/`; what it is given is escaped unless it is Markup."""
+    """Return a template of `scenarios/reporting/page/`; values are escaped unless they are Markup."""
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -109,9 +108,9 @@ def _plotly() -> str:
 
 
 def _policy(scripts: Sequence[str]) -> str:
-    """Return the page's Content-Security-Policy: its scripts by their hashes, styles, pictures that it holds itself.
+    """Return the page's Content-Security-Policy: its scripts by their hashes, inline styles, embedded pictures.
 
-    Plotly sets styles of its elements, and passes pictures that are saved on as data and blobs.
+    Plotly sets inline styles, and hands over pictures to be saved as data and blobs.
     """
     hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
     return f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"

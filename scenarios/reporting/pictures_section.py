@@ -1,4 +1,4 @@
-"""Shows what cameras saw at moments of a run, with what was detected drawn over it."""
+"""The section of a page that shows camera pictures of a run, with detections drawn over them."""
 
 import base64
 import math
@@ -14,16 +14,16 @@ from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_folder import RunFolder
 
 _WIDTHS = (960, 800, 640, 480, 360)
-"""Widths of which the greatest is taken with which all pictures have room, px."""
+"""Widths to choose from, px: the greatest at which all pictures have room in the page."""
 
 _QUALITY = 80
-_ROOM = 1_200_000
-"""What pictures may take of a page as base64, bytes."""
+_MAX_BYTES = 1_200_000
+"""Size of all pictures in a page together, in base64."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _DisplayedPicture:
-    """A picture in the page: where it comes from, and what one hears who cannot see it."""
+    """A picture in the page: its source, its data in base64, and a caption for screen readers."""
 
     picture: CameraPicture
     data: str
@@ -36,7 +36,7 @@ class _DisplayedPicture:
 
 
 def pictures_section(folder: RunFolder) -> Section | None:
-    """Return the pictures in a run's folder, those of one moment beside each other; None where there are none.
+    """Return the pictures in a run's folder, those of one moment side by side; None where there are none.
 
     Raises:
         InvalidRunFolder: they are damaged.
@@ -48,21 +48,21 @@ def pictures_section(folder: RunFolder) -> Section | None:
     for picture, data in zip(pictures, _inline(pictures), strict=True):
         moments.setdefault((picture.t, picture.role), []).append(_DisplayedPicture(picture=picture, data=data))
     marks = {mark.label: mark for picture in pictures for mark in picture.marks}
-    html = template("pictures.html").render(moments=moments, legend=list(marks.values()), place=_place)
+    html = template("pictures.html").render(moments=moments, legend=list(marks.values()), place=_mark_style)
     return Section(anchor="pictures", title="What the cameras saw", html=Markup(html))
 
 
 def _inline(pictures: Sequence[CameraPicture]) -> list[str]:
-    """Return the pictures as the page holds them, in the greatest width in which all have room."""
-    made: list[str] = []
+    """Return the pictures in base64, at the greatest width at which all have room."""
+    encoded: list[str] = []
     for width in _WIDTHS:
-        made = [base64.b64encode(_narrowed(p, width)).decode() for p in pictures]
-        if sum(map(len, made)) <= _ROOM:
+        encoded = [base64.b64encode(_scaled_down(p, width)).decode() for p in pictures]
+        if sum(map(len, encoded)) <= _MAX_BYTES:
             break
-    return made
+    return encoded
 
 
-def _narrowed(picture: CameraPicture, width: int) -> bytes:
+def _scaled_down(picture: CameraPicture, width: int) -> bytes:
     if picture.width <= width:
         return picture.jpeg
     height = math.ceil(picture.height * width / picture.width)
@@ -70,8 +70,8 @@ def _narrowed(picture: CameraPicture, width: int) -> bytes:
     return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
 
 
-def _place(mark: Mark, picture: CameraPicture) -> str:
-    """Return the style that puts a mark over its place in a picture of any size."""
+def _mark_style(mark: Mark, picture: CameraPicture) -> str:
+    """Return the CSS that puts a mark at its position in a picture shown at any size."""
     left, top = 100.0 * (mark.u + 0.5) / picture.width, 100.0 * (mark.v + 0.5) / picture.height
     wide = 100.0 * 2.0 * mark.radius / picture.width
     return f"left:{left:.3f}%;top:{top:.3f}%;width:{wide:.3f}%;color:{mark.colour}"

@@ -1,6 +1,6 @@
-"""The part of a page that shows a run in space, with a slider over its time.
+"""The section of a page that animates a run in space, with a slider over its time.
 
-The moments of a run that a replay shows, and the phases between them.
+The page holds a limited number of frames, picked from the record's rows; its script interpolates between them.
 """
 
 import base64
@@ -20,11 +20,11 @@ from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import Section, asset
 
 MAX_FRAMES = 240
-"""Frames of a replay; the page moves bodies smoothly between them."""
+"""Frames of a replay; the page interpolates poses between them."""
 
 
 def frame_rows(time: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the rows of a record, rising, that lie about evenly in time, first and last among them."""
+    """Return ascending rows of a record that are about evenly spaced in time, with the first and the last."""
     last = len(time) - 1
     wanted: Floats = np.linspace(float(time[0]), float(time[-1]), min(MAX_FRAMES, len(time)))
     after = np.clip(np.searchsorted(time, wanted), min(1, last), last)
@@ -33,7 +33,7 @@ def frame_rows(time: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def phase_changes(record: Record, signal: str) -> list[tuple[float, str]]:
-    """Return when each phase begins, s, and its name as one reads it; nothing for the signal ""."""
+    """Return when each phase begins, s, and its name in words; nothing for the signal ""."""
     if not signal:
         return []
     values, names = record[signal], record.items(signal)
@@ -44,7 +44,7 @@ def phase_changes(record: Record, signal: str) -> list[tuple[float, str]]:
 
 
 _MARGIN = 0.04
-"""Room around what is drawn, over its greatest side."""
+"""Margin around what is drawn, as a share of its longest side."""
 _SPEEDS = ("0.5", "1", "2", "5")
 
 Drawn = Line | Body
@@ -53,7 +53,7 @@ Drawn = Line | Body
 def replay_section(replay: Replay, record: Record) -> Section:
     """Return a scene that can be turned, with play button, slider, time and phase, speeds and a legend.
 
-    It holds at most some 240 moments of the run; rigid bodies are held once, with their poses over time.
+    It holds at most some `MAX_FRAMES` moments of the run; rigid bodies are stored once, with their poses over time.
 
     Raises:
         ValueError: a line or a body has neither one row nor as many as the record.
@@ -67,7 +67,7 @@ def replay_section(replay: Replay, record: Record) -> Section:
         "eye": list(replay.eye),
         "low": np.round(low, 4).tolist(),
         "high": np.round(high, 4).tolist(),
-        "traces": [_trace(same) for same in _alike(drawn)],
+        "traces": [_trace(group) for group in _grouped(drawn)],
     }
     return Section(
         anchor="replay",
@@ -78,7 +78,7 @@ def replay_section(replay: Replay, record: Record) -> Section:
 
 
 def _at(drawn: Drawn, rows: NDArray[np.int64], all_rows: int) -> Drawn:
-    """Return what is drawn at some rows of the record only; at one if it stays."""
+    """Return what is drawn with some rows of the record only; with one row if it does not move."""
     if isinstance(drawn, Line):
         return replace(drawn, points=_downsampled(drawn.label, drawn.points, rows, all_rows, keep=drawn.trail))
     q_WB = None if drawn.q_WB is None else _downsampled(drawn.label, drawn.q_WB, rows, all_rows)
@@ -90,13 +90,13 @@ def _downsampled(label: str, values: Floats, rows: NDArray[np.int64], all_rows: 
         return values
     if len(values) != all_rows:
         raise ValueError(f"replay: {label!r} has {len(values)} rows, the record {all_rows}; it needs as many, or one")
-    chosen: Floats = np.asarray(values[rows], dtype=np.float64)
-    stays = not keep and np.array_equal(chosen, np.broadcast_to(chosen[:1], chosen.shape), equal_nan=True)
-    return chosen[:1] if stays else chosen
+    frames: Floats = np.asarray(values[rows], dtype=np.float64)
+    stays = not keep and np.array_equal(frames, np.broadcast_to(frames[:1], frames.shape), equal_nan=True)
+    return frames[:1] if stays else frames
 
 
-def _alike(drawn: Sequence[Drawn]) -> list[list[Drawn]]:
-    """Return groups that one trace can show: tubes and bodies of one look together, each line alone."""
+def _grouped(drawn: Sequence[Drawn]) -> list[list[Drawn]]:
+    """Return groups that one trace can show: tubes and bodies that look alike together, each line alone."""
     groups: dict[Any, list[Drawn]] = {}
     for d in drawn:
         solid = isinstance(d, Body) or d.radii is not None
@@ -104,13 +104,13 @@ def _alike(drawn: Sequence[Drawn]) -> list[list[Drawn]]:
     return list(groups.values())
 
 
-def _trace(same: Sequence[Drawn]) -> dict[str, Any]:
-    first = same[0]
+def _trace(group: Sequence[Drawn]) -> dict[str, Any]:
+    first = group[0]
     look: dict[str, Any] = {"label": first.label, "colour": first.colour, "opacity": first.opacity}
     if isinstance(first, Line) and first.radii is None:
         line = {"width": first.width, "markers": first.markers, "trail": first.trail}
         return {**look, **line, "points": _packed(first.points), "n": first.points.shape[1]}
-    return {**look, "parts": [_part(d) for d in same]}
+    return {**look, "parts": [_part(d) for d in group]}
 
 
 def _part(solid: Drawn) -> dict[str, Any]:
@@ -126,9 +126,9 @@ def _part(solid: Drawn) -> dict[str, Any]:
 
 
 def _continuous(q: Floats) -> Floats:
-    """Return the same orientations by quaternions none of which is opposite to the one before."""
-    turned = np.where(np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0, -1.0, 1.0)
-    return q * np.concatenate([[1.0], np.cumprod(turned)])[:, None]
+    """Return the same orientations with signs such that the page can interpolate from each quaternion to the next."""
+    signs = np.where(np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0, -1.0, 1.0)
+    return q * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
 
 
 def _packed(values: NDArray[Any], dtype: str = "f4") -> Mapping[str, str]:
@@ -138,37 +138,37 @@ def _packed(values: NDArray[Any], dtype: str = "f4") -> Mapping[str, str]:
 
 
 def _window(drawn: Sequence[Drawn]) -> tuple[Floats, Floats]:
-    """Return the least and greatest corner of all that is drawn at any time, with some room around it."""
+    """Return minimum and maximum corner of all that is drawn at any time, with a margin around it."""
     with np.errstate(invalid="ignore"):
         corners = np.array([c for d in drawn for c in _corners(d)])
     low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
-    room = max(_MARGIN * float(np.max(high - low)), 1e-3)
-    return low - room, high + room
+    margin = max(_MARGIN * float(np.max(high - low)), 1e-3)
+    return low - margin, high + margin
 
 
 def _corners(drawn: Drawn) -> tuple[Floats, Floats]:
     if isinstance(drawn, Line):
-        room = np.zeros(1) if drawn.radii is None else drawn.radii
-        points = np.concatenate([drawn.points - room[:, None], drawn.points + room[:, None]]).reshape(-1, 3)
+        radii = np.zeros(1) if drawn.radii is None else drawn.radii
+        points = np.concatenate([drawn.points - radii[:, None], drawn.points + radii[:, None]]).reshape(-1, 3)
     else:
         R_WB = np.eye(3)[None] if drawn.q_WB is None else Rotation.from_quat(drawn.q_WB, scalar_first=True).as_matrix()
-        turned = np.einsum("rij,nj->rni", R_WB, drawn.mesh.vertices)
-        points = np.concatenate([drawn.p_WB + reach for reach in (turned.min(axis=1), turned.max(axis=1))])
-    seen = points[np.isfinite(points).all(axis=1)]
-    if not len(seen):
+        p_BV_W = np.einsum("rij,nj->rni", R_WB, drawn.mesh.vertices)
+        points = np.concatenate([drawn.p_WB + extent for extent in (p_BV_W.min(axis=1), p_BV_W.max(axis=1))])
+    shown = points[np.isfinite(points).all(axis=1)]
+    if not len(shown):
         return np.full(3, np.nan), np.full(3, np.nan)
-    return seen.min(axis=0), seen.max(axis=0)
+    return shown.min(axis=0), shown.max(axis=0)
 
 
 def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str]) -> Markup:
-    names = {d.label: d.colour for d in reversed(drawn)}
+    colours = {d.label: d.colour for d in reversed(drawn)}  # of the first that has the label
     chips = [
         f'<button type="button" aria-pressed="true" data-label="{escape(name)}">'
-        f'<i style="background: {escape(names[name])}"></i>{escape(name)}</button>'
+        f'<i style="background: {escape(colours[name])}"></i>{escape(name)}</button>'
         for name in dict.fromkeys(d.label for d in drawn)
     ]
     speeds = [f'<option value="{s}"{" selected" if s == "1" else ""}>{s}&times;</option>' for s in _SPEEDS]
-    entries = [f'<p class="soft">{escape(note)}</p>' for note in notes]
+    paragraphs = [f'<p class="soft">{escape(note)}</p>' for note in notes]
     return Markup(
         f"<style>{asset('replay.css')}</style>"
         f'<div class="replay">{data}'
@@ -182,5 +182,5 @@ def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str
         f'<select class="replay-speed" aria-label="speed of the replay">{"".join(speeds)}</select>'
         '<button type="button" class="replay-reset">reset view</button></div>'
         f'<div class="replay-legend" role="group" aria-label="what is shown">{"".join(chips)}</div>'
-        f"</div>{''.join(entries)}</div>"
+        f"</div>{''.join(paragraphs)}</div>"
     )

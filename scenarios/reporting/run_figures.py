@@ -1,4 +1,7 @@
-"""Draws the figures of a run that has ended, of what its folder keeps."""
+"""Draws the figures of a run for papers, from what its folder keeps.
+
+The scenario's evaluator sees the recorded signals again, so that figures can show what it found.
+"""
 
 import os
 import re
@@ -18,22 +21,22 @@ from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported
 
 _MAX_SIGNALS = 6
-"""Signals in one figure."""
+"""Ports of a unit in its figure."""
 
 
 def draw_figures(
     experiment: Experiment[Any], parameters: Any, evaluator: Evaluator, record: Record, folder: Path
 ) -> Sequence[Figure]:
-    """Draw what a scenario shows of a run into a folder: the scene and the like, then curves over time."""
+    """Draw a scenario's figures of a run into a folder: those of `draw`, such as the scene, then those over time."""
     scenes = experiment.draw(parameters, evaluator, record, folder)
     return [*scenes, *draw_time_figures(experiment.time_figures(parameters, record), record.time, folder)]
 
 
 def draw_run(folder: RunFolder) -> Sequence[Figure]:
-    """Draw a run's figures into `figures/`, in place of those of the same names, all or none.
+    """Draw a run's figures into `figures/`, replacing those of the same names; all of them or none.
 
     Raises:
-        InvalidRunFolder: it is not the folder of a run, it is damaged, or it has nothing that can be drawn.
+        InvalidRunFolder: it is not the folder of a run, it is damaged, or it has nothing to draw.
         RecordNotWritten: they cannot be written.
     """
     facts, record = RunFacts.read(folder), record_of(folder)
@@ -43,7 +46,7 @@ def draw_run(folder: RunFolder) -> Sequence[Figure]:
     with disk_errors_reported(folder.figures):
         try:
             unfinished.mkdir(exist_ok=True)
-            figures = _drawn(facts, record, unfinished)
+            figures = _draw_record(facts, record, unfinished)
             folder.figures.mkdir(exist_ok=True)
             for file in unfinished.iterdir():
                 os.replace(file, folder.figures / file.name)
@@ -52,14 +55,14 @@ def draw_run(folder: RunFolder) -> Sequence[Figure]:
     return figures
 
 
-def _drawn(facts: RunFacts, record: Record, to: Path) -> Sequence[Figure]:
+def _draw_record(facts: RunFacts, record: Record, to: Path) -> Sequence[Figure]:
     experiment = facts.experiment
     if experiment is None:
         return draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
     try:
         parameters = parameters_of(type(experiment), facts.run["parameters"])
         evaluator = experiment.evaluator_of_record(parameters, read_picture_files(facts.folder.pictures))
-        _show(record, evaluator)
+        _evaluate(record, evaluator)
         return draw_figures(experiment, parameters, evaluator, record, to)
     except (InvalidParameter, KeyError) as e:
         raise InvalidRunFolder(
@@ -67,8 +70,8 @@ def _drawn(facts: RunFacts, record: Record, to: Path) -> Sequence[Figure]:
         ) from e
 
 
-def _show(record: Record, evaluator: Evaluator) -> None:
-    """Let a watch see a run again."""
+def _evaluate(record: Record, evaluator: Evaluator) -> None:
+    """Replay a record to an evaluator."""
     signals = RecordedSignals(record)
     for row, t in enumerate(record.time.tolist()):
         signals.row = row
@@ -77,7 +80,7 @@ def _show(record: Record, evaluator: Evaluator) -> None:
 
 
 def figures_of_outputs(units: Iterable[str], record: Record) -> list[TimeFigure]:
-    """Return the first real outputs of each unit over time, an axis for each."""
+    """Return a figure for each unit with its first real outputs over time, each on its own axes."""
     figures: list[TimeFigure] = []
     for name in units:
         ports = [s for s in record.signals if s.startswith(f"{name}.") and record[s].dtype.kind == "f"][:_MAX_SIGNALS]

@@ -1,10 +1,7 @@
-"""Writes the page of a run, of what is in its folder.
+"""Writes the report page of a run, from what its folder keeps.
 
-What stands under the heading of a run's page: what ran, and how it ended.
-
-The tables of a run's page: figures of merit, parameters, the master, files.
-
-A run's figures beside what its paper tells of them.
+`write_run_page` puts the sections together. Header, tables (metrics, parameters, master, files) and the comparison with
+published values are made here; graph, plots, pictures and replay in their own modules.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,145 +24,9 @@ from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import format_conversion, format_metric, master_rows
 
-_VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
-
-
-def run_header(facts: RunFacts) -> Markup:
-    """Return the verdict, what ran with which seed and versions, and what was told of a failure."""
-    summary, versions = facts.summary, facts.run.get("versions", {})
-    entries = [facts.title] if facts.title else []
-    if facts.run.get("seed") is not None:
-        entries.append(f"seed {facts.run['seed']}")
-    entries.append(_how_long(facts))
-    entries += [f"{name} {versions[key]}" for key, name in _VERSIONS.items() if key in versions]
-    return Markup(
-        template("run_lead.html").render(
-            entries=[t for t in entries if t],
-            verdict=_verdict(facts),
-            good=summary["success"],
-            reason=summary["reason"],
-            to_go_on=facts.folder.checkpoint.exists(),
-            failure={"log": (), "instance": None, **(summary.get("failure") or {})},
-        )
-    )
-
-
-def _verdict(facts: RunFacts) -> str:
-    if facts.summary["success"]:
-        return "Succeeded"
-    if not facts.ended:
-        return "Not ended"
-    return "Interrupted" if facts.summary["reason"].startswith("interrupted") else "Failed"
-
-
-def _how_long(facts: RunFacts) -> str:
-    simulated, wall = (facts.summary.get(f"{name}_seconds") for name in ("simulated", "wall"))
-    if simulated is None:
-        return ""
-    return f"{simulated:.1f} s simulated" + ("" if wall is None else f" in {wall:.1f} s")
-
-
-_IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")
-"""Metrics that have a place in other tables."""
-
-_FILES = {
-    "summary.json": "verdict and figures of the run",
-    "signals.parquet": "all signals over time, with units",
-    "run.json": "configuration, versions and hashes",
-    "checkpoint.zip": "where it can go on",
-    "figures": "figures as PNG and SVG",
-    "pictures": "pictures of the cameras",
-}
-
-
-def metrics_section(facts: RunFacts) -> Section | None:
-    """Return the figures of merit, those of the headline first."""
-    metrics: Mapping[str, Any] = facts.summary["metrics"]
-    first = [n for n in facts.headline if n in metrics]
-    others = [n for n in metrics if n not in first and not n.startswith(_IN_TABLES)]
-    rows = [(metrics[n].get("description") or n, format_metric(metrics[n]), n) for n in first + others]
-    return _table("figures", "Figures of the run", rows, first=len(first))
-
-
-def parameters_section(facts: RunFacts) -> Section | None:
-    """Return the parameters, with what they are where the run tells it."""
-    return _table("parameters", "Parameters", [(description, value, n) for n, value, description in facts.parameters])
-
-
-def master_section(facts: RunFacts) -> Section | None:
-    """Return how the units were coupled, and which units of measure were converted.
-
-    Raises:
-        InvalidRunFolder: what the folder tells of it is damaged.
-    """
-    try:
-        rows = master_rows(facts.summary) if "master" in facts.summary else []
-        conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
-    except (KeyError, TypeError, ValueError) as e:
-        fault = f"what it tells of its master is damaged: {type(e).__name__} {e}"
-        raise InvalidRunFolder(facts.folder.path, fault) from e
-    if not rows and not conversions:
-        return None
-    html = template("run_master.html").render(rows=rows, conversions=conversions)
-    return Section(anchor="master", title="Master", html=Markup(html))
-
-
-def files_section(facts: RunFacts) -> Section:
-    """Return what is in the run's folder, and the versions that it ran with."""
-    path = facts.folder.path
-    there = [(name, what) for name, what in _FILES.items() if _is_something(path / name)]
-    versions, units = facts.run.get("versions", {}), facts.run.get("units", {})
-    html = template("run_files.html").render(files=there, units=units, versions=versions)
-    return Section(anchor="files", title="Files", html=Markup(html))
-
-
-def _is_something(path: Any) -> bool:
-    return any(path.iterdir()) if path.is_dir() else path.exists()
-
-
-def _table(anchor: str, title: str, rows: Sequence[tuple[str, str, str]], first: int = 0) -> Section | None:
-    if not rows:
-        return None
-    html = template("run_table.html").render(rows=rows, first=first)
-    return Section(anchor=anchor, title=title, html=Markup(html))
-
-
-def published_section(facts: RunFacts) -> Section | None:
-    """Return the run's figures that the paper has too, for parameters near the published; None if there are none."""
-    metrics = facts.summary["metrics"]
-    rows = [_row(v, metrics[v.metric]) for v in _values(facts) if v.metric in metrics]
-    if not rows:
-        return None
-    note = "One run is no trial of what was published: it does not tell how its figures vary."
-    html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
-    return Section(
-        anchor="published", title="Published values", html=html + Markup("<p class='soft'>{}</p>").format(note)
-    )
-
-
-def _values(facts: RunFacts) -> Sequence[PublishedValue]:
-    if facts.experiment is None:
-        return ()
-    try:
-        return facts.experiment.published(parameters_of(type(facts.experiment), facts.run["parameters"]))
-    except InvalidParameter:  # of another version: the page tells it where it leaves plots out
-        return ()
-
-
-def _row(value: PublishedValue, metric: Mapping[str, Any]) -> tuple[str | Markup, ...]:
-    unit = {"unit": metric["unit"]}
-    shown = f"{value.relation} {format_metric({**unit, 'value': value.value})}".lstrip()
-    if value.limits is not None:
-        shown += " ({} to {})".format(*(format_metric({**unit, "value": x}) for x in value.limits))
-    status = "" if value.status == "stated" else f" ({value.status})"
-    where = Markup("{}{}").format(value.where, status)
-    if value.note:
-        where += Markup("<br><span class='soft'>{}</span>").format(value.note)
-    return metric["description"] or value.metric, format_metric(metric), shown, where
-
 
 def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
-    """Write the page of a run that has ended, or that was completed: what of it the folder has is in it.
+    """Write the page of a run, with all that its folder has of it.
 
     Args:
         folder: the run's.
@@ -180,10 +41,10 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     sections = [
         metrics_section(facts),
         published_section(facts),
-        *_seen(facts, record),
+        *_sections_of_scenario(facts, record),
         pictures_section(folder),
         None if record is None else explorer_section(record),
-        *_of_units(facts),
+        *_sections_of_units(facts),
         parameters_section(facts),
         master_section(facts),
         files_section(facts),
@@ -192,8 +53,8 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
     write_page(file or folder.report, heading, run_header(facts), [s for s in sections if s is not None])
 
 
-def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
-    """Return what the scenario shows of its record; a section that says why where it cannot."""
+def _sections_of_scenario(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
+    """Return the scenario's plots and replay of the record; a section that says why where they cannot be made."""
     if facts.experiment is None or record is None:
         return ()
     try:
@@ -209,9 +70,146 @@ def _seen(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
         return [Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))]
 
 
-def _of_units(facts: RunFacts) -> Sequence[Section | None]:
+def _sections_of_units(facts: RunFacts) -> Sequence[Section | None]:
     try:
         return graph_section(facts.run), cpu_section(facts.summary)
     except (KeyError, TypeError, AttributeError, ValueError, IndexError) as e:
-        fault = f"what it tells of its units is damaged: {type(e).__name__} {e}"
+        fault = f"its description of the units is damaged: {type(e).__name__} {e}"
         raise InvalidRunFolder(facts.folder.path, fault) from e
+
+
+_VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
+
+
+def run_header(facts: RunFacts) -> Markup:
+    """Return the verdict, what ran with which seed and versions, and the log of a failure."""
+    summary, versions = facts.summary, facts.run.get("versions", {})
+    entries = [facts.title] if facts.title else []
+    if facts.run.get("seed") is not None:
+        entries.append(f"seed {facts.run['seed']}")
+    entries.append(_duration(facts))
+    entries += [f"{name} {versions[key]}" for key, name in _VERSIONS.items() if key in versions]
+    return Markup(
+        template("run_lead.html").render(
+            entries=[t for t in entries if t],
+            verdict=_verdict(facts),
+            good=summary["success"],
+            reason=summary["reason"],
+            resumable=facts.folder.checkpoint.exists(),
+            failure={"log": (), "instance": None, **(summary.get("failure") or {})},
+        )
+    )
+
+
+def _verdict(facts: RunFacts) -> str:
+    if facts.summary["success"]:
+        return "Succeeded"
+    if not facts.ended:
+        return "Not ended"
+    return "Interrupted" if facts.summary["reason"].startswith("interrupted") else "Failed"
+
+
+def _duration(facts: RunFacts) -> str:
+    simulated, wall = (facts.summary.get(f"{name}_seconds") for name in ("simulated", "wall"))
+    if simulated is None:
+        return ""
+    return f"{simulated:.1f} s simulated" + ("" if wall is None else f" in {wall:.1f} s")
+
+
+_IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")
+"""Beginnings of the names of metrics that other sections show."""
+
+_FILES = {
+    "summary.json": "verdict and figures of the run",
+    "signals.parquet": "all signals over time, with units",
+    "run.json": "configuration, versions and hashes",
+    "checkpoint.zip": "the last checkpoint, to resume from",
+    "figures": "figures as PNG and SVG",
+    "pictures": "pictures of the cameras",
+}
+
+
+def metrics_section(facts: RunFacts) -> Section | None:
+    """Return the metrics, those of the headline first."""
+    metrics: Mapping[str, Any] = facts.summary["metrics"]
+    first = [n for n in facts.headline if n in metrics]
+    others = [n for n in metrics if n not in first and not n.startswith(_IN_TABLES)]
+    rows = [(metrics[n].get("description") or n, format_metric(metrics[n]), n) for n in first + others]
+    return _table("figures", "Figures of the run", rows, first=len(first))
+
+
+def parameters_section(facts: RunFacts) -> Section | None:
+    """Return the parameters, with their descriptions where the run has them."""
+    return _table("parameters", "Parameters", [(description, value, n) for n, value, description in facts.parameters])
+
+
+def master_section(facts: RunFacts) -> Section | None:
+    """Return how the units were coupled, and which units of measure were converted.
+
+    Raises:
+        InvalidRunFolder: the folder's description of it is damaged.
+    """
+    try:
+        rows = master_rows(facts.summary) if "master" in facts.summary else []
+        conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
+    except (KeyError, TypeError, ValueError) as e:
+        fault = f"its description of the master is damaged: {type(e).__name__} {e}"
+        raise InvalidRunFolder(facts.folder.path, fault) from e
+    if not rows and not conversions:
+        return None
+    html = template("run_master.html").render(rows=rows, conversions=conversions)
+    return Section(anchor="master", title="Master", html=Markup(html))
+
+
+def files_section(facts: RunFacts) -> Section:
+    """Return the files in the run's folder, and the versions that it ran with."""
+    path = facts.folder.path
+    files = [(name, what) for name, what in _FILES.items() if _has_content(path / name)]
+    versions, units = facts.run.get("versions", {}), facts.run.get("units", {})
+    html = template("run_files.html").render(files=files, units=units, versions=versions)
+    return Section(anchor="files", title="Files", html=Markup(html))
+
+
+def _has_content(path: Any) -> bool:
+    return any(path.iterdir()) if path.is_dir() else path.exists()
+
+
+def _table(anchor: str, title: str, rows: Sequence[tuple[str, str, str]], first: int = 0) -> Section | None:
+    if not rows:
+        return None
+    html = template("run_table.html").render(rows=rows, first=first)
+    return Section(anchor=anchor, title=title, html=Markup(html))
+
+
+def published_section(facts: RunFacts) -> Section | None:
+    """Return the run's metrics beside the paper's values, for parameters near the published; None if there are none."""
+    metrics = facts.summary["metrics"]
+    rows = [_published_row(v, metrics[v.metric]) for v in _published_values(facts) if v.metric in metrics]
+    if not rows:
+        return None
+    note = "One run does not test what was published: it does not show how its figures vary."
+    html = rows_table(("figure", "this run", "published", "where"), rows, numbers=(1, 2), cards=True)
+    return Section(
+        anchor="published", title="Published values", html=html + Markup("<p class='soft'>{}</p>").format(note)
+    )
+
+
+def _published_values(facts: RunFacts) -> Sequence[PublishedValue]:
+    if facts.experiment is None:
+        return ()
+    try:
+        return facts.experiment.published(parameters_of(type(facts.experiment), facts.run["parameters"]))
+    except InvalidParameter:  # of another version: the page reports it in place of the plots
+        return ()
+
+
+def _published_row(value: PublishedValue, metric: Mapping[str, Any]) -> tuple[str | Markup, ...]:
+    unit = {"unit": metric["unit"]}
+    shown = f"{value.relation} {format_metric({**unit, 'value': value.value})}".lstrip()
+    if value.limits is not None:
+        shown += " ({} to {})".format(*(format_metric({**unit, "value": x}) for x in value.limits))
+    status = "" if value.status == "stated" else f" ({value.status})"
+    where = Markup("{}{}").format(value.where, status)
+    if value.note:
+        where += Markup("<br><span class='soft'>{}</span>").format(value.note)
+    return metric["description"] or value.metric, format_metric(metric), shown, where

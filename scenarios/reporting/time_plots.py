@@ -1,8 +1,6 @@
-"""Draws what a scenario gives to be drawn over time.
+"""The sections of a page with curves over time: a scenario's own plots, and an explorer of all recorded signals.
 
-All recorded signals, to be chosen from and drawn.
-
-Few rows of a signal that look like all of them.
+Both downsample: a page holds few rows of a signal, which look like all of them (`rows_of_curve`, `rows_of_steps`).
 """
 
 import base64
@@ -27,25 +25,25 @@ Rows = NDArray[np.int64]
 
 
 def rows_of_curve(values: Floats, max_rows: int) -> Rows:
-    """Return rows of a curve, shape (rows,), between which straight lines look like it; about `most` at the most.
+    """Return rows of a curve, shape (rows,), between which straight lines look like it; about `max_rows` at most.
 
-    Gaps (NaN) stay gaps. Rows are chosen by extremes and by the largest triangles.
+    Gaps (NaN) stay gaps. Rows are selected by MinMaxLTTB: extremes first, then the largest triangles.
     """
     if len(values) <= max_rows:
         return np.arange(len(values))
     finite = np.isfinite(values)
-    there = np.flatnonzero(finite)
-    if len(there) > max_rows:
-        chosen = MinMaxLTTBDownsampler().downsample(np.ascontiguousarray(values[there]), n_out=max_rows)
-        there = there[chosen.astype(np.int64)]
+    rows = np.flatnonzero(finite)
+    if len(rows) > max_rows:
+        selected = MinMaxLTTBDownsampler().downsample(np.ascontiguousarray(values[rows]), n_out=max_rows)
+        rows = rows[selected.astype(np.int64)]
     gaps = np.flatnonzero(~finite & np.concatenate(([True], finite[:-1])))  # the first row of each
-    return np.union1d(there, gaps[:max_rows])
+    return np.union1d(rows, gaps[:max_rows])
 
 
 def rows_of_steps(values: Floats, max_rows: int) -> Rows:
-    """Return the rows where a value that is held changes, the first and the last; a curve's if they are too many.
+    """Return the rows where a held value changes, the first and the last; `rows_of_curve` if they are too many.
 
-    Of a gap (NaN) the row before it is one, too: until there the value is drawn.
+    The row before a gap (NaN) is among them: the value is drawn until there.
     """
     if len(values) == 0:
         return np.zeros(0, np.int64)
@@ -57,7 +55,7 @@ def rows_of_steps(values: Floats, max_rows: int) -> Rows:
 
 
 def changes_of(values: Floats) -> Rows:
-    """Return the rows whose value is another than that before; from gap to gap (NaN) is no change."""
+    """Return the rows whose value differs from the one before; NaN after NaN is no change."""
     before, after = values[:-1], values[1:]
     return np.flatnonzero((before != after) & ~(np.isnan(before) & np.isnan(after))) + 1
 
@@ -75,7 +73,7 @@ _LEVELS = ("longdash", "longdashdot")
 
 
 def time_plots_section(plots: Sequence[TimePlot], time: Floats) -> Section | None:
-    """Return the plots below each other, over the record's time, s; None where there are none."""
+    """Return plots below each other, over the record's time, s; None where there are none."""
     if not plots:
         return None
     html = Markup("").join(
@@ -86,7 +84,7 @@ def time_plots_section(plots: Sequence[TimePlot], time: Floats) -> Section | Non
 
 
 def time_figure(plot: TimePlot, time: Floats) -> go.Figure:
-    """Return a plot as a figure, with its unit at the axis and at each value told; the page draws the phases."""
+    """Return a plot as a Plotly figure, with its unit at the axis and in tooltips; the page's script adds phases."""
     meta: dict[str, Any] = {"time": True}
     if plot.phases:
         meta["phases"] = _phases(plot.phases)
@@ -138,29 +136,28 @@ def _level(value: float, label: str, time: Floats, dash: str) -> Any:
 
 
 def _phases(phases: Sequence[Phase]) -> list[dict[str, Any]]:
-    """Return the phases as the page's script takes them; the longest ones where there are too many to be seen."""
+    """Return the phases as the page's script takes them; only the longest where there are too many to be seen."""
     longest = sorted(phases, key=lambda phase: phase.begin - phase.end)[:_MAX_PHASES]
     return [{"from": p.begin, "to": p.end, "name": p.name} for p in sorted(longest, key=lambda p: p.begin)]
 
 
-_BUDGET = 1_400_000
-"""Bytes in the page for all signals, about."""
+_MAX_BYTES = 1_400_000
+"""Approximate size of all signals together in the page."""
 _MIN_ROWS, _MAX_EXPLORED_ROWS = 60, 800
-"""Points of a scalar signal."""
-_A_POINT = 8 * 4 / 3
-"""Bytes that a point takes: time and value as float32, in base64."""
+"""Limits of the number of points of a scalar signal."""
+_BYTES_PER_POINT = 8 * 4 / 3
+"""Time and value as float32, in base64."""
 
 
 def explorer_section(record: Record) -> Section | None:
-    """Return what draws any signal of a record; None where nothing was recorded.
+    """Return a section in which any signals of a record can be selected and drawn; None where nothing was recorded.
 
-    A value that is held is kept exactly, as long as it does not change too often; curves by points between which
-    straight lines look like them.
+    A held value is kept exactly, unless it changes too often; curves are downsampled.
     """
     if len(record.time) < 2 or not record.signals:
         return None
     columns = sum(int(np.prod(record[name].shape[1:])) for name in record.signals)
-    max_rows = int(np.clip(_BUDGET / (_A_POINT * columns), _MIN_ROWS, _MAX_EXPLORED_ROWS))
+    max_rows = int(np.clip(_MAX_BYTES / (_BYTES_PER_POINT * columns), _MIN_ROWS, _MAX_EXPLORED_ROWS))
     time = record.time.astype(np.float32)
     data = {
         "span": [float(time[0]), float(time[-1])],

@@ -1,1 +1,1 @@
-"""A run's folder, written and read; its summary is made here, in one place."""
+"""The folder of a run: written, read and checked; the one place where its summary is made."""

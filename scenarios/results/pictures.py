@@ -1,4 +1,4 @@
-"""The camera pictures in a run's folder: JPEG files, and `pictures.json` that tells what they show."""
+"""The camera pictures in a run's folder: JPEG files, and `pictures.json` that describes them."""
 
 import json
 import re
@@ -16,7 +16,7 @@ _KEYS = ("t", "camera", "role", "width", "height")
 
 
 def write_picture_files(folder: Path, pictures: Sequence[CameraPicture]) -> None:
-    """Write pictures into a folder, in place of those that are in it; without pictures there is no folder.
+    """Write pictures into a folder, replacing those in it; without pictures there is no folder.
 
     Raises:
         RecordNotWritten: they cannot be written.
@@ -31,32 +31,32 @@ def write_picture_files(folder: Path, pictures: Sequence[CameraPicture]) -> None
         for number, picture in enumerate(pictures, start=1):
             file = f"{number:02}_{_plain(picture.role)}_{_plain(picture.camera)}.jpg"
             (folder / file).write_bytes(picture.jpeg)
-            facts = {name: getattr(picture, name) for name in _KEYS}
-            entries.append({**facts, "file": file, "marks": [asdict(mark) for mark in picture.marks]})
+            fields = {name: getattr(picture, name) for name in _KEYS}
+            entries.append({**fields, "file": file, "marks": [asdict(mark) for mark in picture.marks]})
     write_whole(folder / "pictures.json", json.dumps(entries, indent=2, allow_nan=False) + "\n")
 
 
 def read_picture_files(folder: Path) -> list[CameraPicture]:
-    """Return the pictures in a folder, in their order; none where there is no folder of the kind.
+    """Return the pictures in a folder, in the order in which they were written; none where it has no `pictures.json`.
 
     Raises:
-        InvalidRunFolder: it is damaged.
+        InvalidRunFolder: `pictures.json` or a picture is damaged.
     """
-    listed = folder / "pictures.json"
-    if not listed.is_file():
+    index = folder / "pictures.json"
+    if not index.is_file():
         return []
     try:
-        return [_picture(folder, entries) for entries in json.loads(listed.read_bytes())]
+        return [_picture(folder, entry) for entry in json.loads(index.read_bytes())]
     except OSError as e:
         raise InvalidRunFolder(folder.parent, f"its picture {e.filename} cannot be read: {e.strerror}") from e
     except (ValueError, TypeError, KeyError) as e:
         raise InvalidRunFolder(folder.parent, f"its pictures.json is damaged: {one_line(e)}") from e
 
 
-def _picture(folder: Path, entries: dict[str, Any]) -> CameraPicture:
-    marks = tuple(Mark(**mark) for mark in entries["marks"])
-    jpeg = (folder / Path(entries["file"]).name).read_bytes()
-    return CameraPicture(jpeg=jpeg, marks=marks, **{name: entries[name] for name in _KEYS})
+def _picture(folder: Path, entry: dict[str, Any]) -> CameraPicture:
+    marks = tuple(Mark(**mark) for mark in entry["marks"])
+    jpeg = (folder / Path(entry["file"]).name).read_bytes()
+    return CameraPicture(jpeg=jpeg, marks=marks, **{name: entry[name] for name in _KEYS})
 
 
 def _plain(name: str) -> str:

@@ -1,6 +1,6 @@
-"""What a run's folder says of it, checked as it is read: folders come from other versions, and from broken disks.
+"""Reads a run back from its folder, for pages, figures and tables: `run.json`, `summary.json` and the record.
 
-The record in a run's folder, as pages and figures need it.
+All is checked as it is read, since folders come from other versions, and from broken disks.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,13 +20,13 @@ _NEEDED = {"run.json": ("scenario", "parameters"), "summary.json": ("success", "
 
 @dataclass(frozen=True, kw_only=True)
 class RunFacts:
-    """A run as its folder tells it.
+    """A run, as its folder describes it.
 
     Attributes:
-        folder: where it is.
-        run, summary: what is in `run.json` and `summary.json`; of a run that was killed, a summary that says so.
-        experiment: the scenario, if it is one of the catalog.
-        ended: whether the run came to write its summary.
+        folder: the run's.
+        run, summary: contents of `run.json` and `summary.json`; for a run that was killed, a summary that says so.
+        experiment: the scenario, if the catalog has it; None for an SSP.
+        ended: whether the run wrote its summary.
     """
 
     folder: RunFolder
@@ -49,22 +49,23 @@ class RunFacts:
             summary = unwritten_summary(run)
         _check(folder, "summary.json", summary, Summary)
         _check_metrics(folder, cast(Mapping[str, Any], summary["metrics"]))
-        named = SCENARIOS.get(run["scenario"])
-        return cls(folder=folder, run=run, summary=summary, experiment=None if named is None else named(), ended=ended)
+        scenario = SCENARIOS.get(run["scenario"])
+        experiment = None if scenario is None else scenario()
+        return cls(folder=folder, run=run, summary=summary, experiment=experiment, ended=ended)
 
     @property
     def scenario(self) -> str:
-        """Its name."""
+        """The scenario's name."""
         return self.run["scenario"]
 
     @property
     def title(self) -> str:
-        """What it does, in a line; "" where nothing tells."""
+        """What the scenario does, in a line; "" if unknown."""
         return self.run.get("title", "" if self.experiment is None else self.experiment.title)
 
     @property
     def headline(self) -> Sequence[str]:
-        """Names of the metrics that are told first."""
+        """Names of the metrics that summaries list first."""
         return self.run.get("headline", () if self.experiment is None else self.experiment.headline)
 
     @property
@@ -92,15 +93,15 @@ def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
 
 
 def record_of(folder: RunFolder) -> Record | None:
-    """Return a run's record; None where there is none, or one of less than two rows, which shows nothing over time.
+    """Return a run's record; None where there is none, or only one row of it, which shows nothing over time.
 
     Raises:
-        InvalidRunFolder: it is damaged.
+        InvalidRunFolder: the record is damaged.
     """
     if not folder.signals.exists():
         return None
     try:
         record = Record(folder.signals)
         return record if len(record.time) > 1 else None
-    except (OSError, ValueError, KeyError) as e:  # Arrow's faults are among them
+    except (OSError, ValueError, KeyError) as e:  # Arrow's exceptions are subclasses of these
         raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e

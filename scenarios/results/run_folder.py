@@ -1,4 +1,8 @@
-"""The folder that a run leaves behind: checked before the run, written to during and after it."""
+"""A run's output folder: checked before the run, written to during and after it.
+
+Files are replaced as a whole (`write_whole`), so that a process may end at any time and leave no half-written JSON.
+A lock on the folder (`folder_held`) keeps two processes from working in it.
+"""
 
 import contextlib
 import errno
@@ -19,7 +23,7 @@ _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-pytho
 
 
 class InvalidRunFolder(ValueError):
-    """The output folder cannot be used."""
+    """A folder that cannot be used as a run's output folder, or be read as one."""
 
     def __init__(self, path: Path, fault: str) -> None:
         super().__init__(f"output folder {path}: {fault}")
@@ -42,7 +46,7 @@ def check_place(path: Path) -> None:
 class RunFolder:
     """Paths of a run's files: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `pictures/`, `figures/`.
 
-    While it goes on there are the files of a `Recorder`, and `checkpoint.zip` if it was asked for.
+    During the run there are also the files of a `Recorder`, and `checkpoint.zip` if checkpoints were requested.
 
     Raises:
         InvalidRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
@@ -59,7 +63,7 @@ class RunFolder:
 
     @classmethod
     def of_run(cls, path: Path) -> "RunFolder":
-        """Return the folder that a run has left."""
+        """Return the existing folder of a run, which is not checked."""
         folder = cls.__new__(cls)
         folder.path = path
         return folder
@@ -71,7 +75,7 @@ class RunFolder:
 
     @property
     def checkpoint(self) -> Path:
-        """The last checkpoint of a run that has not come to its end."""
+        """The last checkpoint of a run that is not complete."""
         return self.path / "checkpoint.zip"
 
     @property
@@ -91,7 +95,7 @@ class RunFolder:
 
     @property
     def is_there(self) -> bool:
-        """Whether a run has begun in it."""
+        """Whether a run was started in it."""
         return (self.path / "run.json").is_file()
 
     def make(self) -> None:
@@ -106,7 +110,7 @@ class RunFolder:
             raise InvalidRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
 
     def remove_presentation(self) -> None:
-        """Remove page and figures, which tell of less than the run that goes on.
+        """Remove page and figures, which show less than the run that is resumed.
 
         Raises:
             RecordNotWritten: they cannot be removed.
@@ -118,40 +122,40 @@ class RunFolder:
 
     @contextlib.contextmanager
     def held(self) -> Generator[None, None, None]:
-        """Keep other processes that call this from the folder that a run has left.
+        """Lock the folder of a run against other processes that call this.
 
         Raises:
-            InvalidRunFolder: another process holds it, or it is not there.
+            InvalidRunFolder: another process holds it, or it does not exist.
         """
         with folder_held(self.path, "the run still goes on"):
             yield
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
-        """Write `summary.json`; this and what follows raise `RecordNotWritten` where they cannot."""
+        """Write `summary.json`; this and the next two raise `RecordNotWritten` if the disk does not take it."""
         _write_json(self.path / "summary.json", summary)
 
     def write_run(self, run: Mapping[str, Any]) -> None:
         """Write `run.json`."""
         _write_json(self.path / "run.json", run)
 
-    def add_to_run(self, **facts: Any) -> None:
-        """Add facts to `run.json`.
+    def add_to_run(self, **entries: Any) -> None:
+        """Add entries to `run.json`.
 
         Raises:
             InvalidRunFolder: there is none.
         """
-        _write_json(self.path / "run.json", {**self.read_run(), **facts})
+        _write_json(self.path / "run.json", {**self.read_run(), **entries})
 
     def read_run(self) -> dict[str, Any]:
         """Return what `write_run` wrote.
 
         Raises:
-            InvalidRunFolder: there is nothing of the kind.
+            InvalidRunFolder: it is missing or damaged.
         """
         return read_object(self.path / "run.json", "it is not the folder of a run: it has no run.json")
 
     def read_summary(self) -> dict[str, Any]:
-        """Return what `write_summary` wrote; nothing if the run has not come so far.
+        """Return what `write_summary` wrote; an empty dict if the run has not written it.
 
         Raises:
             InvalidRunFolder: it is damaged.
@@ -164,7 +168,7 @@ def read_object(file: Path, missing: str) -> dict[str, Any]:
     """Return the JSON object in a file of a folder.
 
     Raises:
-        InvalidRunFolder: it is damaged, or cannot be read, which is told as `missing`.
+        InvalidRunFolder: it is damaged, or it cannot be read, with the message `missing`.
     """
     try:
         content = json.loads(file.read_bytes())
@@ -179,10 +183,10 @@ def read_object(file: Path, missing: str) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def folder_held(path: Path, by_another: str) -> Generator[None, None, None]:
-    """Keep other processes that call this from a folder.
+    """Lock a folder against other processes that call this.
 
     Raises:
-        InvalidRunFolder: another process holds it, which is told as `by_another`, or it is not there.
+        InvalidRunFolder: another process holds it, with the message `by_another`, or it does not exist.
     """
     with contextlib.ExitStack() as held:
         try:
@@ -197,7 +201,7 @@ def folder_held(path: Path, by_another: str) -> Generator[None, None, None]:
 
 @contextlib.contextmanager
 def disk_errors_reported(path: Path) -> Generator[None, None, None]:
-    """Tell as RecordNotWritten that a file could not be written."""
+    """Raise RecordNotWritten for a file where the system raises OSError."""
     try:
         yield
     except OSError as e:
@@ -205,12 +209,12 @@ def disk_errors_reported(path: Path) -> Generator[None, None, None]:
 
 
 def is_full(e: OSError) -> bool:
-    """Return whether there is no room: the disk is full, or someone's share of it, or a file at its largest."""
+    """Return whether space ran out: the disk is full, a quota is used up, or a file has its maximum size."""
     return e.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file that is whole or as it was, whenever the process ends.
+    """Write a file atomically: it has the old or the new content, whenever the process ends.
 
     Raises:
         RecordNotWritten: it cannot be written.
@@ -226,7 +230,7 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def sha256_of(file: Path) -> str:
-    """Return a file's hash."""
+    """Return a file's SHA-256 in hexadecimal."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
@@ -236,9 +240,9 @@ def versions() -> dict[str, str]:
 
 
 def version_differences(here: Mapping[str, str], there: Mapping[str, str]) -> str:
-    """Return which of `versions` are others elsewhere, "" if none is."""
-    other = [name for name, version in here.items() if there.get(name) != version]
-    return ", ".join(f"{name} {there.get(name)} (here {here[name]})" for name in other)
+    """Return which of the `versions` differ elsewhere, with both; "" if none does."""
+    differing = [name for name, version in here.items() if there.get(name) != version]
+    return ", ".join(f"{name} {there.get(name)} (here {here[name]})" for name in differing)
 
 
 def _version(package: str) -> str:

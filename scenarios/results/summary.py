@@ -2,11 +2,10 @@
 
 However a run ends, its summary is made here: `finished_summary`, also where a unit failed; `crashed_summary`, where the
 run's process ended; `refused_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
-Keys stand in the files as the calls here name them.
+Keys stand in the files as the keyword arguments here name them.
 
-Figures of every run, whatever the scenario: what it cost in CPU time, memory and iterations.
-
-What a run's folder keeps of its system: the units, and which output feeds which input.
+Also here: the metrics that every run has, whatever the scenario (`run_metrics`: CPU time, memory, iterations), and the
+system's units and connections, which `run.json` keeps for the report's graph (`describe_system`).
 """
 
 import math
@@ -34,10 +33,7 @@ from handover.scenarios.results.task import Task
 
 
 def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
-    """Return units and connections of a system without faults, as JSON can hold it.
-
-    For `adaptive` see `own_period`.
-    """
+    """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `own_period`."""
     units = [
         {
             "name": name,
@@ -52,7 +48,7 @@ def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
 
 
 def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
-    """Return a unit's step, s; None where it varies: if the master chooses the steps, all but sampled units follow."""
+    """Return a unit's step, s; None where it varies: with adaptive steps, only sampled units keep their own."""
     return None if adaptive and not unit.sampled else float(unit.period)
 
 
@@ -66,15 +62,15 @@ def _describe_connection(system: System, c: Connection) -> dict[str, Any]:
 
 
 def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
-    """Return the figures of a run by name, those in seconds in CPU time."""
-    cycle = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
+    """Return the metrics that every run has, by name: memory, CPU times, and iterations if steps were iterated."""
+    medians = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
     peak = peak_memory()
     units = " + ".join(experiment.cycle())
     metrics: dict[str, Metric] = {}
     if peak is not None:
         metrics["peak_memory"] = Metric(peak, "B", "largest resident memory of the process")
-    if cycle:
-        metrics["cpu_per_cycle"] = Metric(sum(cycle), "s", f"median CPU time of a control cycle ({units})")
+    if medians:
+        metrics["cpu_per_cycle"] = Metric(sum(medians), "s", f"median CPU time of a control cycle ({units})")
     for name, spent in master.cpu.items():
         total = float(np.sum(spent))
         metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
@@ -85,7 +81,7 @@ def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric
 
 
 def peak_memory() -> float | None:
-    """Return the process's largest resident memory in bytes, None where the system does not tell (Windows)."""
+    """Return the process's peak resident memory in bytes, None where the system does not report it (Windows)."""
     try:
         import resource
     except ImportError:
@@ -99,12 +95,12 @@ def _iterations(count: IterationCount) -> dict[str, Metric]:
     text = f"mean number of iterations of a step that was iterated, {count.most} at most"
     return {
         "iterations": Metric(count.iterations / count.steps, "1", text),
-        "rollbacks": Metric(count.rollbacks, "1", "how often units went back to the begin of a step"),
+        "rollbacks": Metric(count.rollbacks, "1", "how often units were rolled back to the start of a step"),
     }
 
 
 class Configuration(TypedDict):
-    """What decides on a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`."""
+    """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`."""
 
     scenario: str
     parameters: dict[str, Any]
@@ -113,7 +109,7 @@ class Configuration(TypedDict):
 
 
 class MetricData(TypedDict):
-    """A figure of merit; JSON knows no infinity: what is not finite is None."""
+    """A metric. Values that are not finite are None, since JSON has neither infinity nor NaN."""
 
     value: float | None
     unit: str
@@ -121,7 +117,7 @@ class MetricData(TypedDict):
 
 
 class UnitData(TypedDict):
-    """A unit's FMU and step in words, its number of steps and its CPU time; None where they are not known."""
+    """A unit's FMU and step in words, its number of steps and its CPU time, None where unknown."""
 
     name: str
     model: str
@@ -136,9 +132,9 @@ class _OfSomeSummaries(TypedDict, total=False):
 
 
 class Summary(Configuration, _OfSomeSummaries):
-    """How a run went: a run that is not `complete` can go on; `failure` is as `UnitFailure.as_data`, None if none.
+    """How a run went: one that is not `complete` can be resumed; `failure` is as `UnitFailure.as_data`, or None.
 
-    Steps that follow their error leave `steps`, see `StepStatistics`; a pace that was asked for, `pace`: `PaceReport`.
+    Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`.
     """
 
     complete: bool
@@ -154,7 +150,7 @@ class Summary(Configuration, _OfSomeSummaries):
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """A run after its end. `failure` is set when a unit failed; the record then ends there."""
+    """A run after its end. `failure` is set if a unit failed; the record then ends at the failure."""
 
     outcome: Outcome
     summary: Summary
@@ -168,9 +164,10 @@ class _OfSomeRuns(TypedDict, total=False):
 
 
 class RunData(Configuration, _OfSomeRuns):
-    """What another process needs to go on with a run, or to present it: see `Task` and `Experiment`.
+    """What another process needs to resume a run, or to present it: see `Task` and `Experiment`.
 
-    A run that began has `system` and `conversions`, one that failed `failure`; `units` are names and hashes of FMUs.
+    A run that started has `system` and `conversions`, one that could not start has `failure`; `units` are the FMUs'
+    names and hashes.
     """
 
     source: dict[str, Any]
@@ -192,13 +189,13 @@ class ElapsedTime:
     cpu: float = 0.0
 
     def clock(self) -> Callable[[], "ElapsedTime"]:
-        """Return a function that tells what has been spent since, this included."""
+        """Return a function that gives the time elapsed until it is called, including these seconds."""
         wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
         return lambda: ElapsedTime(time.perf_counter() - wall, time.process_time() - cpu)
 
 
 def configuration(task: Task) -> Configuration:
-    """Return what decides on a run's signals."""
+    """Return what determines a run's signals."""
     return Configuration(
         scenario=task.experiment.name,
         parameters={v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()},
@@ -210,7 +207,7 @@ def configuration(task: Task) -> Configuration:
 def finished_summary(
     task: Task, outcome: Outcome, master: Master, spent: ElapsedTime, failure: UnitFailure | None, complete: bool
 ) -> Summary:
-    """Return the summary of a run that came to its end, its failure or its interruption."""
+    """Return the summary of a run that came to its end, failed, or was interrupted."""
     metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
     steps: _OfSomeSummaries = {} if master.steps is None else {"steps": asdict(master.steps)}
     summary = Summary(
@@ -225,7 +222,7 @@ def finished_summary(
 
 
 def crash_facts(task: Task, master: Master) -> dict[str, Any]:
-    """Return what `crashed_summary` is given of a run, to be kept while its process is there."""
+    """Return what `crashed_summary` needs to know of a run, to be kept before its process may crash."""
     return {
         "configuration": configuration(task),
         "units": [(unit["name"], unit["model"], unit["step"]) for unit in _units(master)],
@@ -236,7 +233,7 @@ def crashed_summary(
     configuration: Configuration, units: Sequence[tuple[str, str, str]], reason: str, failure: dict[str, Any],
     simulated: float, spent: ElapsedTime,
 ) -> Summary:  # fmt: skip
-    """Return the summary of a run whose process ended in it after so many simulated seconds."""
+    """Return the summary of a run whose process crashed after so many simulated seconds."""
     return Summary(
         **configuration, complete=False, success=False, metrics={}, simulated_seconds=simulated, cpu_seconds=spent.cpu,
         units=[UnitData(name=n, model=m, step=s, steps=None, cpu_seconds=None) for n, m, s in units],
@@ -245,7 +242,7 @@ def crashed_summary(
 
 
 def refused_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> Summary:
-    """Return the summary of a run that could not begin."""
+    """Return the summary of a run that could not start."""
     reason = failure_reason(refusal) if isinstance(refusal, UnitFailure) else one_line(refusal)
     return Summary(
         **configuration(task), complete=False, success=False, reason=reason, metrics={}, simulated_seconds=0.0,
@@ -254,22 +251,22 @@ def refused_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> Summ
 
 
 def unwritten_summary(run: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is known, by its `run.json`, of a run that has written no summary."""
+    """Return a summary, from `run.json`, of a run that has written none."""
     reason = "it has no summary: it was killed before its end, or the machine went down"
     kept = {name: run[name] for name in Configuration.__annotations__ if name in run}
     return {"success": False, "reason": reason, "metrics": dict[str, Any](), "complete": False, **kept}
 
 
 def begun_run(task: Task, master: Master) -> RunData:
-    """Return `run.json` of a run that begins."""
+    """Return the content of `run.json` for a run that starts."""
     system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
-    return _run(task, fmus, {"system": system, "conversions": conversions_of(master.system)})
+    return _run_data(task, fmus, {"system": system, "conversions": conversions_of(master.system)})
 
 
 def refused_run(task: Task, refusal: CosimError) -> RunData:
-    """Return `run.json` of a run that could not begin."""
-    return _run(task, task.fmus, {"failure": _refusal_data(refusal)})
+    """Return the content of `run.json` for a run that could not start."""
+    return _run_data(task, task.fmus, {"failure": _refusal_data(refusal)})
 
 
 def failure_reason(failure: UnitFailure) -> str:
@@ -283,7 +280,11 @@ def metric_data(m: Metric) -> MetricData:
 
 
 def metric_of(data: Mapping[str, Any]) -> Metric:
-    """Return a metric that was read, NaN where it was not finite; raises KeyError, TypeError, ValueError if damaged."""
+    """Return a metric from its JSON, NaN where it was not finite.
+
+    Raises:
+        KeyError, TypeError, ValueError: the data is damaged.
+    """
     value = float("nan") if data["value"] is None else float(data["value"])
     return Metric(value=value, unit=str(data["unit"]), description=str(data["description"]))
 
@@ -298,12 +299,14 @@ def parameter_rows(task: Task) -> list[list[str]]:
 
 
 def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
-    """Return what in a file that was read is of another type than declared; other versions may have written less."""
-    kinds = {name: _kinds(kind) for name, kind in get_type_hints(declared).items() if name in content}
-    return [f"{name!r} is {content[name]!r:.40}" for name, kind in kinds.items() if not isinstance(content[name], kind)]
+    """Return which entries of a file are not of the declared type; entries may be missing, as in other versions."""
+    types = {name: _json_types(hint) for name, hint in get_type_hints(declared).items() if name in content}
+    return [
+        f"{name!r} is {content[name]!r:.40}" for name, valid in types.items() if not isinstance(content[name], valid)
+    ]
 
 
-def _run(task: Task, fmus: Mapping[str, Path], known: _OfSomeRuns) -> RunData:
+def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) -> RunData:
     return RunData(
         **configuration(task),
         source=dict(task.source),
@@ -313,7 +316,7 @@ def _run(task: Task, fmus: Mapping[str, Path], known: _OfSomeRuns) -> RunData:
         title=task.experiment.title,
         headline=list(task.experiment.headline),
         told_parameters=parameter_rows(task),
-        **known,
+        **of_this_run,
         units={name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
         versions={"platform": platform.platform(), **versions()},
     )
@@ -334,16 +337,16 @@ def _refusal_data(refusal: CosimError) -> dict[str, Any]:
         return refusal.failure.as_data()
     if isinstance(refusal, UnitFailure):
         return refusal.as_data()
-    nothing = {"instance": None, "call": None, "time": 0.0, "log": list[str]()}
-    return {"kind": "refused", "status": one_line(refusal), **nothing}
+    of_no_unit = {"instance": None, "call": None, "time": 0.0, "log": list[str]()}
+    return {"kind": "refused", "status": one_line(refusal), **of_no_unit}
 
 
-def _kinds(declaration: Any) -> tuple[type, ...]:
-    """Return the types that JSON's values of a declared type have when they are read."""
+def _json_types(declaration: Any) -> tuple[type, ...]:
+    """Return the types that values of a declared type can have when they are read from JSON."""
     if isinstance(declaration, UnionType):
-        return tuple(kind for part in get_args(declaration) for kind in _kinds(part))
-    kind: type = get_origin(declaration) or declaration
-    return (dict,) if is_typeddict(kind) else (float, int) if kind is float else (kind,)
+        return tuple(json_type for part in get_args(declaration) for json_type in _json_types(part))
+    declared: type = get_origin(declaration) or declaration
+    return (dict,) if is_typeddict(declared) else (float, int) if declared is float else (declared,)
 
 
 def _plain(value: Any) -> Any:

@@ -1,10 +1,6 @@
-"""How a run's units were coupled, and how that went, in rows that one reads.
+"""Rows and texts of a run's tables: how units were coupled, unit conversions, values of parameters, metrics.
 
-What a system's connections change on the way, as a run's folder keeps it and its user is told.
-
-Writes values of parameters and options as one types them.
-
-Writes figures of merit with units that read well.
+The command line and the report page show the same rows.
 """
 
 from collections.abc import Mapping
@@ -18,7 +14,7 @@ from handover.scenarios.experiment.display_unit import display_unit
 
 
 def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return name and value of what `summary.json` says of the master."""
+    """Return name and value of the master's options and statistics, from what is in `summary.json`."""
     master, metrics = summary["master"], summary["metrics"]
     rows = [("algorithm", master["algorithm"]), ("extrapolation", master["extrapolation"])]
     if "iterations" in metrics or Algorithm(master["algorithm"]).iterates:
@@ -38,7 +34,7 @@ def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return name and value of how a run kept its pace, if it was to keep one."""
+    """Return name and value of how a run kept pace with real time; no rows if it was not paced."""
     if not summary.get("pace"):
         return []
     report = PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"})
@@ -54,21 +50,21 @@ def _steps(steps: Mapping[str, Any]) -> str:
 
 
 def conversions_of(system: System) -> list[dict[str, Any]]:
-    """Return, as JSON can hold it, the connections that change values: both ends with their units, and how."""
+    """Return the connections that convert units, as JSON can hold them: both ends with their units, factor, offset."""
     entries: list[dict[str, Any]] = []
     for c in system.connections:
-        change = system.change_by(c)
-        if change is not None:
+        conversion = system.change_by(c)
+        if conversion is not None:
             source = system.units[c.source.unit].description.outputs[c.source.port]
             target = system.units[c.target.unit].description.inputs[c.target.port]
             ends = {"source": str(c.source), "unit": str(source.unit)}
             ends |= {"target": str(c.target), "target_unit": str(target.unit)}
-            entries.append({**ends, "factor": change.factor, "offset": change.offset})
+            entries.append({**ends, "factor": conversion.factor, "offset": conversion.offset})
     return entries
 
 
 def format_conversion(conversion: Mapping[str, Any]) -> tuple[str, str]:
-    """Return a conversion as one reads it: from where to where, and how."""
+    """Return both ends of a conversion with their units, and its formula."""
     source = _with_unit(conversion["source"], conversion["unit"])
     target = _with_unit(conversion["target"], conversion["target_unit"])
     return f"{source} -> {target}", str(LinearTransformation(conversion["factor"], conversion["offset"]))
@@ -79,13 +75,13 @@ def _with_unit(port: str, unit: str) -> str:
 
 
 def format_value(value: Any) -> str:
-    """Return a number to six digits, true or false, and else the text of a value."""
+    """Return a value of a parameter or an option as it is typed: numbers to six digits, true or false, or a text."""
     if isinstance(value, float):
         return f"{value:g}"
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def format_metric(metric: Mapping[str, Any]) -> str:
-    """Write a metric, as `summary.json` has it, in the unit in which pages show such a value."""
+    """Return a metric of `summary.json` with its value in a display unit; "undefined" where it was not finite."""
     value, unit = metric["value"], metric["unit"]
     return "undefined" if value is None else display_unit(unit, value).text(value)

@@ -1,4 +1,4 @@
-"""What is to be run."""
+"""The specification of a run: scenario, parameters, FMUs, options of the master, output folder."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,14 +16,14 @@ class Task:
     """A run before it begins.
 
     Attributes:
-        experiment, parameters, seed: the scenario and what was chosen of it.
+        experiment, parameters, seed: the scenario, and what it is run with.
         fmus: the FMU of each unit.
-        folder: for what it leaves.
-        formats: further forms of the record, see `RECORD_FORMATS`.
-        every: simulated seconds from checkpoint to checkpoint, if there are to be any.
-        source: what `resume` needs to find the experiment again, if it is not one of the catalog.
-        options: how its units are run.
-        presented: whether figures are drawn and a report is written at the end.
+        folder: where its results are written.
+        formats: further file formats of the record, see `RECORD_FORMATS`.
+        every: simulated seconds between checkpoints; None for no checkpoints.
+        source: what `resume` needs to find the experiment again, if the catalog does not have it.
+        options: of the master, which runs the units.
+        presented: whether figures and a report are made at the end.
     """
 
     experiment: Experiment[Any]

@@ -1,6 +1,6 @@
-"""Judges how well the tip followed its path, by the tracker, which the arm's controller does not see.
+"""Evaluates how well the tip followed its path, by the tracker, which the arm's controller does not see.
 
-A point of the desired path and where the arm was when its time for it was over.
+A `PathPoint` is kept for each desired point, with the arm's positions at the end of the time allotted to it.
 """
 
 import math
@@ -21,11 +21,11 @@ class PathPoint:
 
     Attributes:
         t: time, s.
-        desired: the point that the arm had been told to go to.
+        desired: the point that the arm was commanded to reach.
         tracked: the tip by the tracker.
         true: the tip itself.
-        servo: the tip that encoders and rigid links give.
-        estimated: the tip that the forward model gives.
+        servo: the tip by encoders and rigid links.
+        estimated: the tip by the forward model.
         outside: whether the learned model had to extrapolate.
     """
 
@@ -39,7 +39,7 @@ class PathPoint:
 
     @classmethod
     def take(cls, t: float, desired: Floats, signals: Signals) -> "PathPoint":
-        """Copy the positions as they are."""
+        """Return the point with the current positions."""
         return cls(
             t,
             desired,
@@ -69,7 +69,7 @@ def distance(p: Floats, q: Floats) -> float:
 def distance_to_path(p: Floats, path: Floats) -> float:
     """Return the distance of a point from the polyline through two or more points, shape (n, 3), m."""
     start, along = path[:-1], np.diff(path, axis=0)
-    squares = np.maximum(np.sum(along**2, axis=1), np.finfo(np.float64).tiny)  # a leg of no length is its start
+    squares = np.maximum(np.sum(along**2, axis=1), np.finfo(np.float64).tiny)  # for legs without length: their start
     share = np.clip(np.sum((p - start) * along, axis=1) / squares, 0.0, 1.0)
     return float(np.min(np.linalg.norm(start + share[:, None] * along - p, axis=1)))
 
@@ -79,12 +79,12 @@ _REACH_SPAN = 0.01
 
 
 class PathEvaluator(Evaluator):
-    """Follows one run along a path and tells how far the tip was from it.
+    """Follows one run along a path and measures how far the tip was from it.
 
-    A point counts at the instant when the planner goes on to the next one: until then the arm had time to get there.
+    A point is measured at the instant at which the planner proceeds to the next: the arm had time until then.
 
     Attributes:
-        points: the path's points in their order, with where the arm was.
+        points: the path's points in order, with the arm's positions.
         completed: time at which the path was completed, s; None before.
     """
 
@@ -101,7 +101,7 @@ class PathEvaluator(Evaluator):
         self._lowest = math.inf
 
     def __call__(self, t: float, signals: Signals) -> None:
-        """Follow the planner; keep a point when it is left."""
+        """Follow the planner; keep a point when the planner proceeds to the next."""
         goal, moving = signals["planner.p_WG_goal"], bool(signals["planner.moving"])
         if self._goal is not None and self._moving and not (moving and np.array_equal(goal, self._goal)):
             self.points.append(PathPoint.take(t, self._goal, signals))
@@ -147,7 +147,7 @@ class PathEvaluator(Evaluator):
 
     @property
     def _dip(self) -> str:
-        """Say how far the arm was below the ground, which hinders nothing in the simulation."""
+        """How far the arm was below the ground, which is no obstacle in the simulation, as a clause of the reason."""
         if self._lowest >= 0.0:
             return ""
         return f"; a real arm would have struck the ground: the links dipped {-self._lowest * 1000:.1f} mm below it"

@@ -51,7 +51,7 @@ class Parameters:
 
     @property
     def q_0(self) -> Floats:
-        """Joint angles at which the arm starts, with the tip 0.3 m out, level with the shoulder, shape (3,), rad."""
+        """Joint angles at the start, with the tip 0.3 m from the base, level with the shoulder, shape (3,), rad."""
         sign = 1.0 if self.elbow is Elbow.UP else -1.0
         return sign * np.array([0.0, 0.8411, -1.6821])
 
@@ -61,10 +61,10 @@ class Parameters:
         return self.points * len(segments_of(self.path, self.x_0, self.x_g))
 
     def path_faults(self) -> list[str]:
-        """Say which end of the path is below the ground, or is given for a path that does not have it."""
-        own, faults = type(self)(), list[str]()
-        for name, p_WG, p_WG_own in (("x_0", self.x_0, own.x_0), ("x_g", self.x_g, own.x_g)):
-            if self.path is not Path.CUSTOM and not np.array_equal(p_WG, p_WG_own):
+        """Return faults of the path's ends: below the ground, or given for a path that has ends of its own."""
+        default, faults = type(self)(), list[str]()
+        for name, p_WG, p_WG_default in (("x_0", self.x_0, default.x_0), ("x_g", self.x_g, default.x_g)):
+            if self.path is not Path.CUSTOM and not np.array_equal(p_WG, p_WG_default):
                 path = self.path.name.lower()
                 faults.append(f"{name}: the path {path} has ends of its own; {name} is for path=custom only")
             elif self.path is Path.CUSTOM and p_WG[2] < 0.0:

@@ -1,8 +1,7 @@
-"""What both experiments share: planner, kinematics and arm, wired, and a path to follow. [Gandarias2020] sec. V.
+"""An arm with links of variable stiffness follows a path. [Gandarias2020] sec. V.
 
-The arm follows a path by rigid-link kinematics with learned corrections. [Gandarias2020] sec. V-B, experiment 2.
-
-The arm follows a path by rigid-link kinematics. [Gandarias2020] sec. V-A, experiment 1.
+Both experiments wire planner, kinematics and arm alike. `VslModelBased` commands by rigid-link kinematics (sec. V-A,
+experiment 1), `VslHybrid` by the same with learned corrections (sec. V-B, experiment 2).
 """
 
 from collections.abc import Mapping
@@ -21,12 +20,12 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.evaluation import PathEvaluator
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
-_MORE = 5
-"""Time after which a path that should have been completed is given up, s (assumed)."""
+_GRACE = 5
+"""Time by which the path may be completed late before the run ends, s (assumed)."""
 
 
 class PathExperiment(Experiment[PathEvaluator]):
-    """The tip is to follow a path; servos, pressures and currents are measured, the tip is not."""
+    """The tip is to follow a path; joint angles, pressures and currents are measured, the tip is not."""
 
     units: ClassVar[Mapping[str, str]] = {
         "planner": "TrajectoryPlanner",
@@ -58,7 +57,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         """Wire planner, kinematics and arm.
 
         Raises:
-            InvalidParameter: an end of the path is below the ground, or is given for a path that does not have it.
+            InvalidParameter: an end of the path is below the ground, or is given for a path that has ends of its own.
         """
         p = parameters
         if faults := p.path_faults():
@@ -104,38 +103,47 @@ class PathExperiment(Experiment[PathEvaluator]):
         return s
 
     def stop_time(self, parameters: Parameters) -> Fraction:
-        """Return the time that the path takes, with what precedes it, and some more."""
-        return Fraction(round(parameters.settle + parameters.length / parameters.speed)) + _MORE
+        """Return the nominal duration of the run, settling and path, plus a grace period."""
+        return Fraction(round(parameters.settle + parameters.length / parameters.speed)) + _GRACE
 
     def evaluator(self, parameters: Parameters) -> PathEvaluator:
-        """Return the judge of one run along the path."""
+        """Return the evaluator of one run along the path."""
         return PathEvaluator(parameters, hybrid=self.hybrid)
 
     def cycle(self) -> tuple[str, ...]:
-        """Return the robot's own computing: planning and kinematics."""
+        """Return the units that run on the robot's computer: planner and kinematics."""
         return ("planner", "kinematics")
 
     def draw(self, parameters: Parameters, evaluator: PathEvaluator, record: Record, folder: Path) -> list[Figure]:
         """Draw the path, the arm's shape at three moments, and errors."""
-        from handover.scenarios.vsl.plots import draw_path_run  # what draws takes long to load
+        from handover.scenarios.vsl.plots import draw_path_run  # matplotlib is slow to import
 
         return draw_path_run(parameters, evaluator, record, folder)
 
     def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
-        """Return error and place of the tip, joints, pressures and currents over time."""
+        """Return error and position of the tip, joints, pressures and currents over time."""
         from handover.scenarios.vsl.plots import figures_of_path
 
         return figures_of_path(parameters, record, hybrid=self.hybrid)
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:
-        """Return arm, load, path and the tip's way in space."""
+        """Return arm, load, desired path and tip path in space."""
         from handover.scenarios.vsl.replay import replay_path
 
         return replay_path(parameters, record, hybrid=self.hybrid)
 
 
+class VslModelBased(PathExperiment):
+    """The paper's first experiment: the links bend, which the kinematics ignore."""
+
+    name: ClassVar[str] = "vsl_model_based"
+    title: ClassVar[str] = "an arm of soft links follows a path by rigid-link kinematics"
+    parameters_type: ClassVar[type[Parameters]] = Parameters
+    hybrid: ClassVar[bool] = False
+
+
 class VslHybrid(PathExperiment):
-    """The paper's second experiment: pressures and currents tell how far the links bend."""
+    """The paper's second experiment: pressures and currents show how far the links bend."""
 
     name: ClassVar[str] = "vsl_hybrid"
     title: ClassVar[str] = "an arm of soft links follows a path by kinematics with learned corrections"
@@ -145,12 +153,3 @@ class VslHybrid(PathExperiment):
     def kinematics(self, parameters: HybridParameters) -> dict[str, Any]:
         """Return the trained model's file, absolute, since a unit may run in another folder."""
         return {"model": str(Path(parameters.model).absolute()) if parameters.model else ""}
-
-
-class VslModelBased(PathExperiment):
-    """The paper's first experiment: links bend, and the kinematics do not know."""
-
-    name: ClassVar[str] = "vsl_model_based"
-    title: ClassVar[str] = "an arm of soft links follows a path by rigid-link kinematics"
-    parameters_type: ClassVar[type[Parameters]] = Parameters
-    hybrid: ClassVar[bool] = False

@@ -1,7 +1,4 @@
-"""Curves of a run along a path over time: the tip's error and place, joints, currents and pressures.
-
-Figures of a run along a path in space: the path, the arm's shape, and its errors.
-"""
+"""Figures of a run along a path: error, joints, currents, pressures over time; path, arm and errors in space."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,13 +28,14 @@ SERVOS, TIP = "tip by the servos, links taken as rigid", "tip by the tracker"
 _PALETTE = ("servos", "tip", "desired", "estimate")
 SERVO_COLOUR, TIP_COLOUR, DESIRED_COLOUR, ESTIMATE_COLOUR = COLOURS[: len(_PALETTE)]
 _LINKS: tuple[Stroke, ...] = ("solid", "dashed")
-"""Of the links' pressures, which are often the same."""
+"""Strokes of the links' pressures, which often coincide."""
 _BAR = 1e5  # Pa
-_FLAT = 1e-6  # m
+_FLAT = 1e-6
+"""Distance from the plane XZ below which a path lies in it, m."""
 
 
 def figures_of_path(parameters: Parameters, record: Record, *, hybrid: bool) -> list[TimeFigure]:
-    """Return the tip's error with its place and the desired one, and joints, currents and pressures."""
+    """Return the figures of the tip's error and position, and of joints, currents and pressures."""
     segments = int(np.max(record["planner.segment"]))
     names = {0: "before", **{n: f"segment {n}" for n in range(1, segments + 1)}}
     phases = phases_of(record, "planner.segment", names)
@@ -62,10 +60,10 @@ def figures_of_path(parameters: Parameters, record: Record, *, hybrid: bool) -> 
 
 def _error(parameters: Parameters, record: Record, phases: Sequence[Phase], *, hybrid: bool) -> TimePlot:
     goal, tip = record["planner.p_WG_goal"], record["arm.p_WG_meas"]
-    found = [(SERVOS, "servos", record["kinematics.p_WG_model"], goal), (TIP, "tip", tip, goal)]
+    compared = [(SERVOS, "servos", record["kinematics.p_WG_model"], goal), (TIP, "tip", tip, goal)]
     if hybrid:
         estimate = record["kinematics.p_WG_est"]
-        found.append(("hybrid forward model, to the true tip", "estimate", estimate, record["arm.p_WG"]))
+        compared.append(("hybrid forward model, to the true tip", "estimate", estimate, record["arm.p_WG"]))
     moving = record["planner.moving"]
     return TimePlot(
         title="Error of the tip, on the path",
@@ -73,7 +71,7 @@ def _error(parameters: Parameters, record: Record, phases: Sequence[Phase], *, h
         unit="mm",
         curves=[
             Curve(label=label, values=np.where(moving, 1000 * np.linalg.norm(p - q, axis=1), np.nan), group=group)
-            for label, group, p, q in found
+            for label, group, p, q in compared
         ],
         levels=(Level(label="tolerance for the mean", value=1000 * parameters.tolerance),),
         phases=phases,
@@ -131,16 +129,16 @@ def _pressures(record: Record, phases: Sequence[Phase]) -> TimePlot:
 
 
 _ARM_LINES: tuple[dict[str, Any], ...] = ({"lw": 3.6}, {"lw": 2.4}, {"lw": 1.6, "ls": "--"})
-"""The arm's lines at its three moments: where they lie over each other, all are seen."""
+"""Line styles of the arm at three moments, such that all are seen where they overlap."""
 
 _DISTANCE = "horizontal distance from the base (mm)"
 
 _APART = 0.01
-"""Points nearer to each other than this are shown once, m (assumed)."""
+"""Distance below which two points are shown as one, m (assumed)."""
 
 
 def draw_path_run(parameters: Parameters, evaluator: PathEvaluator, record: Record, folder: Path) -> list[Figure]:
-    """Draw a run's path and what it was like into a folder; nothing of a run that did not come to a point of it."""
+    """Draw path, shapes of the arm and errors into a folder; nothing of a run that reached no point of the path."""
     if not evaluator.points:
         return []
     return [_path(evaluator, folder), _shapes(parameters, evaluator, record, folder), _errors(evaluator, folder)]
@@ -216,7 +214,7 @@ def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
 
 
 def _moments(evaluator: PathEvaluator) -> dict[str, float]:
-    """Return three moments by what they are; on a path that reaches farthest at an end, the second is half way."""
+    """Return three moments by their names; if the reach is greatest at an end of the path, the second is half way."""
     first, last = evaluator.points[0], evaluator.points[-1]
     role, second = "farthest reach", max(evaluator.points, key=lambda p: p.reach)
     if min(distance(second.desired, end.desired) for end in (first, last)) < _APART:
@@ -268,7 +266,7 @@ def _along_tip(shape: Floats, evaluator: PathEvaluator) -> tuple[Floats, Floats]
 
 
 def _flat(evaluator: PathEvaluator) -> bool:
-    return bool(np.all(np.abs(evaluator.path[:, 1]) < 1e-6))
+    return bool(np.all(np.abs(evaluator.path[:, 1]) < _FLAT))
 
 
 def _horizontal(evaluator: PathEvaluator) -> str:

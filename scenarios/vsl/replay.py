@@ -1,4 +1,4 @@
-"""A run along a path in space: the arm's links, its load, the path it is to follow, and the way of its tip."""
+"""A run along a path in space: the arm's links, its load, the path it is to follow, and its tip path."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from handover.scenarios.experiment.replay import Body, Line, Replay, ball, prism
 from handover.scenarios.vsl.parameters import Parameters
 
 _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
-_DESIRED, _WAY, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"
-_WIDER = 1.2
+_DESIRED, _TIP_PATH, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"
+_RADIUS_RATIO = 1.2
 """Radius of servos, base and gripper over that of the links (assumed)."""
 _DENSITY, _BELOW = 2700.0, 0.03
 """Density of the ball that the load is drawn as, kg/m3, and how far below the gripper it hangs, m (assumed)."""
@@ -19,31 +19,31 @@ _ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 
 def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Replay:
-    """Return the arm over a run's time; `hybrid` with where the model takes its tip to be."""
+    """Return the arm over a run's time; if `hybrid`, with the model's estimate of the tip."""
     shape = record["arm.shape"]
     return Replay(
         bodies=[_ground(shape), *_joints(shape), *_load(parameters, shape)],
         lines=[*_arm(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
-        fixed=[Line(label="desired path", colour=_DESIRED, points=_path(parameters)[None], width=4.0)],
+        fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
         eye=(0.45, -1.45, 0.35),
-        notes=("The way of the tip is that of the tip itself, not of the tracker.",),
+        notes=("The path of the tip is the true one, not that by the tracker.",),
     )
 
 
-def _path(parameters: Parameters) -> Floats:
+def _desired_path(parameters: Parameters) -> Floats:
     p = parameters
-    found: list[Floats] = []
+    parts: list[Floats] = []
     for segment in segments_of(p.path, p.x_0, p.x_g):
         points, _ = segment.sampled(p.points, p.speed)
-        found += [segment.x_0[None], points]
-    return np.vstack(found)
+        parts += [segment.x_0[None], points]
+    return np.vstack(parts)
 
 
 def _arm(shape: Floats) -> list[Line]:
     """Return the links from shoulder to elbow and from elbow to gripper, 12 points each, and the gripper."""
     radius: float = ArmParams().R_link
     parts = (("arm", _LINK, shape[:, 1:13], radius), ("arm", _LINK, shape[:, 12:], radius))
-    gripper = ("gripper", _SERVO, shape[:, -2:], _WIDER * radius)
+    gripper = ("gripper", _SERVO, shape[:, -2:], _RADIUS_RATIO * radius)
     return [
         Line(label=label, colour=colour, points=points, radii=np.full(len(points[0]), r))
         for label, colour, points, r in (*parts, gripper)
@@ -52,7 +52,7 @@ def _arm(shape: Floats) -> list[Line]:
 
 def _joints(shape: Floats) -> list[Body]:
     """Return the base, and the servos at shoulder and elbow."""
-    radius = _WIDER * ArmParams().R_link
+    radius = _RADIUS_RATIO * ArmParams().R_link
     outline = radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
     base = prism(outline, 0.0, float(shape[0, 1, 2] - shape[0, 0, 2]))
     servos = [Body(label="arm", colour=_SERVO, mesh=ball(radius), p_WB=shape[:, k]) for k in (1, 12)]
@@ -74,11 +74,13 @@ def _hook(parameters: Parameters, shape: Floats) -> list[Line]:
 
 
 def _tips(record: Record, hybrid: bool) -> list[Line]:
-    way = Line(label="way of the tip", colour=_WAY, points=record["arm.p_WG"][:, None], width=4.0, trail=True)
+    tip_path = Line(
+        label="path of the tip", colour=_TIP_PATH, points=record["arm.p_WG"][:, None], width=4.0, trail=True
+    )
     if not hybrid:
-        return [way]
+        return [tip_path]
     estimate = record["kinematics.p_WG_est"][:, None]
-    return [way, Line(label="tip, by the hybrid model", colour=_ESTIMATE, points=estimate, width=6.0)]
+    return [tip_path, Line(label="tip, by the hybrid model", colour=_ESTIMATE, points=estimate, width=6.0)]
 
 
 def _ground(shape: Floats) -> Body:

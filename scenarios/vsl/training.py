@@ -24,10 +24,10 @@ SPLIT = (0.70, 0.15, 0.15)
 """Shares of training, validation and test points. [Gandarias2020] sec. IV-B"""
 
 MIN_POINTS = 400
-"""Points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
+"""Number of points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
 
 _MIN_VARIATION = 1e-9
-"""Share of its size by which an input must vary to be learned from; less is rounding."""
+"""Range of an input, relative to its magnitude, below which it counts as constant: that much is rounding."""
 
 _MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
 
@@ -42,7 +42,7 @@ DEFAULT_MODEL = """\\
 
 
 class NothingToLearn(ValueError):
-    """Measured points from which no kinematics can be learned: the arm is another, or its sensors are dead."""
+    """Measured points from which no kinematics can be learned: not the expected arm, or its sensors do not work."""
 
     def __init__(self, fmu: Path, fault: str) -> None:
         super().__init__(f"{fmu}: {fault}")
@@ -72,7 +72,7 @@ class VslTraining:
     Attributes:
         fmu: the arm.
         kinematics: of rigid links, to which the learned residuals are added.
-        points: how many are measured; those whose tip is too near to the end of reach are left out.
+        points: how many are measured; those whose tip is too near to the limits of reach are left out.
         seed: of the points, the split and the arm's noise.
     """
 
@@ -85,7 +85,7 @@ class VslTraining:
         """Return the model, whose provenance has no date or path, and its errors.
 
         Raises:
-            InvalidFmu, InitializationError, UnitFailure: the arm cannot be used, does not start, or fails.
+            InvalidFmu, InitializationError, UnitFailure: the arm's FMU is invalid, does not initialize, or fails.
             NothingToLearn: fewer than half of the tips are within reach, or an input is the same at all points.
         """
         d = describe_arm(self.fmu)
@@ -94,12 +94,12 @@ class VslTraining:
         parameters = parameters_of(d, arm_seed)
         measured = collect(d, self.kinematics, self.points, rng, parameters, progress)
         usable = self._usable(measured)
-        training, validation, test = (usable.rows(chosen) for chosen in split(len(usable), rng))
+        training, validation, test = (usable.rows(indices) for indices in split(len(usable), rng))
         inverse = fit_cubic(*self.inverse_pairs(training), *self.inverse_pairs(validation))
         forward = fit_cubic(*self.forward_pairs(training), *self.forward_pairs(validation))
         model = VslModel(inverse.cubic, forward.cubic, self.kinematics, {})
         errors = self.errors(model, test)
-        facts: dict[str, Any] = {
+        provenance: dict[str, Any] = {
             "arm": {
                 "fmu": d.name,
                 "key": content_key(self.fmu),
@@ -117,7 +117,7 @@ class VslTraining:
             "mean_test_errors_m": {k: float(f"{v:.4g}") for k, v in vars(errors).items()},
             "versions": {"python": platform.python_version(), "numpy": np.__version__},
         }
-        return VslModel(inverse.cubic, forward.cubic, self.kinematics, facts), errors
+        return VslModel(inverse.cubic, forward.cubic, self.kinematics, provenance), errors
 
     def inverse_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
         """Return inputs, the rigid angles of the measured tips first, and commanded minus rigid angles, rad.
@@ -148,7 +148,7 @@ class VslTraining:
         )
 
     def _moved(self, inputs: Floats, angles: Floats) -> Floats:
-        """Return how small turns of the joints move the tip, shape (n, 3), m."""
+        """Return the displacements of the tip by small joint rotations, shape (n, 3), m, by the Jacobian."""
         jacobians = [self.kinematics.jacobian(q) for q in inputs[:, :3]]
         return np.array([J @ dq for J, dq in zip(jacobians, angles, strict=True)])
 
@@ -162,20 +162,20 @@ class VslTraining:
                 f"shoulder {k.L_1:g} m high can be; half of them should be",
             )
         x = inputs_of(usable.q, usable.p, usable.i)
-        still = np.ptp(x, axis=0) <= _MIN_VARIATION * np.max(np.abs(x), axis=0)
-        if np.any(still):
-            names = ", ".join(name for name, s in zip(FORWARD_INPUTS, still, strict=True) if s)
+        constant = np.ptp(x, axis=0) <= _MIN_VARIATION * np.max(np.abs(x), axis=0)
+        if np.any(constant):
+            names = ", ".join(name for name, c in zip(FORWARD_INPUTS, constant, strict=True) if c)
             raise NothingToLearn(self.fmu, f"the same at all points, whatever is commanded: {names}")
         return usable
 
     def _within_reach(self, p_WG: Floats) -> NDArray[np.bool_]:
-        least, _ = self.kinematics.reach
+        min_reach, _ = self.kinematics.reach
         from_shoulder = _lengths(p_WG - np.array([0.0, 0.0, self.kinematics.L_1]))
-        return (from_shoulder <= STRETCH) & (from_shoulder >= least + 0.001)
+        return (from_shoulder <= STRETCH) & (from_shoulder >= min_reach + 0.001)
 
 
 def split(points: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
-    """Return the numbers of training, validation and test points, drawn at random."""
+    """Return indices of training, validation and test points, drawn at random."""
     order = rng.permutation(points)
     first, second = round(SPLIT[0] * points), round((SPLIT[0] + SPLIT[1]) * points)
     return order[:first], order[first:second], order[second:]
@@ -184,7 +184,7 @@ def split(points: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
 def content_key(fmu: Path) -> str:
     """Return a hash that changes if the sources of the arm do: those in `plants` that its FMU carries.
 
-    Neither engine nor builder count. Of an FMU from elsewhere all bytes do.
+    Changes of engine and builder leave it as it is. Of an FMU without such sources it is the hash of all bytes.
     """
     digest = hashlib.sha256()
     with zipfile.ZipFile(fmu) as archive:
@@ -198,13 +198,13 @@ def content_key(fmu: Path) -> str:
 
 
 def file_text(model: VslModel, path: Path) -> str:
-    """Return what a file is to hold: a Python module if its name ends in .py, else JSON."""
+    """Return the content of a model's file: a Python module if its name ends in .py, else JSON."""
     text = model_text(model)
     if path.suffix != ".py":
         return text
-    facts = model.provenance
+    provenance = model.provenance
     elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
-    return _MODULE.format(points=facts["points"]["measured"], seed=facts["seed"], elbow=elbow, text=text)
+    return _MODULE.format(points=provenance["points"]["measured"], seed=provenance["seed"], elbow=elbow, text=text)
 
 
 def _fit_facts(fit: Fit, unit: str) -> dict[str, float]:

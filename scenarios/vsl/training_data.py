@@ -26,16 +26,16 @@ TURN = 0.5
 """Largest angle of J1 either way, rad (assumed)."""
 
 SAG = 0.075
-"""How far above the wanted tip it is commanded at most, m, at the largest radius; there it sags by about as much."""
+"""Maximum height of the commanded above the wanted tip, m, at the largest radius, where the arm sags about as much."""
 
 STRETCH = 0.44
-"""Distance from the shoulder up to which tips are commanded and kept, m: beyond, rigid kinematics turn singular."""
+"""Distance from the shoulder up to which tips are commanded and kept, m: rigid kinematics are singular beyond it."""
 
 PRESSURES = (3e4, 2.2e5)
-"""Pa, each link's own; the published ones are 0.5e5 to 2e5."""
+"""Pressures of each link, Pa; the published ones are 0.5e5 to 2e5."""
 
 LOADS = (0.0, 0.13)
-"""kg; the published ones are 0 to 0.1."""
+"""Loads at the gripper, kg; the published ones are 0 to 0.1."""
 
 _STEP, _STEPS, _KEPT = 0.1, 15, 5
 """Each point: steps of 0.1 s until settled; the mean of the readings after the last ones is kept."""
@@ -48,7 +48,7 @@ _WANTED = {
 
 @dataclass(frozen=True)
 class Dataset:
-    """The matrix D of eq. (9), a row a point, and the commands that led there.
+    """The matrix D of eq. (9), a row for each point, and the commanded angles.
 
     Attributes:
         p_WG: tip by the tracker, shape (n, 3), m.
@@ -67,16 +67,16 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.q)
 
-    def rows(self, chosen: Any) -> "Dataset":
+    def rows(self, indices: Any) -> "Dataset":
         """Return some of the points."""
-        return Dataset(self.p_WG[chosen], self.p[chosen], self.i[chosen], self.q[chosen], self.q_cmd[chosen])
+        return Dataset(self.p_WG[indices], self.p[indices], self.i[indices], self.q[indices], self.q_cmd[indices])
 
 
 def describe_arm(fmu: Path) -> FmuDescription:
     """Read the FMU of an arm that can be learned from.
 
     Raises:
-        InvalidFmu: it cannot be used, or lacks ports of `VslArm` that are needed.
+        InvalidFmu: it is invalid, or lacks ports of `VslArm` that are needed.
     """
     d = describe_fmu(fmu)
     faults: list[str] = []
@@ -92,7 +92,7 @@ def describe_arm(fmu: Path) -> FmuDescription:
 
 
 def parameters_of(d: FmuDescription, seed: int) -> dict[str, Any]:
-    """Return what the arm's parameters are set to: at rest at every instant, with the seed, if it has such."""
+    """Return the arm's parameter settings: quasi-static motion and the seed, as far as it has these parameters."""
     wanted: dict[str, Any] = {"motion": "QUASI_STATIC", "seed": seed}
     return {name: value for name, value in wanted.items() if name in d.parameters}
 
@@ -107,17 +107,17 @@ def collect(
 ) -> Dataset:
     """Measure points of the workspace at random pressures, angles and loads, each after the arm has settled.
 
-    The source varies one of the three from point to point; here all are drawn anew, which spreads as many points
-    better. The arm is commanded above the wanted tip by a random share of what it may sag, so that measured tips cover
-    the wanted places.
+    The source varies one of the three from point to point; here all are drawn anew, which spreads points better.
+    The arm is commanded above the wanted tip by a random share of what it may sag, so that measured tips cover the
+    wanted places.
 
     Args:
         d: the arm.
         kinematics: of rigid links, by which it is commanded.
         points: how many.
         rng: random numbers of the points.
-        parameters: what the arm's parameters are set to.
-        progress: told the simulated time and its end, s.
+        parameters: the arm's parameter settings.
+        progress: called with the simulated time and its end, s.
 
     Raises:
         InvalidFmu, InitializationError, UnitFailure: the arm does not load, start or step.

@@ -1,6 +1,6 @@
 """Measures a host that steps a ring of units: `python ring_hosts.py HOST N FMU`; prints us of CPU per unit and step.
 
-Each unit's output, its input plus one, feeds the next unit. All step at once, from the values at the communication
+Each unit's output, its input plus one, feeds the next unit. All step in parallel, from the values at the communication
 point, so after k steps each output is k: that is looked at. The CPU time is that of the whole process while it steps,
 of all threads; the best of several repeats. A process of its own: a host's library shares none with the tests.
 """

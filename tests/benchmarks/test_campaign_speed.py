@@ -3,7 +3,7 @@
 `pytest tests/benchmarks/test_campaign_speed.py --benchmark-enable -s` prints the figures. Runs are of helix_handover
 and give up after a second of simulated time, which takes one to two seconds of wall time on an idle core.
 
-Counted is from the first order to the last answer, when the workers are up and have carried out one run each, in which
+Time is counted from the first job to the last result, when the workers are up and have executed one run each, in which
 they load what runs need (2 to 4 s a worker, once). A run's own time are the `wall_seconds` of its summary: from when
 its system is built until its summary is written. Overhead is what remains: forking, the folder's name, ending the
 process, and Dask.
@@ -36,7 +36,7 @@ FASTER = 1.8
 
 
 def jobs(runs: Path, count: int) -> Sequence[RunJob]:
-    """Return orders of short runs into a folder of their own."""
+    """Return jobs of short runs in a folder of their own."""
     runs.mkdir(parents=True)
     fmus = {unit: str(cached(block, 3)) for unit, block in SCENARIOS["helix_handover"].units.items()}
     return [
@@ -54,12 +54,12 @@ def jobs(runs: Path, count: int) -> Sequence[RunJob]:
 
 
 def carried_out(pool: WorkerPool, given: Sequence[RunJob]) -> tuple[float, float]:
-    """Return the seconds that a worker pool takes for orders, and the runs' own seconds in all."""
+    """Return the seconds that a worker pool takes for jobs, and the total of the runs' own seconds."""
     began = time.perf_counter()
     results = list(pool.run_jobs(given))
     took = time.perf_counter() - began
     assert [result.lost for result in results] == [""] * len(given)
-    summaries = [json.loads(Path(order.runs, order.name, "summary.json").read_text()) for order in given]
+    summaries = [json.loads(Path(job.runs, job.name, "summary.json").read_text()) for job in given]
     return took, sum(summary["wall_seconds"] for summary in summaries)
 
 
@@ -103,7 +103,7 @@ def test_a_campaign_takes_little_of_the_processor_beside_its_runs(benchmark: Ben
     with local_cluster(1) as pool:
         carried_out(pool, jobs(tmp_path / "first", 1))
         benchmark.pedantic(measure, rounds=1)
-    summaries = [json.loads(Path(order.runs, order.name, "summary.json").read_text()) for order in given]
+    summaries = [json.loads(Path(job.runs, job.name, "summary.json").read_text()) for job in given]
     spent = sum(summary["cpu_seconds"] for summary in summaries)
     overhead = (took - spent) / spent
     print(f"\n{len(given)} runs: {took:.2f} s of CPU, of which the runs {spent:.2f} s; overhead {overhead:.1%}")

@@ -1,4 +1,4 @@
-"""Blocks that do not return: in a step, or as they are made, until a file appears that they are told the place of."""
+"""Blocks that do not return: in a step, or as they are made, until a file appears whose path is a parameter."""
 
 import os
 import re

@@ -89,7 +89,7 @@ class SpringOutputs:
 
 
 class Spring(Stateless):
-    """Pulls back by f = -k x, at once."""
+    """A spring, f = -k x, with direct feedthrough."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"f": ("x",)}
 
@@ -124,7 +124,7 @@ class CounterOutputs:
 
 
 class Counter:
-    """Counts its steps and tells in all kinds of port."""
+    """Counts its steps, with outputs of all kinds."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     period: ClassVar[Fraction | None] = None
@@ -181,7 +181,7 @@ class EchoOutputs:
 
 
 class Echo(Stateless):
-    """Gives back what it gets, at once."""
+    """Passes its input on, with direct feedthrough."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "n_back": ("n",),
@@ -224,11 +224,11 @@ class Picky(Counter):
 @dataclass(kw_only=True)
 class PushedOutputs:
     x: Metre = output("position")
-    a: Number = output("force over mass, at once")
+    a: Number = output("force over mass, by direct feedthrough")
 
 
 class Pushed(Mass):
-    """A mass that also tells its acceleration, which the force acts on at once."""
+    """A mass that also has its acceleration as an output, with direct feedthrough from the force."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"a": ("f",)}
 
@@ -301,7 +301,7 @@ class TallyOutputs:
     heard: Number = output("sum of the inputs")
 
 
-class RunCounts:
+class Tally:
     """Gives numbers of many widths that grow from step to step."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}

@@ -15,7 +15,7 @@ _KINDS = {"f": Kind.REAL, "i": Kind.INTEGER, "u": Kind.INTEGER, "b": Kind.BOOLEA
 
 
 def signals_of(arrays: Mapping[str, NDArray[Any]], **more: Any) -> Signals:
-    """Return outputs of a unit `unit`, named and held by these arrays; `more` is told of all ports."""
+    """Return outputs of a unit `unit`, named and held by these arrays; `more` are further attributes of all ports."""
     ports = {name: port_of(name, a, **more) for name, a in arrays.items()}
     return Signals({"unit": {name: (a,) for name, a in arrays.items()}}, {"unit": ports}, None)
 

@@ -1,4 +1,4 @@
-"""Which names an error suggests for one that there is not."""
+"""Which names an error suggests for an unknown one."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What libcosim is asked to run, and what it answers, by variables' names."""
+"""A job for libcosim and its result, by variables' names."""
 
 import json
 import subprocess

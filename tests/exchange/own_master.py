@@ -29,7 +29,7 @@ Connections = Sequence[tuple[str, str]]
 def run_in_our_own(
     units: Mapping[str, Placed], connections: Connections, step: Fraction, steps: int
 ) -> dict[str, Record]:
-    """Return each unit's outputs at every communication point, all units stepped at once: what parallel hosts do."""
+    """Return each unit's outputs at every communication point, all units stepped in parallel."""
     system = System()
     for name, placed in units.items():
         system.add(name, placed.fmu, period=step, **placed.start)

@@ -49,7 +49,7 @@ class Record:
         return Record([{n: value for n, value in row.items() if n not in names} for row in self.rows], self.pictures)
 
     def is_like(self, other: "Record") -> bool:
-        """Tell whether two records agree within TOLERANCE, and their pictures byte by byte."""
+        """Return whether two records agree within TOLERANCE, and their pictures byte by byte."""
         a, b = self.table, other.table
         same = a.shape == b.shape and np.allclose(a, b, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True)
         return same and list(self.pictures) == list(other.pictures)

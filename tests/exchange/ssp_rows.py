@@ -25,7 +25,7 @@ def exported(folder: Path) -> Path:
 
 
 def own_rows(ssp: SspFile) -> list[dict[str, float]]:
-    """Return all scalar signals at every communication point, all units stepped at once."""
+    """Return all scalar signals at every communication point, all units stepped in parallel."""
     rows: list[dict[str, float]] = []
 
     def observe(t: float, signals: Signals) -> None:  # noqa: ARG001

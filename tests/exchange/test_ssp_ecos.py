@@ -21,7 +21,7 @@ TYPES = ("REAL", "INT", "BOOL")
 
 
 def test_an_exported_scenario_in_ecos_is_the_same_as_in_our_own_master(tmp_path: Path):
-    """As far as Ecos tells: it writes six decimals. It applies the parameter sets of the name that it is told."""
+    """To the six decimals that Ecos writes. It applies the parameter sets of the name that it is given."""
     file = exported(tmp_path)
     with SspFile(file, STEP) as ssp:
         wanted = own_rows(ssp)

@@ -25,7 +25,7 @@ def some(s: Subject, rng: random.Random, causality: str) -> list[Variable]:
 
 
 def ask(s: Subject, rng: random.Random, function: str) -> tuple[list[Any], Any]:
-    """Return arguments in order and the memory for the answer."""
+    """Return valid arguments and the memory for the result."""
     unknowns, knowns = some(s, rng, "output"), some(s, rng, "input")
     sides = [sum(v.size for v in vs) for vs in (knowns, unknowns)]
     n_seed, n_answer = reversed(sides) if "Adjoint" in function else sides

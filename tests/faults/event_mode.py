@@ -24,7 +24,7 @@ def update_arguments(s: Subject) -> tuple[Any, ...]:
 
 
 def settle(s: Subject) -> bool:
-    """Activate the clock if it ticks and handle what is due; tell whether the block did."""
+    """Activate the clock if it ticks and handle what is due; return whether the block did."""
     ticks = tick_is_due(s)
     if ticks:
         activate_clock(s)
@@ -36,7 +36,7 @@ def settle(s: Subject) -> bool:
 
 
 def to_step_mode(s: Subject) -> bool:
-    """Go to step mode if not there, after what is due; tell whether the block did that."""
+    """Go to step mode if not there, after what is due; return whether the block did that."""
     if s.mode == "stepping" and (s.needs_event or tick_is_due(s)):
         enter_event_mode(s)
     if s.mode != "event":
@@ -55,5 +55,5 @@ def enter_event_mode(s: Subject) -> None:
 
 
 def advance(s: Subject, dt: float) -> bool:
-    """Do a step of at most `dt`, up to the clock's next tick; tell whether the block did."""
+    """Do a step of at most `dt`, up to the clock's next tick; return whether the block did."""
     return to_step_mode(s) and s.step(min(dt, s.next_tick - s.t))

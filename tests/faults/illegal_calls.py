@@ -1,4 +1,4 @@
-"""Sequences of calls that the standards forbid: each is refused, named in the log, and changes nothing."""
+"""Sequences of calls that the standards forbid: each is rejected, named in the log, and changes nothing."""
 
 import random
 from collections.abc import Callable
@@ -23,10 +23,10 @@ REFUSALS: tuple[Offence, ...] = (
     *illegal_clocks.REFUSALS,
     *derivatives.REFUSALS,
 )
-"""Calls that are refused at once."""
+"""Calls that are rejected immediately."""
 
 POISONS: tuple[Offence, ...] = (*illegal_variables.POISONS, *illegal_times.POISONS)
-"""Values that may be set, but with which the unit refuses to go on."""
+"""Values that may be set, but with which the unit rejects the next step."""
 
 
 class IllegalCalls:

@@ -12,7 +12,7 @@ CONSTANT = ("SetIntervalDecimal", "SetIntervalFraction", "SetShiftDecimal", "Set
 
 
 def values(s: Subject, function: str) -> list[Any]:
-    """Return memory for a function's values, in order but for the references and their number."""
+    """Return memory for a function's values, all valid but the references and their number."""
     s.kept = memory = ctypes.create_string_buffer(64)
     at = ctypes.addressof(memory)
     arrays = s.unit.signatures[function][3:]

@@ -1,4 +1,4 @@
-"""Instances that cannot be, no instance at all, and what a unit does not offer."""
+"""Instances that cannot be, no instance at all, and what a unit does not support."""
 
 import ctypes
 import random
@@ -51,7 +51,7 @@ def anything(s: Subject, function: str) -> list[Any]:
 
 
 def instance_that_cannot_be(s: Subject, rng: random.Random) -> None:
-    """A wrong token or folder, or another kind of unit; told in the log, if there is one."""
+    """A wrong token or folder, or another kind of unit; reported in the log, if there is one."""
     if rng.random() > 0.3:
         return
     wrong: dict[str, Any] = rng.choice(

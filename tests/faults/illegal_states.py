@@ -39,12 +39,12 @@ def freed_state(s: Subject, rng: random.Random) -> None:
 
 
 def refuse_foreign_state(s: Subject, foreign: Saved) -> None:
-    """Have a state of another instance refused."""
+    """Expect that a state of another instance is rejected."""
     refuse_pointer(s, foreign.pointer, random.Random(s.answered))
 
 
 def refuse_pointer(s: Subject, pointer: int, rng: random.Random) -> None:
-    """Have a pointer refused that is none of this instance's states."""
+    """Expect that a pointer is rejected that is none of this instance's states."""
     size, held = ctypes.c_size_t(), ctypes.c_void_p(pointer)
     function, *more = rng.choice(
         [
@@ -69,7 +69,7 @@ def no_room_for_a_state(s: Subject, rng: random.Random) -> None:
 
 
 def refuse_corrupted_state(s: Subject, good: bytes, rng: random.Random) -> None:
-    """Have a state's bytes refused that are not as they were written."""
+    """Expect that a state's bytes are rejected that are not as they were written."""
     data = bytearray(good)
     kind = rng.randrange(3)
     if kind == 0:

@@ -50,7 +50,7 @@ def wrong_type(s: Subject, rng: random.Random) -> None:
 
 
 def wrong_size(s: Subject, rng: random.Random) -> None:
-    """FMI 3 only: FMI 2 tells no number of values."""
+    """FMI 3 only: FMI 2's functions take no number of values."""
     v = pick(s, rng, "input", "parameter", "output", "independent")
     if v is None or s.unit.fmi == 2:
         return
@@ -102,7 +102,7 @@ def get_output_too_early(s: Subject, rng: random.Random) -> None:
 
 
 def bad_string(s: Subject, rng: random.Random) -> None:
-    """NULL, or not UTF-8, perhaps after one that is in order."""
+    """NULL, or not UTF-8, perhaps after a valid one."""
     strings = [v for v in settable(s) if v.type == "String"]
     if not strings:
         return
@@ -114,7 +114,7 @@ def bad_string(s: Subject, rng: random.Random) -> None:
 
 
 def bad_binary(s: Subject, rng: random.Random) -> None:
-    """A picture of another size, more bytes than there is room for, or none where some are told of."""
+    """A picture of another size, more bytes than fit, or NULL with a size above 0."""
     binaries = [v for v in settable(s) if v.type == "Binary"]
     if not binaries:
         return
@@ -156,7 +156,7 @@ def unknown_item(s: Subject, rng: random.Random) -> None:
 
 
 def poison(s: Subject, rng: random.Random, variables: list[Variable], bad: float) -> None:
-    """Set an entry of a variable to a value with which the unit must not go on, unless it refuses that at once."""
+    """Set an entry of a variable to a value with which the unit must not go on, unless it rejects that immediately."""
     if not variables:
         return
     v = rng.choice(variables)

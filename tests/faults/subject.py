@@ -115,7 +115,7 @@ class Subject:
             raise Fault(f"{function} in {self.mode} is answered with {status}; log: {self.log[-1:]}")
 
     def attempt(self, function: str, *arguments: Any) -> bool:
-        """Call a function that runs the block, which may refuse impossible values, but not silently."""
+        """Call a function that runs the block, which may reject impossible values, but not silently."""
         del self.log[:]
         status = self.call(function, *arguments)
         if status == OK:
@@ -154,7 +154,7 @@ class Subject:
         return self.call(f"Set{kind}", references, n, data, *more)
 
     def get(self, variables: Sequence[Variable]) -> list[Any] | None:
-        """Get variables of one type; None if the block refused. What is real is finite."""
+        """Get variables of one type; None if the block rejected its inputs. Real values are finite."""
         kind, (references, n) = variables[0].type, references_of(variables)
         if kind == "Binary":
             sizes, pointers = (ctypes.c_size_t * n)(), (ctypes.c_void_p * n)()
@@ -235,14 +235,14 @@ class Subject:
         self.mode, self.t, self.start, self.stop = "initialisation", start, start, stop
 
     def exit(self) -> bool:
-        """Leave initialisation mode; tell whether the block took the values that were set."""
+        """Leave initialisation mode; return whether the block accepted the values that were set."""
         if self.attempt("ExitInitializationMode"):
             self.mode = "event" if self.event_mode else "stepping"
             return True
         return False
 
     def step(self, dt: float) -> bool:
-        """Advance; tell whether the block did. The time goes on, if the unit returns early not by all of `dt`."""
+        """Advance; return whether the block did. The time advances by less than `dt` if the unit returns early."""
         if not self.attempt("DoStep", *self.step_arguments(self.t, dt)):
             return False
         last, early = self.t + dt, False

@@ -1,4 +1,4 @@
-"""Every unit stands thousands of random calls, legal ones and illegal ones, in a process of its own.
+"""Every unit survives thousands of random calls, legal ones and illegal ones, in a process of its own.
 
 A failure names the sequence by its seed and number, and the last calls; `python tests/faults/driver.py` plays it again.
 """
@@ -120,7 +120,7 @@ class WorkerPool:
 
 
 @pytest.fixture
-def crew(tmp_path: Path) -> Iterator[WorkerPool]:
+def pool(tmp_path: Path) -> Iterator[WorkerPool]:
     made = WorkerPool(tmp_path)
     yield made
     made.end()
@@ -134,18 +134,18 @@ def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
     return [(cached(n, fmi), fmi) for n in names for fmi in ((3,) if n in ONLY_FMI3 else (2, 3))]
 
 
-def test_a_few_sequences_on_light_units(crew: WorkerPool, tmp_path: Path):
-    crew.add([*sample_fmus(tmp_path), *catalog_fmus(LIGHT)], FEW)
-    crew.add(catalog_fmus(LIGHT[:1]), FEW_APART, apart=True)
-    crew.run()
+def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
+    pool.add([*sample_fmus(tmp_path), *catalog_fmus(LIGHT)], FEW)
+    pool.add(catalog_fmus(LIGHT[:1]), FEW_APART, apart=True)
+    pool.run()
 
 
-def test_a_unit_that_crashes_or_hangs_is_told_with_its_last_calls(crew: WorkerPool, tmp_path: Path):
+def test_a_unit_that_crashes_or_hangs_is_reported_with_its_last_calls(pool: WorkerPool, tmp_path: Path):
     for name in ("Crashing", "Hanging"):
         fmu = build_block(f"sample_units.fatal:{name}", 3, tmp_path)
-        crew.jobs.append(Job(fmu, 3, "legal", MANY, tmp_path / f"{name}.ring", hung=SOON))
+        pool.jobs.append(Job(fmu, 3, "legal", MANY, tmp_path / f"{name}.ring", hung=SOON))
     with pytest.raises(AssertionError) as caught:
-        crew.run()
+        pool.run()
     crash, hang = str(caught.value).split("Hanging.fmi3.fmu", 1)
     assert re.search(r"the process ended with -?\d+: Fatal Python error", crash), crash
     assert f"no call ended for {SOON:g} s" in hang
@@ -154,12 +154,12 @@ def test_a_unit_that_crashes_or_hangs_is_told_with_its_last_calls(crew: WorkerPo
         assert re.fullmatch(r"x\d \[stepping\] DoStep\(.+", re.findall(r"^ +(x\d .+)$", entries, re.MULTILINE)[-1]), (
             entries
         )
-    assert [job.process.poll() is None for job in crew.jobs if job.process] == [False, False]
+    assert [job.process.poll() is None for job in pool.jobs if job.process] == [False, False]
 
 
 @pytest.mark.slow
-def test_thousands_of_sequences_on_every_unit(crew: WorkerPool, tmp_path: Path):
+def test_thousands_of_sequences_on_every_unit(pool: WorkerPool, tmp_path: Path):
     slowest_first = sorted(UNITS, key=lambda n: (n not in ONLY_FMI3, n != "TendonArm"))
-    crew.add([*catalog_fmus(tuple(slowest_first)), *sample_fmus(tmp_path)], MANY)
-    crew.add(catalog_fmus(LIGHT[:1]), MANY // 5, apart=True)
-    crew.run()
+    pool.add([*catalog_fmus(tuple(slowest_first)), *sample_fmus(tmp_path)], MANY)
+    pool.add(catalog_fmus(LIGHT[:1]), MANY // 5, apart=True)
+    pool.run()

@@ -65,7 +65,7 @@ class CtypesHost:
         self.callbacks = Callbacks(logger=self._log2)
 
     def instantiate(self, token: str | None = None, *, event_mode: bool = False, early_return: bool = False) -> bool:
-        """Make the instance; tell whether it was made."""
+        """Make the instance; return whether it was made."""
         given = (token or self.token).encode()
         resources = self.folder / "resources"
         if self.fmi == 2:

@@ -27,7 +27,7 @@ ALIVE = {
     "Push": {"start": 0.15, "duration": 0.2},
     "TrajectoryPlanner": {"settle": 0.1},
 }
-"""Parameters of units that refuse a change of any one alone, or that do nothing for longer than a run takes."""
+"""Parameters of units that reject a change of any one alone, or that do nothing for longer than a run takes."""
 
 
 INTERNAL = ("internal_step", "substep")

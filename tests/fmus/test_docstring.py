@@ -37,7 +37,7 @@ def test_paragraphs_formulas_and_lists_keep_their_order():
     )
 
 
-def test_errors_are_told_by_name():
+def test_errors_are_reported_by_name():
     assert parse(DOCSTRING).errors == (
         ("Unusable", "by the constructor, for a v that is not positive."),
         ("TooFar, TooFast", "by `step`."),

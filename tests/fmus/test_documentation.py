@@ -1,4 +1,4 @@
-"""documentation/index.html: what it tells of a unit."""
+"""documentation/index.html: how it describes a unit."""
 
 import re
 import zipfile
@@ -31,7 +31,7 @@ def test_types_are_those_of_the_model_description(fmi: int, scalar: bool, intege
     assert "1, 0, 0; 0, 1, 0; 0, 0, 1" in page
 
 
-def test_the_clock_is_told_where_there_is_one(tmp_path: Path):
+def test_the_clock_is_named_where_there_is_one(tmp_path: Path):
     pages = [page_of("sampled:Sampled", tmp_path, fmi, scalar=scalar) for fmi, scalar in ((2, False), (3, False))]
     assert ["sample_clock" in page for page in pages] == [False, True]
     assert all("Sampled with a period of 1/30 s" in page for page in pages)

@@ -1,4 +1,4 @@
-"""Outputs that are not of their declared type are refused by name, and none is made to fit."""
+"""Outputs that are not of their declared type are rejected by name, none is converted with a loss."""
 
 from dataclasses import replace
 from typing import Any

@@ -43,7 +43,7 @@ def variables_of(root: ET.Element) -> dict[str, dict[str, str]]:
 
 
 @pytest.mark.parametrize(("fmi", "block"), FORMS)
-def test_it_is_valid_and_its_first_line_tells_the_encoding(workshop: Workshop, fmi: int, block: str):
+def test_it_is_valid_and_its_first_line_says_the_encoding(workshop: Workshop, fmi: int, block: str):
     fmu = workshop.fmu(block, fmi)
     assert validate_fmu(str(fmu)) == []
     with zipfile.ZipFile(fmu) as archive:
@@ -107,7 +107,7 @@ def numbers(unknown: ET.Element) -> list[int]:
 
 
 @pytest.mark.parametrize(("fmi", "block"), FORMS)
-def test_bounds_are_told_where_they_bind(workshop: Workshop, fmi: int, block: str):
+def test_bounds_are_reported_where_they_bind(workshop: Workshop, fmi: int, block: str):
     v = variables_of(root_of(workshop.fmu(block, fmi)))
 
     def bounds(name: str) -> tuple[str | None, str | None]:

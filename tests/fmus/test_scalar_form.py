@@ -160,7 +160,7 @@ def poses(fmu: Callable[[str], Path]) -> list[bytes]:
     return told
 
 
-def test_the_page_tells_how_entries_are_named(every_kind: Path, fmu_folder: Path):
+def test_the_page_says_how_entries_are_named(every_kind: Path, fmu_folder: Path):
     pages: list[str] = []
     for fmu in (every_kind, build_block(BLOCK, 3, fmu_folder)):
         with zipfile.ZipFile(fmu) as archive:

@@ -1,4 +1,4 @@
-"""Campaigns to make pages of: real ones, and tables that a test chooses."""
+"""Campaigns for tests of their pages: real ones, and made-up tables."""
 
 import json
 from collections.abc import Generator, Mapping, Sequence
@@ -21,7 +21,7 @@ from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 
 @dataclass
 class PlainPool:
-    """Carries runs out one after another in this process, and loses those that are named."""
+    """Executes runs one after another in this process, and loses those that are named."""
 
     lost: Sequence[str] = ()
 
@@ -29,16 +29,16 @@ class PlainPool:
         assert folder.is_dir()
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        for order in jobs:
-            if order.name in self.lost:
-                yield JobResult(name=order.name, lost="its worker went away")
+        for job in jobs:
+            if job.name in self.lost:
+                yield JobResult(name=job.name, lost="its worker went away")
                 continue
-            run_job(order, Path(order.runs, order.name))
-            yield JobResult(name=order.name)
+            run_job(job, Path(job.runs, job.name))
+            yield JobResult(name=job.name)
 
 
 def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:
-    """Carry a campaign out and return its folder."""
+    """Run a campaign and return its folder."""
     folder = CampaignFolder(path)
     run_campaign(prepared(plan), folder, PlainPool(lost), lambda _tally: None)
     return folder
@@ -47,7 +47,7 @@ def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> Cam
 def campaign_metadata(
     scenario: str, points: Sequence[Mapping[str, str]], repetitions: int = 2, **more: Any
 ) -> dict[str, Any]:
-    """Return what a campaign's file says."""
+    """Return the content of a campaign's campaign.json."""
     plan: dict[str, Any] = {
         "scenario": scenario,
         "points": list(points),

@@ -1,4 +1,4 @@
-"""A page in a browser that may neither complain nor ask for anything."""
+"""A page in a browser; errors on its console and network requests fail the test."""
 
 from collections.abc import Generator
 from contextlib import contextmanager

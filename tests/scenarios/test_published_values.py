@@ -72,7 +72,7 @@ def test_the_times_of_the_thesis_are_those_of_the_step_size():
     assert (first.value, first.limits) == (39.6, (28.4, 57.6))
 
 
-def test_what_differs_from_the_published_runs_is_told():
+def test_what_differs_from_the_published_runs_is_reported():
     note = values_of("helix_handover", ("alpha=0.2", "tuning=thesis"))[0].note
     assert note == "its control period was 1.51 s"
     assert values_of("helix_handover", ("alpha=0.3",)) == []

@@ -14,8 +14,8 @@ from handover.scenarios.reporting.replay_section import replay_section
 
 MUST_SHOW = {
     "helix_handover": {"arm", "gripper", "hand", "ball", "cameras"},
-    "vsl_model_based": {"arm", "gripper", "load", "desired path", "way of the tip"},
-    "vsl_hybrid": {"arm", "gripper", "load", "desired path", "way of the tip", "tip, by the hybrid model"},
+    "vsl_model_based": {"arm", "gripper", "load", "desired path", "path of the tip"},
+    "vsl_hybrid": {"arm", "gripper", "load", "desired path", "path of the tip", "tip, by the hybrid model"},
     "flyer_impedance": {"robot", "gripper", "push", "place of rest"},
     **{
         f"flyer_{task}": {"robot", "arm", "gripper", "object", "hand"}

@@ -1,4 +1,4 @@
-"""The sequences of figures 3.2 and 3.3, with a robot that goes to its goal at once unless a person moves it."""
+"""The sequences of figures 3.2 and 3.3, with a robot that reaches its goal immediately unless a person moves it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

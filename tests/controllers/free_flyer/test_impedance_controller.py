@@ -147,7 +147,7 @@ def test_turning_world_goal_and_robot_together_changes_nothing():
     np.testing.assert_allclose(a.tau_cmd, b.tau_cmd, atol=1e-9)
 
 
-def test_commands_nothing_when_off_but_tells_the_error():
+def test_commands_nothing_when_off_but_outputs_the_error():
     y = ImpedanceController(Params()).step(0.0, T, replace(anywhere(1), active=False))
     assert not np.any(y.f_cmd)
     assert not np.any(y.tau_cmd)
@@ -212,7 +212,7 @@ def test_published_behaviours_have_their_damping():
     assert compliant.damping_ratio == pytest.approx(0.3, abs=0.05)
 
 
-def test_delay_that_destabilises_is_refused_with_what_would_be_right():
+def test_delay_that_destabilises_is_refused_with_valid_values():
     with pytest.raises(InvalidControllerParameters, match=r"62\.5 Hz with a delay of 0\.032 s") as caught:
         ImpedanceController(replace(NO_LAG, delay=0.032))
     assert "|z| = 1.0571" in str(caught.value)
@@ -223,7 +223,7 @@ def test_delay_that_destabilises_is_refused_with_what_would_be_right():
 
 def test_refused_delay_does_swing_up_and_the_allowed_one_calms_down():
     """The nonlinear body agrees with the verdict."""
-    controller = ImpedanceController(NO_LAG)  # the law is the same for any delay that it is told
+    controller = ImpedanceController(NO_LAG)  # the law is the same for any delay
     bad, good = (pushed(controller, pulse(2, 0.001, 0.1, 3.0), delay=d) for d in (2, 1))
     assert np.max(np.abs(bad[-20:, 4])) > 10.0 * np.max(np.abs(good[:, 4]))
     assert np.max(np.abs(good[-20:])) < 0.3 * np.max(np.abs(good))

@@ -1,4 +1,4 @@
-"""The PID and its way, with the free-flyer and its thrusters, their limits and lag."""
+"""The PID and its path, with the free-flyer and its thrusters, their limits and lag."""
 
 import math
 from dataclasses import replace
@@ -228,7 +228,7 @@ def test_linear_prediction_holds_for_a_small_push():
     assert np.max(np.abs(np.array(path) - predicted)) < 0.01 * np.max(predicted)
 
 
-def test_delay_too_long_is_refused_with_what_would_be_right():
+def test_delay_too_long_is_refused_with_valid_values():
     with pytest.raises(InvalidControllerParameters, match=r"delay of 0\.5 s.*\|z\| = 1\.0.*at most about 0\.33"):
         PoseController(Params(delay=0.5))
     PoseController(Params(delay=0.1))

@@ -41,14 +41,14 @@ def fit(shift: tuple[float, float] = (0.0, 0.12)) -> BallFit:
 
 
 def test_meeting_point_of_two_rays_is_the_point_they_come_from():
-    p, gap = RIG.meeting_point(*(c.project(P_WO) for c in RIG.cameras))
+    p, gap = RIG.triangulate(*(c.project(P_WO) for c in RIG.cameras))
     np.testing.assert_allclose(p, P_WO, atol=1e-12)
     assert gap < 1e-12
 
 
 def test_meeting_point_of_rays_that_miss_is_halfway():
     (a, b) = (c.project(P_WO + d) for c, d in zip(RIG.cameras, ([0, 0, 0.004], [0, 0, -0.004]), strict=True))
-    p, gap = RIG.meeting_point(a, b)
+    p, gap = RIG.triangulate(a, b)
     np.testing.assert_allclose(p, P_WO, atol=4e-4)
     assert gap == pytest.approx(0.008, rel=0.02)
 

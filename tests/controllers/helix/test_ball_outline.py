@@ -26,7 +26,7 @@ def bar(picture: Pixels, start: tuple[int, int], end: tuple[int, int], thickness
 
 
 @pytest.mark.parametrize("background", [GREY, (60, 60, 60), (225, 225, 225)])
-def test_finds_the_circle_on_any_background(background: tuple[int, int, int]):
+def test_finds_the_cycle_on_any_background(background: tuple[int, int, int]):
     picture = disc(background)
     found = BallFinder().find(picture, Region.whole(picture))
     assert found is not None

@@ -98,7 +98,7 @@ def test_the_reflex_brings_thumb_and_ring_to_the_target_then_closes_pulls_and_sh
     assert 1 <= closing.steps <= Params().max_steps
 
 
-def test_the_pull_goes_back_along_the_hand_and_the_shake_across():
+def test_the_pull_rolls_back_along_the_hand_and_the_shake_across():
     p = pregrasp(-0.15, 0.0, yaw_pregrasp=0.5, strategy=Strategy.BLIND)
     seen = run(Scene(), IrReflex(p))
     pull = next(y for y in seen if y.phase is Phase.PULL)
@@ -242,7 +242,7 @@ def test_outputs_at_the_start_are_those_of_the_first_step_while_nothing_is_decid
     assert pickle.dumps(before) == pickle.dumps(reflex.step(0.0, DT, scene.inputs()))
 
 
-def test_all_faults_of_the_parameters_are_told_at_once():
+def test_all_faults_of_the_parameters_are_reported_together():
     bad = Params(
         probe=np.array([0.004, 0.004, 0.04, 0.0]),
         weight=np.zeros(3),

@@ -70,7 +70,7 @@ def test_what_stays_unseen_both_ways_counts_as_independent():
     assert np.allclose(probing.jacobian[1], jacobian(x)[1], atol=0.005)
 
 
-def test_an_open_hand_is_not_told_to_open_further():
+def test_an_open_hand_is_not_commanded_to_open_further():
     x = (0.0, 0.0, 0.0, 0.0)
     probing, closures = Probing(SIZES), list[float]()
     probing.begin(x, x, residuals(x))

@@ -59,7 +59,7 @@ def test_speeds_leave_room_for_corrections():
     np.testing.assert_allclose(y.qd_cmd, [0.0, -0.3, 0.5])
 
 
-def test_what_was_not_trained_on_is_told():
+def test_what_was_not_trained_on_is_reported():
     unit = HybridKinematics(Params(i_lag=0.0))
     strange = [
         dataclasses.replace(USUAL, p_meas=np.array([4e5, 1e5])),

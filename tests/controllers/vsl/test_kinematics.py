@@ -48,7 +48,7 @@ def test_joint_velocities_move_the_tip():
     np.testing.assert_allclose((ARM.forward(q + h * qd) - ARM.forward(q - h * qd)) / (2 * h), v, atol=1e-9)
 
 
-def test_elbow_is_where_it_is_told_to_be():
+def test_elbow_is_where_it_is_commanded_to_be():
     p_WG = np.array([0.3, 0.1, 0.2])
     for elbow in Elbow:
         q = VslKinematics(0.15, 0.225, 0.225, elbow).inverse(p_WG)
@@ -65,7 +65,7 @@ def test_known_poses():
 
 
 @pytest.mark.parametrize(("p_WG", "text"), [([0.4, 0.3, 0.15], "0.5 m"), ([0.05, 0.0, 0.1], "0.05 m")])
-def test_points_out_of_reach_are_told_with_what_is_in_reach(p_WG: list[float], text: str):
+def test_points_out_of_reach_are_reported_with_what_is_in_reach(p_WG: list[float], text: str):
     with pytest.raises(Unreachable, match=r"0\.1 \.\. 0\.5 m|0 \.\. 0\.45 m") as caught:
         (ARM if p_WG[1] else UNEQUAL).inverse(np.array(p_WG))
     assert text in str(caught.value)
@@ -88,7 +88,7 @@ def test_the_shoulder_itself_is_not_said_to_be_out_of_reach():
         ([0.3, 0.0, 0.15], None),
     ],
 )
-def test_singular_points_are_told(p_WG: list[float], text: str | None):
+def test_singular_points_are_reported(p_WG: list[float], text: str | None):
     arm = UNEQUAL if text == "folded" else ARM
     fault = arm.singularity(np.array(p_WG), 0.001)
     assert (fault is None) if text is None else (fault is not None and text in fault)

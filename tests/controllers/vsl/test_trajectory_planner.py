@@ -218,7 +218,7 @@ def test_a_path_that_cannot_be_followed_is_refused(changes: dict[str, Any], entr
         assert part in str(caught.value)
 
 
-def test_every_bad_segment_is_told():
+def test_every_bad_segment_is_reported():
     with pytest.raises(InvalidPath) as caught:
         TrajectoryPlanner(Params(path=Path.CURVE, L_2=0.2, L_3=0.2))
     assert len(caught.value.faults) == 2

@@ -39,7 +39,7 @@ def variable(kind: Kind, **facts: Any) -> Variable:
         (variable(Kind.STRING), 5, "5 is not a string"),
     ],
 )
-def test_a_bad_value_is_told_with_what_would_be_right(given: Variable, value: Any, text: str):
+def test_a_bad_value_is_reported_with_valid_values(given: Variable, value: Any, text: str):
     fault = fault_of(given, value)
     assert fault is not None
     assert text in fault
@@ -65,5 +65,5 @@ def test_numbers_come_in_row_major_order():
     assert numbers_of(variable(Kind.ENUMERATION), "Left").tolist() == [4]
 
 
-def test_no_range_is_told_where_there_is_none():
+def test_no_range_is_reported_where_there_is_none():
     assert range_of(variable(Kind.REAL)) == ""

@@ -1,4 +1,4 @@
-"""Loading and running a foreign unit that spoils one thing: what it was is told, and the check lives on."""
+"""Loading and running a foreign unit with one fault: the fault is reported, and the check survives."""
 
 import os
 from pathlib import Path
@@ -49,7 +49,7 @@ def test_a_sound_unit_passes(decay_library: bytes, tmp_path: Path):
         ("out_of_range", Level.WARNING, "output 'y' at t = 0.3 s: 1e+06 is out of its declared range"),
     ],
 )  # fmt: skip
-def test_a_spoilt_run_is_told(decay_library: bytes, tmp_path: Path, mode: str, level: Level, wanted: str):
+def test_a_spoilt_run_is_reported(decay_library: bytes, tmp_path: Path, mode: str, level: Level, wanted: str):
     found, lines = told(checked(tmp_path, decay_library, decay.spoilt(mode)), "run")
     assert found is level
     assert wanted in lines
@@ -61,7 +61,7 @@ def test_a_run_that_hangs_is_ended(decay_library: bytes, tmp_path: Path):
     assert "fmi2DoStep at t = 0.2 s was not done after 5 s; if it only needs longer: --timeout" in lines
 
 
-def test_a_refused_instantiation_is_told_with_the_log(decay_library: bytes, tmp_path: Path):
+def test_a_refused_instantiation_is_reported_with_the_log(decay_library: bytes, tmp_path: Path):
     found, lines = told(checked(tmp_path, decay_library, decay.edited(('guid="decay"', 'guid="x"'))), "run")
     assert found is Level.FAULT
     assert "instantiation: wrong guid x" in lines.replace("[Error] ", "")
@@ -98,7 +98,7 @@ def test_one_instance_is_enough_where_there_may_be_only_one(decay_library: bytes
         ("hang", "loading the library was not done after 3 s"),
     ],
 )  # fmt: skip
-def test_a_crash_on_loading_is_told(
+def test_a_crash_on_loading_is_reported(
     decay_library: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wish: str, wanted: str
 ):
     monkeypatch.setenv("DECAY_ON_LOAD", wish)
@@ -109,13 +109,13 @@ def test_a_crash_on_loading_is_told(
     assert not report.sections[-1].reached
 
 
-def test_all_missing_functions_are_told(tmp_path: Path):
+def test_all_missing_functions_are_reported(tmp_path: Path):
     found, lines = told(checked(tmp_path, decay.compiled(tmp_path, "-DWITHOUT_STATE")), "loading")
     assert found is Level.FAULT
     assert "lacks 3 of 34 functions: fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SetFMUstate" in lines
 
 
-def test_a_library_with_functions_of_other_names_is_told(decay_library: bytes, tmp_path: Path):
+def test_a_library_with_functions_of_other_names_is_reported(decay_library: bytes, tmp_path: Path):
     _, lines = told(checked(tmp_path, decay_library.replace(b"\0fmi2", b"\0abc_")), "loading")
     assert "exports none of the 34 functions of fmi2" in lines
 
@@ -154,7 +154,7 @@ def test_the_linker_is_translated(message: str, wanted: str):
     assert finding.log == (message,)
 
 
-def test_a_library_for_another_machine_is_told(decay_library: bytes, tmp_path: Path):
+def test_a_library_for_another_machine_is_reported(decay_library: bytes, tmp_path: Path):
     other, machine = ("aarch64-linux", 183) if host_platform() == "x86_64-linux" else ("x86_64-linux", 62)
     report = checked(tmp_path, decay_library[:18] + machine.to_bytes(2, "little") + decay_library[20:])
     found, lines = told(report, "binaries")
@@ -171,7 +171,7 @@ def test_a_library_for_another_machine_is_told(decay_library: bytes, tmp_path: P
         ("sources/decay.c", "there are libraries for none; it carries C sources"),
     ],
 )  # fmt: skip
-def test_a_library_that_is_not_where_it_should_be_is_told(
+def test_a_library_that_is_not_where_it_should_be_is_reported(
     decay_library: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moved: str, wanted: str
 ):
     monkeypatch.setattr(decay, "LIBRARY", moved)

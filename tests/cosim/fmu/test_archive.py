@@ -30,7 +30,7 @@ def packed(*names: str, adjust: Callable[[zipfile.ZipInfo], None] = lambda _: No
 
 
 def refusal(folder: Path, content: bytes) -> str:
-    """Return why an archive is refused; nothing may have been unpacked."""
+    """Return why an archive is rejected; nothing may have been unpacked."""
     file, target = folder / "a.fmu", folder / "target"
     file.write_bytes(content)
     with pytest.raises(InvalidFmu) as caught:
@@ -73,7 +73,7 @@ def test_a_file_that_is_also_a_folder_is_refused(tmp_path: Path):
     assert "files that are folders of other files: a" in refusal(tmp_path, packed("a", "a/b/c"))
 
 
-def test_all_kinds_of_faults_are_told_at_once(tmp_path: Path):
+def test_all_kinds_of_faults_are_reported_together(tmp_path: Path):
     value = refusal(tmp_path, packed("../x", "a", "a/b"))
     assert "paths that lead out" in value
     assert "folders of other files" in value
@@ -151,7 +151,7 @@ def test_a_bomb_costs_no_memory(tmp_path: Path):
         ([], "the archive holds nothing"),
     ],
 )
-def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, names: list[str], value: str):
+def test_a_missing_description_is_reported_with_what_is_there(tmp_path: Path, names: list[str], value: str):
     file = tmp_path / "a.fmu"
     with zipfile.ZipFile(file, "w") as archive:
         for name in names:
@@ -174,7 +174,7 @@ def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path
         archive.unpack(target)
 
 
-def test_what_is_no_file_is_told(tmp_path: Path):
+def test_what_is_no_file_is_reported(tmp_path: Path):
     for path, value in ((tmp_path, "zip what is in it"), (Path(os.devnull), "not a regular file")):
         with pytest.raises(InvalidFmu, match=value):
             FmuArchive(path)

@@ -1,4 +1,4 @@
-"""What a heartbeat tells of the call under way, to another process too, and for how long one has been seen."""
+"""A heartbeat reports the call in progress, also to another process, and for how long it has been observed."""
 
 import os
 import sys
@@ -8,7 +8,7 @@ import pytest
 from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
 
 
-def test_a_call_is_told_by_names_and_time_while_it_is_under_way():
+def test_a_call_is_reported_by_names_and_time_while_it_is_under_way():
     beat = Heartbeat()
     assert beat.under_way is None
     beat.begin(beat.code("arm", "fmi3DoStep"), 0.4)
@@ -47,7 +47,7 @@ def test_a_log_without_end_keeps_its_last_lines():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes cannot be forked")
-def test_what_a_process_told_is_known_when_it_is_gone():
+def test_what_a_process_reported_is_known_when_it_is_gone():
     beat = Heartbeat()
     child = os.fork()
     if child == 0:

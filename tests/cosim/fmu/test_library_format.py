@@ -1,4 +1,4 @@
-"""Libraries of each format, as short as headers can be: whole, they pass; a byte less, and they are told."""
+"""Libraries of each format, as short as headers can be: complete, they pass; with a byte less, they are reported."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""A unit that does not return within the limit fails the run; the others are ended, and it is left alone."""
+"""A unit that does not return within the limit fails the run; the others are ended, and it is not called again."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -6,7 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from called import Called, fed_by
+from call_log import CallLog, fed_by
 from endless_blocks import GO_ON
 from native_units import native_fmu
 
@@ -47,21 +47,21 @@ def block(name: str, folder: Path) -> Path:
 def test_a_unit_that_hangs_in_a_step_is_left_and_the_others_are_ended(
     compiled: bool, endless: Callable[[], None], tmp_path: Path
 ):
-    s, called, record = System(), Called(), tmp_path / "r.parquet"
+    s, call_log, record = System(), CallLog(), tmp_path / "r.parquet"
     s.add("steady", native_fmu("trivial"), period=Fraction(1, 10))
     s.add("endless", block("HangsInStep", tmp_path))
     s.add("later", native_fmu("trivial"), period=Fraction(1, 10))
     options = MasterOptions(call_limit=LIMIT, compiled=compiled)
-    with pytest.raises(UnitHung) as caught, Master(s, options, called) as master, Recorder(record) as recorder:
+    with pytest.raises(UnitHung) as caught, Master(s, options, call_log) as master, Recorder(record) as recorder:
         master.run(Fraction(1), [recorder])
     assert str(caught.value) == "endless: fmi3DoStep at t = 0.3 s did not return within 1 s"
     assert caught.value.as_data()["kind"] == "hang"
     assert Record(record).time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
-    ends = [call for call in called.calls if call[1].endswith(("Terminate", "FreeInstance"))]
+    ends = [call for call in call_log.calls if call[1].endswith(("Terminate", "FreeInstance"))]
     assert sorted(ends) == sorted((u, f"fmi3{c}") for u in ("later", "steady") for c in ("FreeInstance", "Terminate"))
-    number = len(called.calls)
+    number = len(call_log.calls)
     endless()
-    assert called.calls[number:] == []  # the thread came back and touched no unit
+    assert call_log.calls[number:] == []  # the thread came back and touched no unit
 
 
 @pytest.mark.parametrize(
@@ -75,28 +75,28 @@ def test_a_unit_that_hangs_in_a_step_is_left_and_the_others_are_ended(
 def test_saved_states_of_a_unit_that_hangs_are_left_too(
     options: MasterOptions, endless: Callable[[], None], tmp_path: Path
 ):
-    s, called = System(), Called()
+    s, call_log = System(), CallLog()
     s.add("steady", native_fmu("integrator"), period=Fraction(1, 10))
     s.add("endless", block("HangsInStep", tmp_path))
-    with pytest.raises(UnitHung) as caught, Master(s, options, called) as master:
+    with pytest.raises(UnitHung) as caught, Master(s, options, call_log) as master:
         master.run(Fraction(1))
     assert caught.value.unit == "endless"
-    assert called.after("endless", "fmi3DoStep", "endless") == []
-    assert called.after("steady", "fmi3DoStep", "endless")[-1] == "fmi3FreeInstance"
-    number = len(called.calls)
+    assert call_log.after("endless", "fmi3DoStep", "endless") == []
+    assert call_log.after("steady", "fmi3DoStep", "endless")[-1] == "fmi3FreeInstance"
+    number = len(call_log.calls)
     endless()
-    assert called.calls[number:] == []
+    assert call_log.calls[number:] == []
 
 
 def test_a_unit_that_hangs_as_it_is_initialised(endless: Callable[[], None], tmp_path: Path):
-    s, called = System(), Called()
+    s, call_log = System(), CallLog()
     s.add("first", native_fmu("trivial"))
     s.add("endless", block("HangsAtOnce", tmp_path))
     hangs = pytest.raises(UnitHung, match=r"endless: fmi3\w+ at t = 0 s did not return")
-    with hangs, Master(s, MasterOptions(call_limit=LIMIT), called):
+    with hangs, Master(s, MasterOptions(call_limit=LIMIT), call_log):
         pass
-    assert ("first", "fmi3FreeInstance") in called.calls
-    assert ("endless", "fmi3FreeInstance") not in called.calls
+    assert ("first", "fmi3FreeInstance") in call_log.calls
+    assert ("endless", "fmi3FreeInstance") not in call_log.calls
     endless()
 
 

@@ -5,8 +5,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 import pytest
-from called import Called
-from checkpointed import oscillator
+from call_log import CallLog
+from checkpointed_runs import oscillator
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
@@ -28,18 +28,18 @@ LINEAR = Extrapolation.LINEAR
     ids=lambda o: f"{o.algorithm.value} {'adaptive' if o.adaptive else 'events' if o.repeat_discarded else 'grid'}",
 )
 def test_outputs_are_fetched_only_after_a_step_or_a_restored_state(options: MasterOptions):
-    called = Called()
-    with Master(oscillator(), options, called) as master:
+    call_log = CallLog()
+    with Master(oscillator(), options, call_log) as master:
         for stop in (0, Fraction(1, 8), Fraction(1, 8), Fraction(1, 5)):
             master.run(Fraction(stop))
     for unit, fmi in (("a", 2), ("b", 3), ("between", 3)):
-        calls = [call.removeprefix(f"fmi{fmi}") for name, call in called.calls if name == unit]
+        calls = [call.removeprefix(f"fmi{fmi}") for name, call in call_log.calls if name == unit]
         assert [c for c in calls if c in START[fmi]] == START[fmi]
         assert calls[-2:] == ["Terminate", "FreeInstance"]
         assert _faults(calls[calls.index("ExitInitializationMode") + 1 : -2]) == []
 
 
 def _faults(calls: Sequence[str]) -> list[tuple[str, str]]:
-    """Return where a Get follows a Set at once; a state that is set ends what inputs before it ask for."""
+    """Return where a Get directly follows a Set; SetFMUState cancels the inputs that were set before it."""
     entries = [c for c in calls if not c.startswith(("GetFMU", "FreeFMU"))]
     return [(a, b) for a, b in pairwise(entries) if a.startswith("Set") and a[:6] != "SetFMU" and b.startswith("Get")]

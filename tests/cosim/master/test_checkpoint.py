@@ -6,9 +6,9 @@ import zipfile
 from fractions import Fraction
 from pathlib import Path
 
-import checkpointed
+import checkpointed_runs
 import pytest
-from checkpointed import checkpoint_of, go_on, record_of, run
+from checkpointed_runs import checkpoint_of, record_of, resume, run
 from fmu_of import FmuOf
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,14 +37,14 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path: Path):
     whole.mkdir()
     killed.mkdir()
     run(whole)
-    command = [sys.executable, checkpointed.__file__ or "", str(killed)]
+    command = [sys.executable, checkpointed_runs.__file__ or "", str(killed)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "passed\n"
         process.kill()
     complete_record(record_of(killed))
-    assert checkpointed.PASSED <= Record(record_of(killed)).time[-1] <= checkpointed.WAITS + 0.02
-    assert go_on(killed) == 7.0
+    assert checkpointed_runs.PASSED <= Record(record_of(killed)).time[-1] <= checkpointed_runs.WAITS + 0.02
+    assert resume(killed) == 7.0
     for name in ("signals.parquet", "signals.csv"):
         assert (killed / name).read_bytes() == (whole / name).read_bytes()
     assert sorted(os.listdir(killed)) == sorted(os.listdir(whole))
@@ -55,21 +55,21 @@ def test_a_checkpoint_is_written_at_the_first_communication_point_that_is_not_be
     s.add("sine", native_fmu("sine"), period=Fraction(1, 3))
     times: list[float] = []
     with Master(s) as master, Recorder(record_of(tmp_path)) as recorder:
-        write = checkpointed.Checkpointer(
+        write = checkpointed_runs.Checkpointer(
             checkpoint_of(tmp_path), Fraction(1, 2), master, recorder, lambda: times.append(master.time) or b""
         )
         master.run(Fraction(3), [recorder, write])
     assert times == [2 / 3, 1.0, 5 / 3, 2.0, 8 / 3, 3.0]
 
 
-def test_a_checkpoint_that_cannot_be_written_is_told_and_the_run_goes_on(
+def test_a_checkpoint_that_cannot_be_written_is_reported_and_the_run_goes_on(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ):
     s = System()
     s.add("sine", native_fmu("sine"))
     checkpoint_of(tmp_path).mkdir()
     with Master(s) as master, Recorder(record_of(tmp_path)) as recorder:
-        write = checkpointed.Checkpointer(checkpoint_of(tmp_path), Fraction(1), master, recorder)
+        write = checkpointed_runs.Checkpointer(checkpoint_of(tmp_path), Fraction(1), master, recorder)
         master.run(Fraction(3, 2), [recorder, write])
         assert master.time == 1.5
     assert "checkpoint.zip cannot be written at t = 1 s, the former one stays: Is a directory" in caplog.text
@@ -87,11 +87,11 @@ def test_a_checkpoint_that_cannot_be_written_is_told_and_the_run_goes_on(
 )
 def test_a_run_goes_on_from_any_communication_point(tmp_path: Path, options: MasterOptions):
     points: list[Checkpoint] = []
-    with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "whole.parquet") as recorder:
+    with Master(checkpointed_runs.oscillator(), options) as master, Recorder(tmp_path / "whole.parquet") as recorder:
         master.run(Fraction(1, 5), [recorder, lambda _t, _s: points.append(take_checkpoint(master, recorder.rows))])
     whole = Record(tmp_path / "whole.parquet")
     for c in points[:-1:2]:
-        with Master(checkpointed.oscillator(), options) as master, Recorder(tmp_path / "rest.parquet") as recorder:
+        with Master(checkpointed_runs.oscillator(), options) as master, Recorder(tmp_path / "rest.parquet") as recorder:
             c.restore(master)
             assert len(master.cpu["a"]) == len(c.cpu["a"]) // 8
             master.run(Fraction(1, 5), [recorder])
@@ -114,14 +114,14 @@ def test_a_plan_that_goes_on_writes_the_record_by_itself(
 
     monkeypatch.setattr(Recorder, "__call__", adding)
     file, compare = record_of(tmp_path), tmp_path / "whole.parquet"
-    with Master(checkpointed.oscillator()) as master, Recorder(compare) as recorder:
+    with Master(checkpointed_runs.oscillator()) as master, Recorder(compare) as recorder:
         for stop in (Fraction(1, 7), *stops):
             master.run(stop, [recorder])
-    with Master(checkpointed.oscillator()) as master, Recorder(file) as recorder:
+    with Master(checkpointed_runs.oscillator()) as master, Recorder(file) as recorder:
         master.run(Fraction(1, 7), [recorder])
         c = take_checkpoint(master, recorder.rows)
     rows.clear()
-    with Master(checkpointed.oscillator()) as master, Recorder(tmp_path / "rest.parquet") as recorder:
+    with Master(checkpointed_runs.oscillator()) as master, Recorder(tmp_path / "rest.parquet") as recorder:
         c.restore(master)
         for stop in stops:
             master.run(stop, [ObserveAfter(c.time, recorder)])
@@ -168,12 +168,12 @@ def test_what_is_read_is_what_was_written(tmp_path: Path):
     assert read_checkpoint(file) == _some()
 
 
-def test_a_missing_checkpoint_is_told(tmp_path: Path):
+def test_a_missing_checkpoint_is_reported(tmp_path: Path):
     with pytest.raises(InvalidCheckpoint, match="there is no checkpoint; a run writes them with --checkpoint"):
         read_checkpoint(tmp_path / "checkpoint.zip")
 
 
-def test_a_checkpoint_of_another_version_is_told(tmp_path: Path):
+def test_a_checkpoint_of_another_version_is_reported(tmp_path: Path):
     file = tmp_path / "checkpoint.zip"
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("checkpoint.json", '{"format": 2}')
@@ -182,7 +182,7 @@ def test_a_checkpoint_of_another_version_is_told(tmp_path: Path):
 
 
 @given(st.data())
-def test_a_damaged_checkpoint_is_told_or_is_what_was_written(
+def test_a_damaged_checkpoint_is_reported_or_is_what_was_written(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ):
     file = tmp_path_factory.mktemp("damaged") / "checkpoint.zip"

@@ -1,4 +1,4 @@
-"""A run with events goes on from a checkpoint as if nothing had been."""
+"""A run with events resumes from a checkpoint as if it had not stopped."""
 
 import json
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Row = tuple[float, ...]
 
 
 def bouncing() -> tuple[System, tuple[str, ...]]:
-    """At most times the slow unit is ahead; at an impact it goes back."""
+    """At most times the slow unit is ahead; at an impact it is rolled back."""
     s = System()
     ball, slow = s.add("ball", native_fmu("ball")), s.add("slow", native_fmu("integrator"), period=Fraction(1, 2))
     alarm, watch = s.add("alarm", native_fmu("alarm"), delay=0.15), s.add("watch", native_fmu("watch"))

@@ -1,11 +1,11 @@
-"""A unit that does not return as it is terminated or freed is told, and the others are ended."""
+"""A unit that does not return as it is terminated or freed is reported, and the others are ended."""
 
 import threading
 from collections.abc import Iterator
 from fractions import Fraction
 
 import pytest
-from called import Called, fed_by
+from call_log import CallLog, fed_by
 from native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
@@ -13,7 +13,7 @@ from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 
 
-class Stuck(Called):
+class Stuck(CallLog):
     """Holds one call of the unit `bad` until it is let go."""
 
     def __init__(self, call: str) -> None:
@@ -50,20 +50,20 @@ def threads() -> Iterator[list[Stuck]]:
 )
 @pytest.mark.parametrize("call", ["Terminate", "FreeInstance"])
 def test_others_are_ended(call: str, options: MasterOptions, threads: list[Stuck]):
-    called = Stuck(f"fmi3{call}")
-    threads.append(called)
-    master = Master(fed_by(native_fmu("gain"), 3), options, called)
+    call_log = Stuck(f"fmi3{call}")
+    threads.append(call_log)
+    master = Master(fed_by(native_fmu("gain"), 3), options, call_log)
     with pytest.raises(UnitHung, match=f"bad: fmi3{call} at t = "), master:
         master.run(Fraction(1))
     for unit in ("source", "reader"):
-        assert [c for u, c in called.calls if u == unit][-1] == "fmi3FreeInstance"
-        assert (unit, "fmi3Terminate") in called.calls
-    assert called.after("bad", f"fmi3{call}", "bad") == []
+        assert [c for u, c in call_log.calls if u == unit][-1] == "fmi3FreeInstance"
+        assert (unit, "fmi3Terminate") in call_log.calls
+    assert call_log.after("bad", f"fmi3{call}", "bad") == []
 
 
 def test_a_failure_counts_more_than_a_hang_that_follows(threads: list[Stuck]):
-    called = Stuck("fmi3Terminate")
-    threads.append(called)
+    call_log = Stuck("fmi3Terminate")
+    threads.append(call_log)
 
     def fail(t: float, _y: object) -> None:
         if t > 0.3:
@@ -71,7 +71,7 @@ def test_a_failure_counts_more_than_a_hang_that_follows(threads: list[Stuck]):
 
     with (
         pytest.raises(ZeroDivisionError),
-        Master(fed_by(native_fmu("gain"), 3), MasterOptions(call_limit=0.5), called) as master,
+        Master(fed_by(native_fmu("gain"), 3), MasterOptions(call_limit=0.5), call_log) as master,
     ):
         master.run(Fraction(1), [fail])
-    assert called.after("source", "fmi3Terminate", "bad") != []
+    assert call_log.after("source", "fmi3Terminate", "bad") != []

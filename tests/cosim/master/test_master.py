@@ -111,7 +111,7 @@ def test_each_unit_steps_at_its_own_rate_and_time_does_not_drift(fmu: FmuOf):
         assert float(master.signals["slow.at"]) == pytest.approx(100.0, abs=1e-12)
 
 
-def test_a_run_ends_when_it_is_told_to(fmu: FmuOf):
+def test_a_run_ends_when_an_observer_ends_it(fmu: FmuOf):
     s = System()
     s.add("counter", fmu("Counter"))
     with Master(s) as master:
@@ -266,10 +266,10 @@ def test_pictures_and_numbers_can_be_read_after_the_run(fmu: FmuOf):
     [
         ("algorithm", "newton", r"algorithm = 'newton': one of Algorithm\.JACOBI, .* is right"),
         ("adaptive", 1e-4, r"adaptive = 0\.0001: None, or such as AdaptiveStep\(\) is right"),
-        ("max_iterations", 2.5, r"most_iterations = 2\.5: a whole number"),
+        ("max_iterations", 2.5, r"max_iterations = 2\.5: a whole number"),
         ("tolerance", "x", r"tolerance = 'x': a finite number"),
     ],
 )
-def test_a_value_of_another_kind_is_told_with_what_would_be_right(option: str, value: Any, entries: str):
+def test_a_value_of_another_kind_is_reported_with_valid_values(option: str, value: Any, entries: str):
     with pytest.raises(InvalidOptions, match=entries):
         MasterOptions(**{option: value})

@@ -1,4 +1,4 @@
-"""A run keeps to the wall clock by absolute deadlines, and tells of those that it missed; the clock here is a list."""
+"""A run keeps to the wall clock by absolute deadlines, and reports those that it missed; the clock here is a list."""
 
 from fractions import Fraction
 
@@ -67,11 +67,11 @@ def test_a_missed_deadline_is_counted_and_the_others_stay_where_they_are():
 @pytest.mark.parametrize(
     ("work", "text"), [(0.0604, "at most 10.4 ms late"), (1.11, "at most 1.06 s late"), (2000.0, "1999.95 s late")]
 )
-def test_lateness_is_told_in_a_unit_that_reads_well(work: float, text: str):
+def test_lateness_is_reported_in_a_unit_that_reads_well(work: float, text: str):
     assert text in str(paced([work])[0])
 
 
-def test_it_tells_how_fast_it_went():
+def test_it_says_how_fast_it_went():
     assert paced([0.01] * 100)[0].reached == pytest.approx(1.0, abs=0.001)
     assert paced([0.2] * 10)[0].reached == pytest.approx(0.05 / 0.2)
     assert paced([])[0].reached is None

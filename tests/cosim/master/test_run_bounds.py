@@ -87,7 +87,7 @@ def test_a_unit_that_failed_does_not_go_on(fmi: int, options: MasterOptions):
     with Master(s, options) as master:
         with pytest.raises(UnitFailure):
             master.run(Fraction(1))
-        with pytest.raises(RuntimeError, match="bad failed, and the standards forbid that it goes on"):
+        with pytest.raises(RuntimeError, match="bad failed, and the standards forbid further calls of it"):
             master.run(Fraction(1))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from called import Called, fed_by
+from call_log import CallLog, fed_by
 from native_units import native_fmu
 
 from handover.cosim.exceptions import InitializationError, UnitFailure
@@ -30,11 +30,15 @@ from handover.cosim.system.system import System
 COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "compiled"])
 
 
-def failed(bad: str, fmi: int, record: Path, *, compiled: bool) -> tuple[UnitFailure, Called]:
-    called, system, options = Called(), fed_by(native_fmu(bad, fmi), fmi), MasterOptions(compiled=compiled)
-    with pytest.raises(UnitFailure) as caught, Master(system, options, called) as master, Recorder(record) as recorder:
+def failed(bad: str, fmi: int, record: Path, *, compiled: bool) -> tuple[UnitFailure, CallLog]:
+    call_log, system, options = CallLog(), fed_by(native_fmu(bad, fmi), fmi), MasterOptions(compiled=compiled)
+    with (
+        pytest.raises(UnitFailure) as caught,
+        Master(system, options, call_log) as master,
+        Recorder(record) as recorder,
+    ):
         master.run(Fraction(1), [recorder])
-    return caught.value, called
+    return caught.value, call_log
 
 
 @COMPILED
@@ -46,7 +50,7 @@ def failed(bad: str, fmi: int, record: Path, *, compiled: bool) -> tuple[UnitFai
         ("fatal", UnitFatal, "bad: fmi{0}DoStep at t = 0.2 s answered Fatal", "memory is corrupt at t = 0.2"),
     ],
 )
-def test_an_answer_of_error_is_told_with_call_time_and_log(
+def test_an_answer_of_error_is_reported_with_call_time_and_log(
     bad: str, kind: type, text: str, line: str, fmi: int, compiled: bool, tmp_path: Path
 ):
     failure, _ = failed(bad, fmi, tmp_path / "r.parquet", compiled=compiled)
@@ -72,7 +76,7 @@ def test_an_answer_of_error_is_told_with_call_time_and_log(
 def test_nan_and_infinity_are_found_before_they_feed_or_are_recorded(
     bad: str, value: str, fmi: int, call: str, compiled: bool, tmp_path: Path
 ):
-    failure, called = failed(bad, fmi, tmp_path / "r.parquet", compiled=compiled)
+    failure, call_log = failed(bad, fmi, tmp_path / "r.parquet", compiled=compiled)
     assert isinstance(failure, NotFinite)
     assert failure.headline == f"bad: {call} at t = 0.3 s gave y = {value}, which feeds reader.u"
     assert (failure.port, failure.index, failure.as_data()["value"]) == ("y", (), value)
@@ -81,7 +85,7 @@ def test_nan_and_infinity_are_found_before_they_feed_or_are_recorded(
     assert record.time.tolist() == [0.0, 0.1, 0.2]
     assert np.isfinite(record["bad.y"]).all()
     if not compiled:
-        assert called.after("reader", call, "bad") == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
+        assert call_log.after("reader", call, "bad") == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
 
 
 @COMPILED
@@ -92,8 +96,8 @@ def test_nan_and_infinity_are_found_before_they_feed_or_are_recorded(
 def test_the_others_are_terminated_and_freed_and_the_failed_one_as_the_standard_has_it(
     bad: str, left: list[str], fmi: int, compiled: bool, tmp_path: Path
 ):
-    _, called = failed(bad, fmi, tmp_path / "r.parquet", compiled=compiled)
-    ends = [(unit, call) for unit, call in called.calls if call.endswith(("Terminate", "FreeInstance"))]
+    _, call_log = failed(bad, fmi, tmp_path / "r.parquet", compiled=compiled)
+    ends = [(unit, call) for unit, call in call_log.calls if call.endswith(("Terminate", "FreeInstance"))]
     for unit in ("source", "reader"):
         assert [c for u, c in ends if u == unit] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
     assert [c for u, c in ends if u == "bad"] == [f"fmi{fmi}{name}" for name in left]
@@ -101,37 +105,37 @@ def test_the_others_are_terminated_and_freed_and_the_failed_one_as_the_standard_
 
 @COMPILED
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_unit_that_ends_the_simulation_is_told_and_terminated_like_the_others(
+def test_a_unit_that_ends_the_simulation_is_reported_and_terminated_like_the_others(
     fmi: int, compiled: bool, tmp_path: Path
 ):
-    failure, called = failed("ends", fmi, tmp_path / "r.parquet", compiled=compiled)
+    failure, call_log = failed("ends", fmi, tmp_path / "r.parquet", compiled=compiled)
     assert type(failure) is UnitTerminated
     assert str(failure) == f"bad: fmi{fmi}DoStep at t = 0.2 s asked to end the simulation"
     assert Record(tmp_path / "r.parquet").time.tolist() == [0.0, 0.1, 0.2]
-    ends = [(unit, call) for unit, call in called.calls if call.endswith(("Terminate", "FreeInstance"))]
+    ends = [(unit, call) for unit, call in call_log.calls if call.endswith(("Terminate", "FreeInstance"))]
     assert [call for unit, call in ends if unit == "bad"] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
 
 
 @COMPILED
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_step_that_is_discarded_is_told_and_the_unit_terminated(fmi: int, compiled: bool):
-    s, called = System(), Called()
+def test_a_step_that_is_discarded_is_reported_and_the_unit_terminated(fmi: int, compiled: bool):
+    s, call_log = System(), CallLog()
     s.add("bad", native_fmu("discards", fmi), period=Fraction(1, 10))
-    with pytest.raises(UnitDiscarded) as caught, Master(s, MasterOptions(compiled=compiled), called) as master:
+    with pytest.raises(UnitDiscarded) as caught, Master(s, MasterOptions(compiled=compiled), call_log) as master:
         master.run(Fraction(1))
     assert caught.value.headline.startswith(f"bad: fmi{fmi}DoStep at t = 0 s answered Discard")
     assert "a step of 0.1 s is longer than 0.04 s" in str(caught.value)
-    assert [call for _, call in called.calls][-2:] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
+    assert [call for _, call in call_log.calls][-2:] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_after_fatal_no_instance_of_the_same_fmu_is_called(fmi: int):
-    system, called = fed_by(native_fmu("fatal", fmi), fmi), Called()
+    system, call_log = fed_by(native_fmu("fatal", fmi), fmi), CallLog()
     system.add("sibling", native_fmu("fatal", fmi), at=1e9)
-    with pytest.raises(UnitFatal), Master(system, MasterOptions(), called) as master:
+    with pytest.raises(UnitFatal), Master(system, MasterOptions(), call_log) as master:
         master.run(Fraction(1))
-    at = called.calls.index(("source", f"fmi{fmi}Terminate"))
-    assert {unit for unit, _ in called.calls[at:]} == {"source", "reader"}
+    at = call_log.calls.index(("source", f"fmi{fmi}Terminate"))
+    assert {unit for unit, _ in call_log.calls[at:]} == {"source", "reader"}
 
 
 def test_numbers_that_feed_nobody_may_be_what_they_are(tmp_path: Path):
@@ -143,7 +147,7 @@ def test_numbers_that_feed_nobody_may_be_what_they_are(tmp_path: Path):
 
 
 def test_a_unit_that_gives_infinity_as_it_is_initialised_is_refused():
-    s, called = System(), Called()
+    s, call_log = System(), CallLog()
     source, reader = (
         s.add("source", native_fmu("sine"), a=1e308, phase=math.pi / 2, b=1e308),
         s.add("reader", native_fmu("integrator")),
@@ -151,11 +155,11 @@ def test_a_unit_that_gives_infinity_as_it_is_initialised_is_refused():
     s.connect(source.y.y, reader.u.u)
     with (
         pytest.raises(InitializationError, match=r"source does not start: y = infinity") as caught,
-        Master(s, heartbeat=called),
+        Master(s, heartbeat=call_log),
     ):
         pass
     assert isinstance(caught.value.failure, NotFinite)
-    assert [call for _, call in called.calls][-2:] == ["fmi3FreeInstance"] * 2
+    assert [call for _, call in call_log.calls][-2:] == ["fmi3FreeInstance"] * 2
 
 
 def test_every_failure_has_a_kind_of_its_own_and_its_data():

@@ -1,4 +1,4 @@
-"""Runs a system as a compiled plan and on the general path, and tells what came of it."""
+"""Runs a system as a compiled plan and on the general path, and compares the results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ PLAIN = (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL)
 
 
 @dataclass(frozen=True)
-class Ran:
-    """What came of a run: the record's bytes, what an observer saw, and the failure in which it ended."""
+class Outcome:
+    """The outcome of a run: the record's bytes, what an observer saw, and the failure in which it ended."""
 
     record: bytes
     seen: tuple[object, ...] = ()
@@ -31,27 +31,27 @@ class Ran:
 
 def recorded(
     build: Build, stops: Sequence[Fraction], folder: Path, *, compiled: bool,
-    algorithm: Algorithm = Algorithm.GAUSS_SEIDEL, watched: bool = False,
-) -> Ran:  # fmt: skip
-    """Run a system from stop to stop; watched, Python looks at all signals at each communication point."""
+    algorithm: Algorithm = Algorithm.GAUSS_SEIDEL, observed: bool = False,
+) -> Outcome:  # fmt: skip
+    """Run a system from stop to stop; observed, Python reads all signals at each communication point."""
     seen: list[object] = []
     system = build()
 
     def look(t: float, signals: Signals) -> None:
         seen.append((t, everything(system, signals)))
 
-    file = folder / f"{algorithm.value}-{compiled}-{watched}.parquet"
+    file = folder / f"{algorithm.value}-{compiled}-{observed}.parquet"
     failure: UnitFailure | None = None
     with Master(system, MasterOptions(algorithm=algorithm, compiled=compiled)) as master:
         assert isinstance(master.stepper, PlanStepper) == compiled
         with Recorder(file) as recorder:
             try:
                 for stop in stops:
-                    master.run(stop, [recorder, look] if watched else [recorder])
+                    master.run(stop, [recorder, look] if observed else [recorder])
             except UnitFailure as e:
                 failure = e
         seen.append((master.time, everything(system, master.signals)))
-    return Ran(file.read_bytes(), tuple(seen), failure)
+    return Outcome(file.read_bytes(), tuple(seen), failure)
 
 
 def everything(system: System, signals: Signals) -> tuple[object, ...]:
@@ -65,17 +65,17 @@ def everything(system: System, signals: Signals) -> tuple[object, ...]:
 
 def expect_alike(
     build: Build, stop: Fraction, folder: Path, algorithm: Algorithm, stops: Sequence[Fraction] = ()
-) -> Ran:
-    """Expect that both paths, watched or not, give the same; return it."""
+) -> Outcome:
+    """Expect that both paths, observed or not, have the same outcome; return it."""
     stops = stops or [stop]
-    general = recorded(build, stops, folder, compiled=False, algorithm=algorithm, watched=True)
-    watched = recorded(build, stops, folder, compiled=True, algorithm=algorithm, watched=True)
+    general = recorded(build, stops, folder, compiled=False, algorithm=algorithm, observed=True)
+    observed = recorded(build, stops, folder, compiled=True, algorithm=algorithm, observed=True)
     alone = recorded(build, stops, folder, compiled=True, algorithm=algorithm)
-    assert watched.record == general.record
+    assert observed.record == general.record
     assert alone.record == general.record
-    assert watched.seen == general.seen
+    assert observed.seen == general.seen
     assert alone.seen == general.seen[-1:]
-    for ran in (watched, alone):
-        assert type(ran.failure) is type(general.failure)
-        assert ran.failure is None or repr(vars(ran.failure)) == repr(vars(general.failure))
+    for outcome in (observed, alone):
+        assert type(outcome.failure) is type(general.failure)
+        assert outcome.failure is None or repr(vars(outcome.failure)) == repr(vars(general.failure))
     return alone

@@ -30,7 +30,7 @@ def test_it_compiles_for_every_platform(target: str, tmp_path: Path):
     assert not made.is_current(target)
 
 
-def test_what_the_compiler_says_is_told_and_nothing_is_left(tmp_path: Path):
+def test_what_the_compiler_says_is_reported_and_nothing_is_left(tmp_path: Path):
     made = libraries(tmp_path / "plan")
     (made.folder / "exact_time.c").write_text("double exact_time(int ticks { }")
     with pytest.raises(CompilationError, match=r"(?s)the master's plan does not compile for .*exact_time\.c:1"):

@@ -1,4 +1,4 @@
-"""A unit that fails in a compiled plan is told as on the general path, and the record ends with the last good step."""
+"""A unit that fails in a compiled plan is reported as on the general path; the record ends with the last good step."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -56,7 +56,7 @@ def test_a_step_that_is_discarded(fmi: int, tmp_path: Path):
     assert isinstance(expect_alike(build, Fraction(10), tmp_path, Algorithm.JACOBI).failure, UnitDiscarded)
 
 
-def test_an_exception_in_a_block_is_told_with_its_log(fmu: FmuOf, tmp_path: Path):
+def test_an_exception_in_a_block_is_reported_with_its_log(fmu: FmuOf, tmp_path: Path):
     def build() -> System:
         s = System()
         s.add("steady", fmu("Counter"), sampled=True)

@@ -44,7 +44,7 @@ with Master(s) as master, Recorder(Path({str(file)!r}), ["csv"]) as recorder:
     assert complete_record(file) == rows
 
 
-def test_a_process_that_died_between_stream_and_counter_left_no_row_twice(tmp_path: Path):
+def test_a_process_that_crashed_between_stream_and_counter_left_no_row_twice(tmp_path: Path):
     file = tmp_path / "signals.parquet"
     x = np.zeros(1)
     recorder = Recorder(file)
@@ -77,7 +77,7 @@ def test_a_record_under_way_is_not_completed_by_another(tmp_path: Path):
     file = tmp_path / "signals.parquet"
     with Recorder(file) as recorder:
         _record(recorder, np.zeros(1), 3)
-        with pytest.raises(FileLocked, match="still goes on"):
+        with pytest.raises(FileLocked, match="still going on"):
             complete_record(file)
     assert complete_record(file) == 3
 
@@ -153,7 +153,7 @@ def test_rows_written_into_the_block_are_recorded_as_those_of_an_observer(tmp_pa
     assert (tmp_path / "observer.parquet").read_bytes() == (tmp_path / "plan.parquet").read_bytes()
 
 
-def test_a_full_disk_is_told_and_leaves_what_was_recorded(tmp_path: Path):
+def test_a_full_disk_is_reported_and_leaves_what_was_recorded(tmp_path: Path):
     resource = pytest.importorskip("resource")
     file, x = tmp_path / "signals.parquet", np.zeros(1)
     recorder = Recorder(file)
@@ -183,5 +183,5 @@ def _record(recorder: Recorder, x: NDArray[np.float64], n: int, flushed: Sequenc
 
 
 def _abandon(recorder: Recorder) -> None:
-    """Let go of the files as a process does that dies."""
+    """Close the files as when a process crashes."""
     recorder.block.close()

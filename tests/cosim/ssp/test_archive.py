@@ -1,4 +1,4 @@
-"""Files that are no SSPs, or not to be read, are refused with one clear line."""
+"""Files that are no SSPs, or cannot be read, are rejected with one clear line."""
 
 import contextlib
 import zipfile
@@ -25,7 +25,7 @@ def refusal(path: Path) -> str:
     return "; ".join(caught.value.faults)
 
 
-def test_what_is_no_archive_is_told(tmp_path: Path):
+def test_what_is_no_archive_is_reported(tmp_path: Path):
     (tmp_path / "a.ssp").write_text("<ssd/>")
     (tmp_path / "b.ssp").write_bytes(b"")
     (tmp_path / "c.ssp").write_bytes(b"PK\x03\x04 and no more")
@@ -65,7 +65,7 @@ def test_a_bomb_is_refused(tmp_path: Path):
         ({"systemstructure.SSD": SOUND}, "upper and lower case count"),
     ],
 )
-def test_a_missing_description_is_told_with_what_is_there(tmp_path: Path, files: dict[str, str], text: str):
+def test_a_missing_description_is_reported_with_what_is_there(tmp_path: Path, files: dict[str, str], text: str):
     assert text in refusal(pack_ssp(tmp_path / "a.ssp", None, files))
 
 
@@ -112,7 +112,7 @@ def test_a_component_s_source_is_a_file_in_the_archive(tmp_path: Path, source: s
     assert text in refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
 
 
-def test_what_is_wrong_with_an_fmu_is_told_with_its_place_in_the_ssp(tmp_path: Path):
+def test_what_is_wrong_with_an_fmu_is_reported_with_its_place_in_the_ssp(tmp_path: Path):
     file = pack_ssp(tmp_path / "a.ssp", SOUND, {"resources/unit.fmu": b"no zip"})
     assert refusal(file) == "resources/unit.fmu: not an FMU: an FMU is a zip archive, and this file is not one"
 

@@ -151,7 +151,7 @@ def test_a_connection_to_nowhere_or_of_the_wrong_kind_is_refused(opened: Open, c
     assert value in refusal(lambda: opened(TWO, connections))
 
 
-def test_all_faults_of_connections_are_told_at_once_each_with_its_line(opened: Open):
+def test_all_faults_of_connections_are_reported_together_each_with_its_line(opened: Open):
     value = refusal(lambda: opened(TWO, connection("c.y", "b.u") + "\n" + connection("a.u", "b.u")))
     assert value.startswith("SystemStructure.ssd, line 3: there is no element 'c'")
     assert "; SystemStructure.ssd, line 4: a.u - b.u: both ends take" in value

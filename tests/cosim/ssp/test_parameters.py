@@ -148,7 +148,7 @@ def test_a_parameter_of_the_system_gives_its_value_to_those_of_units(started: Op
     assert started(whole) == {"a": {"mode": 7}}
 
 
-def test_a_name_that_nothing_has_is_left_out_and_told(started: Open, caplog: pytest.LogCaptureFixture):
+def test_a_name_that_nothing_has_is_left_out_and_reported(started: Open, caplog: pytest.LogCaptureFixture):
     with caplog.at_level(logging.WARNING):
         assert started(one("y|Real|1", "nothing|Real|1", "mode|Integer|2")) == {"a": {"mode": 2}}
     text = caplog.text
@@ -173,7 +173,7 @@ def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: st
     assert text in refusal(lambda: started(one(given)))
 
 
-def test_a_name_that_nothing_has_is_told_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):
+def test_a_name_that_nothing_has_is_reported_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):
     middle = system(component("a", bindings(parameters("moed|Integer|1"))), name="m")
     assert started(system(middle, before=bindings(parameters("m.a.p[3]|Real|1")))) == {"m.a": {}}
     assert "no variable is called 'moed'; did you mean mode?; its value is left out" in caplog.text

@@ -128,7 +128,7 @@ def test_transformations_and_conversions_are_written_out(tmp_path: Path):
     assert changes == {"b.u": None, "c.u": LinearTransformation(0.25, -2.0), "a.u": None}
 
 
-def test_what_stands_in_the_way_is_told_and_nothing_is_written(fmu: FmuOf, tmp_path: Path):
+def test_what_cannot_be_exported_is_reported_and_nothing_is_written(fmu: FmuOf, tmp_path: Path):
     s = System()
     scalar = build_block("master_blocks:Echo", 3, tmp_path, step=STEP, scalar=True)
     one, many = s.add("one", fmu("Counter")), s.add("many", scalar)

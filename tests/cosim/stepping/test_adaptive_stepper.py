@@ -1,4 +1,4 @@
-"""Steps that follow their error, on the two-mass oscillator and on units that cannot."""
+"""Step sizes by the estimated error, on the two-mass oscillator and on units that cannot repeat steps."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -158,7 +158,7 @@ def test_a_step_below_the_smallest_names_the_signal_with_the_largest_error():
     assert e.verdict == "the step could not follow its error"
 
 
-def test_faulty_tolerances_and_limits_are_told_at_once():
+def test_faulty_tolerances_and_limits_are_reported_together():
     with pytest.raises(InvalidOptions) as caught:
         AdaptiveStep(
             relative=-1.0,

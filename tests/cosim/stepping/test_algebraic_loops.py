@@ -1,4 +1,4 @@
-"""Algebraic loops are found at ports, solved at the start and at each step, or refused with the loop spelled out."""
+"""Algebraic loops are found at ports, solved at the start and at each step, or rejected with the loop spelled out."""
 
 import json
 from fractions import Fraction
@@ -113,7 +113,7 @@ def test_a_loop_is_solved_beside_units_with_events():
     assert (y, z) == pytest.approx((-1.0 / 7.0, 4.0 / 7.0), rel=1e-6)
 
 
-def test_a_circle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCaptureFixture):
+def test_a_cycle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCaptureFixture):
     s = System()
     both = s.add("both", native_fmu("discrete_passer"), count_in=7)
     other = s.add("other", native_fmu("discrete_passer"))
@@ -123,7 +123,7 @@ def test_a_circle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCa
     schedule = Schedule(s)
     assert not schedule.loops
     assert [g.units for g in schedule.groups] == [("both",), ("other",)]
-    assert "both steps first where units wait for each other; it gets the former values of other" in caplog.text
+    assert "both steps first where units wait for each other; it gets the previous values of other" in caplog.text
     with Master(s) as master:
         assert int(master.signals["other.count"]) == 7
 
@@ -174,7 +174,7 @@ def test_a_loop_of_values_that_are_not_real_is_refused():
     a = s.add("a", native_fmu("discrete_passer"))
     s.connect(a.y.count, a.u.count_in)
     for algorithm in Algorithm:
-        with pytest.raises(ScheduleError, match=r"a\.count -> a\.count_in, .* at once: .* a\.count is integer"):
+        with pytest.raises(ScheduleError, match=r"a\.count -> a\.count_in, .* feeds through to .* a\.count is integer"):
             Master(s, MasterOptions(algorithm=algorithm))
 
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 from native_units import native_fmu
-from seen import grid, seen
+from observed_rows import grid, observed_rows
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.stepping.options import Algorithm, MasterOptions
@@ -21,7 +21,7 @@ def test_counters_at_three_rates_count_exactly(algorithm: Algorithm):
     for name in rates:
         s.add(name, native_fmu(f"counter_{name}"), period=Fraction(1))
     names = [f"{name}.count" for name in rates]
-    rows = seen(s, Fraction(30), *names, options=MasterOptions(algorithm=algorithm))
+    rows = observed_rows(s, Fraction(30), *names, options=MasterOptions(algorithm=algorithm))
     assert list(rows) == sorted({t for rate in rates.values() for t in grid(rate, 30)})
     for i, rate in enumerate(rates.values()):
         counts = {t: row[i] for t, row in rows.items() if t in set(grid(rate, 30))}
@@ -33,7 +33,7 @@ def test_a_clocked_value_goes_from_tick_to_tick():
     s = System()
     tenths, quarters = s.add("tenths", native_fmu("counter_tenths")), s.add("quarters", native_fmu("counter_quarters"))
     s.connect(tenths.y.count, quarters.u.increment)
-    rows = seen(s, Fraction(1), "tenths.count", "quarters.count")
+    rows = observed_rows(s, Fraction(1), "tenths.count", "quarters.count")
     total = 0
     for k, tenths_then in zip(range(5), (1, 3, 6, 8, 11), strict=True):
         total += tenths_then
@@ -44,7 +44,7 @@ def test_an_output_clock_lets_another_tick():
     s = System()
     fast, slow = s.add("fast", native_fmu("counter_tenths"), every=3), s.add("slow", native_fmu("counter_triggered"))
     s.connect(fast.y.carry, slow.u.tick)
-    rows = seen(s, Fraction(2), "fast.count", "slow.count")
+    rows = observed_rows(s, Fraction(2), "fast.count", "slow.count")
     assert all(slow_count == fast_count // 3 for fast_count, slow_count in rows.values())
     assert rows[2.0] == (21, 7)
 
@@ -52,7 +52,7 @@ def test_an_output_clock_lets_another_tick():
 def test_an_output_is_reached_while_its_output_clock_ticks():
     s = System()
     s.add("fast", native_fmu("counter_tenths"), every=3)
-    rows = seen(s, Fraction(2), "fast.count", "fast.carried")
+    rows = observed_rows(s, Fraction(2), "fast.count", "fast.carried")
     assert all(carried == count // 3 for count, carried in rows.values())
 
 
@@ -65,15 +65,15 @@ def test_ticks_go_through_a_chain_at_one_instant():
     )
     s.connect(b.y.carry, c.u.tick)
     s.connect(a.y.carry, b.u.tick)
-    rows = seen(s, Fraction(1), "a.count", "b.count", "c.count")
+    rows = observed_rows(s, Fraction(1), "a.count", "b.count", "c.count")
     assert all(row == (row[0], row[0] // 2, row[0] // 4) for row in rows.values())
     assert rows[1.0] == (11, 5, 2)
 
 
-def test_a_clock_of_parameters_tells_its_interval():
+def test_a_clock_of_parameters_has_its_interval():
     s = System()
     s.add("metronome", native_fmu("metronome"), period=Fraction(1), beat=0.3)
-    rows = seen(s, Fraction(3), "metronome.count")
+    rows = observed_rows(s, Fraction(3), "metronome.count")
     ticks = {3 * k / 10: k + 1 for k in range(11)}
     assert {t: row[0] for t, row in rows.items() if t not in (1.0, 2.0)} == ticks
 
@@ -82,13 +82,13 @@ def test_a_clock_that_cannot_tick_is_refused():
     s = System()
     s.add("metronome", native_fmu("metronome"), beat=0.0)
     with pytest.raises(InitializationError, match=r"metronome does not start: its clock 'tick' ticks every 0 s"):
-        seen(s, Fraction(1))
+        observed_rows(s, Fraction(1))
 
 
-def test_a_changing_clock_tells_its_next_interval_at_each_tick():
+def test_a_changing_clock_gives_its_next_interval_at_each_tick():
     s = System()
     s.add("pulses", native_fmu("pulses"), period=Fraction(1))
-    rows = seen(s, Fraction(3), "pulses.count")
+    rows = observed_rows(s, Fraction(3), "pulses.count")
     ticks = [k * (k + 1) / 20 for k in range(1, 8)]
     off_grid = [t for t in rows if t not in (0.0, 2.0, 3.0)]
     assert off_grid == pytest.approx(ticks, abs=1e-15)
@@ -100,7 +100,7 @@ def test_a_countdown_begins_when_something_happens():
     s = System()
     ball, alarm = s.add("ball", native_fmu("ball"), period=TENTH), s.add("alarm", native_fmu("alarm"), delay=0.15)
     s.connect(ball.y.bounces, alarm.u.wish)
-    rows = seen(s, Fraction(1), "ball.bounces", "alarm.rings")
+    rows = observed_rows(s, Fraction(1), "ball.bounces", "alarm.rings")
     impact = next(t for t, (bounces, _) in rows.items() if bounces == 1)
     rang = next(t for t, (_, rings) in rows.items() if rings == 1)
     assert rang == pytest.approx(impact + 0.15, abs=1e-15)

@@ -1,4 +1,4 @@
-"""A connection converts units where the dimension is the same, says so in the log, and refuses others."""
+"""A connection converts units where the dimension is the same, says so in the log, and rejects others."""
 
 import logging
 from fractions import Fraction

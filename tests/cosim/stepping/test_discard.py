@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 from native_units import native_fmu
-from seen import grid, seen
+from observed_rows import grid, observed_rows
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import StepDiscarded
@@ -27,15 +27,15 @@ def system(fmi: int, other: str = "integrator", **flags: bool) -> System:
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_all_repeat_a_step_as_far_as_the_unit_came(algorithm: Algorithm):
     options = MasterOptions(repeat_discarded=True, algorithm=algorithm)
-    rows = seen(system(2), Fraction(1, 2), "short.y", "other.x", options=options)
+    rows = observed_rows(system(2), Fraction(1, 2), "short.y", "other.x", options=options)
     shorter = [begin + part for begin in grid(10)[:5] for part in (0.0, 0.04, 0.08)] + [0.5]
     assert list(rows) == pytest.approx(shorter, abs=1e-12)
     for t, row in rows.items():
         assert row == pytest.approx((t, t), abs=1e-12)
 
 
-def test_fmi_3_tells_no_time_so_halves_are_tried():
-    rows = seen(system(3), Fraction(1, 5), "short.y", "other.x", options=REPEATING)
+def test_fmi_3_gives_no_time_so_halves_are_tried():
+    rows = observed_rows(system(3), Fraction(1, 5), "short.y", "other.x", options=REPEATING)
     assert list(rows)[:5] == pytest.approx([0.0, 0.025, 0.0625, 0.1, 0.125], abs=1e-12)
     for t, row in rows.items():
         assert row == pytest.approx((t, t), abs=1e-12)
@@ -44,7 +44,7 @@ def test_fmi_3_tells_no_time_so_halves_are_tried():
 @pytest.mark.parametrize(("fmi", "came"), [(2, "0.04"), (3, "0")])
 def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
     with pytest.raises(StepDiscarded) as failure:
-        seen(system(fmi), Fraction(1, 2), "short.y")
+        observed_rows(system(fmi), Fraction(1, 2), "short.y")
     assert failure.value.reached == pytest.approx(float(came))
     assert failure.value.headline == (
         f"short: fmi{fmi}DoStep at t = 0 s answered Discard, having reached t = {came} s; "
@@ -53,23 +53,23 @@ def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
     assert failure.value.message.startswith("[Discard] a step of 0.1 s is longer than 0.04 s (steps are repeated")
 
 
-def test_a_unit_that_cannot_go_back_is_told():
+def test_a_unit_that_cannot_roll_back_is_reported():
     s = system(2, canGetAndSetFMUstate=False, canSerializeFMUstate=False)
     with pytest.raises(StepDiscarded, match=r"having reached t = 0.04 s; short cannot save its state or vary its step"):
-        seen(s, Fraction(1, 2), "short.y", options=REPEATING)
+        observed_rows(s, Fraction(1, 2), "short.y", options=REPEATING)
 
 
-def test_others_that_cannot_go_back_are_told():
+def test_others_that_cannot_roll_back_are_reported():
     s = system(2, "fixed_step")
     with pytest.raises(StepDiscarded, match="the others would have to roll back too, and other cannot save its state"):
-        seen(s, Fraction(1, 2), "short.y", options=REPEATING)
+        observed_rows(s, Fraction(1, 2), "short.y", options=REPEATING)
 
 
 def test_a_unit_that_discards_every_step_ends_the_run():
     s = System()
     s.add("short", native_fmu("discards", 3), longest=1e-9)
     with pytest.raises(StepDiscarded, match=r"steps down to 9.77e-05 s were tried"):
-        seen(s, Fraction(1, 2), "short.y", options=REPEATING)
+        observed_rows(s, Fraction(1, 2), "short.y", options=REPEATING)
 
 
 @pytest.mark.parametrize("algorithm", list(Algorithm))
@@ -84,12 +84,12 @@ def test_repetition_changes_nothing_where_nothing_is_discarded(algorithm: Algori
 
     names = ("mass.x", "spring.x", "spring.f")
     plain, repeating = (MasterOptions(algorithm=algorithm, repeat_discarded=repeats) for repeats in (False, True))
-    assert seen(two_masses(), Fraction(3), *names, options=repeating) == seen(
+    assert observed_rows(two_masses(), Fraction(3), *names, options=repeating) == observed_rows(
         two_masses(), Fraction(3), *names, options=plain
     )
 
 
-def test_units_are_told_apart_that_have_events():
+def test_units_are_distinguished_that_have_events():
     with Master(system(2)) as plain, Master(system(2), REPEATING) as repeating:
         assert (plain.has_events, repeating.has_events) == (False, True)
     s = System()
@@ -101,4 +101,4 @@ def test_a_step_that_goes_on_by_itself_is_not_waited_for():
     s = System()
     s.add("pending", native_fmu("pending", 2))
     with pytest.raises(UnitFailure, match=r"pending: fmi2DoStep at t = 0.2 s answered Pending"):
-        seen(s, Fraction(1, 2), "pending.count")
+        observed_rows(s, Fraction(1, 2), "pending.count")

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 from native_units import native_fmu
-from seen import grid, seen
+from observed_rows import grid, observed_rows
 
 from handover.cosim.fmu.failures import UnitTerminated, UnsettledEvents
 from handover.cosim.master.master import Master
@@ -23,14 +23,14 @@ def followers(most: int) -> System:
 
 @pytest.mark.parametrize("most", [1, 7, 50])
 def test_an_iteration_between_two_units_settles_at_one_instant(most: int):
-    rows = seen(followers(most), Fraction(1, 2), "a.count", "b.count")
+    rows = observed_rows(followers(most), Fraction(1, 2), "a.count", "b.count")
     assert list(rows) == grid(10)[:6]
     assert set(rows.values()) == {(most, most)}
 
 
 def test_units_that_never_settle_are_named():
     with pytest.raises(UnsettledEvents) as failure:
-        seen(followers(10**6), Fraction(1), "a.count")
+        observed_rows(followers(10**6), Fraction(1), "a.count")
     assert set(failure.value.units) <= {"a", "b"}
     assert failure.value.t == 0.0
     assert f"no end of events after {MAX_ITERATIONS} iterations; these do not settle: a, b" in str(failure.value)
@@ -43,7 +43,7 @@ def test_a_unit_that_wants_ever_more_iterations_is_named():
     with pytest.raises(
         UnsettledEvents, match=r"asker: fmi3UpdateDiscreteStates at t = 0.1 s answered no end"
     ) as failure:
-        seen(s, Fraction(1), "asker.count")
+        observed_rows(s, Fraction(1), "asker.count")
     assert failure.value.units == ("asker",)
 
 
@@ -52,7 +52,7 @@ def test_a_unit_may_return_at_once_some_times(stalls: int, points: int):
     s = System()
     s.add("staller", native_fmu("staller"), most=stalls)
     s.add("other", native_fmu("integrator"), u=1.0)
-    rows = seen(s, Fraction(1, 2), "staller.count", "other.x")
+    rows = observed_rows(s, Fraction(1, 2), "staller.count", "other.x")
     assert list(rows) == grid(10)[:points]
     assert rows[0.5] == (stalls, pytest.approx(0.5))
 
@@ -61,7 +61,7 @@ def test_a_unit_that_does_not_get_on_is_named():
     s = System()
     s.add("staller", native_fmu("staller"), most=10**6)
     with pytest.raises(UnsettledEvents, match=r"staller: fmi3DoStep at t = 0.2 s answered no end of events after"):
-        seen(s, Fraction(1, 2), "staller.count")
+        observed_rows(s, Fraction(1, 2), "staller.count")
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

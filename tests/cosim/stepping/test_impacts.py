@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 from native_units import native_fmu
-from seen import grid, seen
+from observed_rows import grid, observed_rows
 
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
@@ -40,7 +40,7 @@ def height(t: float) -> float:
 def test_impacts_are_communication_points(algorithm: Algorithm, announces: bool):
     s = System()
     s.add("ball", native_fmu("ball"), period=TENTH, announces=announces)
-    rows = seen(s, Fraction(2), "ball.h", "ball.bounces", options=MasterOptions(algorithm=algorithm))
+    rows = observed_rows(s, Fraction(2), "ball.h", "ball.bounces", options=MasterOptions(algorithm=algorithm))
     off_grid = [t for t in rows if t not in grid(10, 2)]
     assert off_grid == pytest.approx(impact_times(4), abs=1e-12)
     assert set(rows) >= set(grid(10, 2))
@@ -56,7 +56,7 @@ def test_another_unit_is_brought_to_the_impact(algorithm: Algorithm):
     ball = s.add("ball", native_fmu("ball"), period=TENTH)
     integral = s.add("integral", native_fmu("integrator"), period=TENTH)
     s.connect(ball.y.v, integral.u.u)
-    rows = seen(s, Fraction(1), "ball.v", "integral.x", options=MasterOptions(algorithm=algorithm))
+    rows = observed_rows(s, Fraction(1), "ball.v", "integral.x", options=MasterOptions(algorithm=algorithm))
     times = list(rows)
     impact = impact_times(1)[0]
     at = min(range(len(times)), key=lambda i: abs(times[i] - impact))
@@ -82,7 +82,7 @@ def test_a_unit_in_event_mode_sees_the_impact_at_its_time():
     s = System()
     ball, watch = s.add("ball", native_fmu("ball"), period=TENTH), s.add("watch", native_fmu("watch"), period=TENTH)
     s.connect(ball.y.bounces, watch.u.count_in)
-    rows = seen(s, Fraction(1), "watch.count", "watch.changed", "ball.bounces", "watch.changes")
+    rows = observed_rows(s, Fraction(1), "watch.count", "watch.changed", "ball.bounces", "watch.changes")
     first, second = impact_times(2)[0], impact_times(2)[1]
     for t, (count, changed, bounces, changes) in rows.items():
         assert count == bounces == changes
@@ -90,11 +90,11 @@ def test_a_unit_in_event_mode_sees_the_impact_at_its_time():
         assert changed == pytest.approx(known, abs=1e-12)
 
 
-def test_a_unit_that_cannot_go_back_stays_at_the_end_of_its_step(caplog: pytest.LogCaptureFixture):
+def test_a_unit_that_cannot_roll_back_stays_at_the_end_of_its_step(caplog: pytest.LogCaptureFixture):
     s = System()
     s.add("ball", native_fmu("ball"), period=TENTH)
     s.add("fixed", native_fmu("fixed_step"), period=TENTH)
-    rows = seen(s, Fraction(2), "ball.h", "fixed.y")
+    rows = observed_rows(s, Fraction(2), "ball.h", "fixed.y")
     assert len(rows) == 25
     output = [r.message for r in caplog.records if "fixed" in r.message]
     assert output == ["fixed cannot roll back to the event at t = 0.451523641 s: it stays at the end of its step"]
@@ -107,7 +107,7 @@ def test_a_unit_that_varies_its_step_waits_for_an_impact_that_is_known():
     ball = s.add("ball", native_fmu("ball"), period=TENTH, announces=True)
     integral = s.add("integral", native_fmu("integrator", canGetAndSetFMUState=False, canSerializeFMUState=False))
     s.connect(ball.y.v, integral.u.u)
-    rows = seen(s, Fraction(1), "ball.v", "integral.x", options=MasterOptions(algorithm=Algorithm.JACOBI))
+    rows = observed_rows(s, Fraction(1), "ball.v", "integral.x", options=MasterOptions(algorithm=Algorithm.JACOBI))
     times = list(rows)
     steps = itertools.pairwise(times)
     expected = [0.0]
@@ -118,12 +118,12 @@ def test_a_unit_that_varies_its_step_waits_for_an_impact_that_is_known():
 
 
 def test_each_unit_keeps_its_rate():
-    """A slow unit that is ahead when the ball bounces goes back to the impact, and on to the end of its step."""
+    """A slow unit that is ahead when the ball bounces is rolled back to the impact, then finishes its step."""
     s = System()
     ball = s.add("ball", native_fmu("ball"), period=Fraction(1, 20))
     slow = s.add("slow", native_fmu("integrator"), period=Fraction(1, 2))
     s.connect(ball.y.v, slow.u.u)
-    rows = seen(s, Fraction(1), "ball.v", "slow.x", options=MasterOptions(algorithm=Algorithm.JACOBI))
+    rows = observed_rows(s, Fraction(1), "ball.v", "slow.x", options=MasterOptions(algorithm=Algorithm.JACOBI))
     (impact,) = (t for t in rows if t not in grid(20))
     assert impact == pytest.approx(impact_times(1)[0], abs=1e-12)
     assert [t for t in rows if t < impact and rows[t][1] != 0.0] == []

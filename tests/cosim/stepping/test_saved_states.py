@@ -5,7 +5,7 @@ from collections import Counter
 from fractions import Fraction
 
 import pytest
-from called import Called
+from call_log import CallLog
 from native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
@@ -24,7 +24,7 @@ OPTIONS = {
 
 
 def cycle(fault: str, fmi: int, at: float = 0.4) -> System:
-    """Return a circle of an integrator and a unit that fails at a time in seconds, and one beside it."""
+    """Return a cycle of an integrator and a unit that fails at a time in seconds, and one beside it."""
     s = System()
     steady, bad = s.add("steady", native_fmu("integrator", fmi)), s.add("bad", native_fmu(fault, fmi), at=at)
     s.add("beside", native_fmu("integrator", fmi))
@@ -33,11 +33,11 @@ def cycle(fault: str, fmi: int, at: float = 0.4) -> System:
     return s
 
 
-def kept(called: Called, fmi: int) -> dict[str, int]:
+def kept(call_log: CallLog, fmi: int) -> dict[str, int]:
     """Return how many states of each unit were saved and not freed."""
     state = "FMUstate" if fmi == 2 else "FMUState"
-    count = Counter(called.calls)
-    units = {unit for unit, _ in called.calls}
+    count = Counter(call_log.calls)
+    units = {unit for unit, _ in call_log.calls}
     return {u: count[u, f"fmi{fmi}Get{state}"] - count[u, f"fmi{fmi}Free{state}"] for u in sorted(units)}
 
 
@@ -45,29 +45,29 @@ def kept(called: Called, fmi: int) -> dict[str, int]:
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("fault", ["errs", "gives_nan", "ends"])
 def test_states_are_freed_after_a_failure(fault: str, fmi: int, options: MasterOptions):
-    called = Called()
-    with pytest.raises(UnitFailure), Master(cycle(fault, fmi), options, called) as master:
+    call_log = CallLog()
+    with pytest.raises(UnitFailure), Master(cycle(fault, fmi), options, call_log) as master:
         master.run(Fraction(1))
-    assert (("steady", f"fmi{fmi}GetFMU{'s' if fmi == 2 else 'S'}tate")) in called.calls
-    assert kept(called, fmi) == {"bad": 0, "beside": 0, "steady": 0}
+    assert (("steady", f"fmi{fmi}GetFMU{'s' if fmi == 2 else 'S'}tate")) in call_log.calls
+    assert kept(call_log, fmi) == {"bad": 0, "beside": 0, "steady": 0}
 
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_unit_is_not_called_after_fatal_to_free_its_states(fmi: int, options: MasterOptions):
-    called = Called()
-    with pytest.raises(UnitFailure), Master(cycle("fatal", fmi), options, called) as master:
+    call_log = CallLog()
+    with pytest.raises(UnitFailure), Master(cycle("fatal", fmi), options, call_log) as master:
         master.run(Fraction(1))
-    last = max(i for i, call in enumerate(called.calls) if call == ("bad", f"fmi{fmi}DoStep"))
-    assert "bad" not in {unit for unit, _ in called.calls[last + 1 :]}
-    left = kept(called, fmi)
+    last = max(i for i, call in enumerate(call_log.calls) if call == ("bad", f"fmi{fmi}DoStep"))
+    assert "bad" not in {unit for unit, _ in call_log.calls[last + 1 :]}
+    left = kept(call_log, fmi)
     assert left["bad"] > 0
     assert left["steady"] == left["beside"] == 0
 
 
 @pytest.mark.parametrize("options", [OPTIONS["newton"], OPTIONS["adaptive"]], ids=["newton", "adaptive"])
 def test_states_are_freed_where_a_unit_does_not_save_its_own(options: MasterOptions, monkeypatch: pytest.MonkeyPatch):
-    called, save = Called(), Instance.save_state
+    call_log, save = CallLog(), Instance.save_state
 
     def save_until_04(self: Instance) -> ctypes.c_void_p:
         if self.name == "bad" and self.time > 0.39:
@@ -75,6 +75,9 @@ def test_states_are_freed_where_a_unit_does_not_save_its_own(options: MasterOpti
         return save(self)
 
     monkeypatch.setattr(Instance, "save_state", save_until_04)
-    with pytest.raises(UnitFailure, match="GetFMUState"), Master(cycle("ends", 3, at=10.0), options, called) as master:
+    with (
+        pytest.raises(UnitFailure, match="GetFMUState"),
+        Master(cycle("ends", 3, at=10.0), options, call_log) as master,
+    ):
         master.run(Fraction(1))
-    assert kept(called, 3) == {"bad": 0, "beside": 0, "steady": 0}
+    assert kept(call_log, 3) == {"bad": 0, "beside": 0, "steady": 0}

@@ -50,5 +50,5 @@ def test_a_number_that_is_near_nothing_is_taken_as_it_stands():
         (LinearTransformation(1.8, 32.0), "times 1.8, plus 32"),
     ],
 )
-def test_a_conversion_tells_what_it_does(linear: LinearTransformation, text: str):
+def test_a_conversion_says_what_it_does(linear: LinearTransformation, text: str):
     assert str(linear) == text

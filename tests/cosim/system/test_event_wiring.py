@@ -1,4 +1,4 @@
-"""What is refused before anything starts: clocks that cannot tick, and units of which there may be one."""
+"""Invalid wiring, rejected before anything starts: clocks that cannot tick, two units where only one is allowed."""
 
 import zipfile
 from pathlib import Path
@@ -25,11 +25,11 @@ def faults_of(s: System) -> tuple[str, ...]:
     [
         ("a.count", "b.tick", "a clock can be connected with a clock only"),
         ("a.carry", "b.increment", "a clock can be connected with a clock only"),
-        ("b.tick", "a.carry", "an output clock lets an input clock tick, not the other way round"),
-        ("b.carry", "a.tick", "it ticks at times of its own; a triggered input clock can be connected"),
+        ("b.tick", "a.carry", "an output clock triggers an input clock, not the other way round"),
+        ("b.carry", "a.tick", "it is time-based; only a triggered input clock can be connected"),
     ],
 )
-def test_clocks_that_do_not_fit_are_told(source: str, target: str, fault: str):
+def test_clocks_that_do_not_fit_are_reported(source: str, target: str, fault: str):
     s = System()
     s.add("a", native_fmu("counter_tenths"))
     s.add("b", native_fmu("counter_triggered"))

@@ -32,14 +32,14 @@ def test_a_soft_need_gives_way_before_a_firm_one():
     assert value.firm == []
 
 
-def test_a_circle_of_firm_needs_opens_where_nothing_else_holds_it_up():
+def test_a_cycle_of_firm_needs_opens_where_nothing_else_holds_it_up():
     value = DescribeWait()
     assert value.order({"after": "b", "b": "c", "c": "b"}) == "b" + "after" + "c"
     assert value.firm == [("b", {"c"})]
     assert value.soft == []
 
 
-def test_what_needs_itself_softly_is_told():
+def test_what_needs_itself_softly_is_reported():
     value = DescribeWait()
     assert value.order({"a": ""}, {"a": "a"}) == "a"
     assert value.soft == [("a", {"a"})]

@@ -43,7 +43,7 @@ def test_units_and_kinds_and_shapes_must_agree(fmu: FmuOf):
     assert shape == "counter.at (real) -> echo.pair (real [2]): their shapes differ"
 
 
-def test_unknown_names_are_told_with_the_nearest_valid_ones(fmu: FmuOf):
+def test_unknown_names_are_reported_with_the_nearest_valid_ones(fmu: FmuOf):
     s = System()
     mass, spring = s.add("mass", fmu("Mass"), mas=1.0), s.add("spring", fmu("Spring"))
     s.connect(mass.y.xx, spring.u.x)
@@ -58,7 +58,7 @@ def test_unknown_names_are_told_with_the_nearest_valid_ones(fmu: FmuOf):
     assert "spring.f is an output, not an input" in text
 
 
-def test_a_connection_to_a_unit_that_is_not_there_is_told(fmu: FmuOf):
+def test_a_connection_to_a_unit_that_is_not_there_is_reported(fmu: FmuOf):
     s, other = System(), System()
     s.add("spring", fmu("Spring"))
     spring = other.add("sprint", fmu("Spring"))
@@ -75,7 +75,7 @@ def test_an_input_is_fed_once(fmu: FmuOf):
     assert faults_of(s) == ("spring.x is fed twice: by a.x and by b.x",)
 
 
-def test_values_out_of_range_or_of_the_wrong_kind_are_told(fmu: FmuOf):
+def test_values_out_of_range_or_of_the_wrong_kind_are_reported(fmu: FmuOf):
     s = System()
     s.add("a", fmu("Mass"), m=-1.0)
     s.add("b", fmu("Mass"), m="heavy")
@@ -151,7 +151,7 @@ def test_large_integers_keep_their_digits():
     assert numbers_of(seed, 2**53 + 1).tolist() == [2**53 + 1]
 
 
-def test_a_port_is_told_from_a_name(fmu: FmuOf):
+def test_a_port_is_distinguished_from_a_name(fmu: FmuOf):
     s = System()
     mass = s.add("mass", str(fmu("Mass")))
     wrong: Any = "mass.x"

@@ -156,7 +156,7 @@ def test_a_note_that_says_nothing_names_no_interpreter(program: Path, unpacked: 
 
 @pytest.mark.parametrize("place", ["0", "1"])
 @pytest.mark.parametrize("command", ["/bin/true", "/bin/cat"])
-def test_a_program_that_is_no_interpreter_is_told_with_one_cure(
+def test_a_program_that_is_no_interpreter_is_reported_with_one_cure(
     program: Path, unpacked: CtypesHost, place: str, command: str
 ):
     done = run(program, unpacked, PATH="/bin:/usr/bin", FMU_PYTHON=command, FMU_PYTHON_PROCESS=place)

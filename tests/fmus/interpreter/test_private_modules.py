@@ -116,7 +116,7 @@ def test_an_explanation_of_a_refusal_has_no_traceback():
     assert loader.explain(loader.HostError("why")) == "why"
 
 
-def test_the_prefix_of_a_units_modules_is_told_nowhere(workshop: Workshop):
+def test_the_prefix_of_a_units_modules_is_reported_nowhere(workshop: Workshop):
     host = workshop.host("every_kind:EveryKind", 3)
     assert host.initialise() == OK
     host.set("a", [666.0])
@@ -127,10 +127,10 @@ def test_the_prefix_of_a_units_modules_is_told_nowhere(workshop: Workshop):
 
 def test_a_path_keeps_all_its_parts():
     error = ValueError("in /tmp/_fmu_12.d/a.py: <_fmu_12ab.plants.arm.Arm object>, _fmu_12ab.größe.Ünit")
-    assert loader.explain(error) == "ValueError: in /tmp/_fmu_12.d/a.py: <handover.plants.arm.Arm object>, größe.Ünit"
+    assert loader.explain(error) == "ValueError: in /tmp/_fmu_12.d/a.py: <plants.arm.Arm object>, größe.Ünit"
 
 
-def test_two_builds_in_one_folder_are_told_with_a_cure(workshop: Workshop):
+def test_two_builds_in_one_folder_are_reported_with_a_cure(workshop: Workshop):
     host = workshop.host("scalars:Scalars", 3)
     host.free()
     assert not host.instantiate(token="{0}")

@@ -1,4 +1,4 @@
-"""A unit whose Python runs in a process of its own: the same values, and whatever happens to it the host lives on."""
+"""A unit whose Python runs in a process of its own: the same values, and the host survives whatever happens to it."""
 
 import ctypes
 import os
@@ -133,7 +133,7 @@ def test_a_process_killed_between_two_calls_is_an_error_of_the_next(workshop: Wo
 
 
 @pytest.mark.parametrize("name", ["GetFMUState", "GetString"])
-def test_every_call_tells_of_the_process_end(workshop: Workshop, name: str):
+def test_every_call_names_the_process_end(workshop: Workshop, name: str):
     host = running(workshop)
     kill(host)
     state = ctypes.c_void_p()

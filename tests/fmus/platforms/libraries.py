@@ -1,4 +1,4 @@
-"""What a shared library tells of itself, read with lief: alike for ELF, PE and Mach-O."""
+"""Properties of a shared library, read with lief: alike for ELF, PE and Mach-O."""
 
 import hashlib
 import struct
@@ -84,7 +84,7 @@ def slices(content: bytes) -> Iterator[bytes]:
 
 
 def is_signed(content: bytes) -> bool:
-    """Tell whether a Mach-O library has a signature of nobody in particular, whose hashes are those of its pages."""
+    """Return whether a Mach-O library has an ad-hoc signature whose hashes are those of its pages."""
     parsed: Any = lief.parse(list(content))
     if not parsed.has_code_signature:
         return False

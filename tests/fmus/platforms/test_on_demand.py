@@ -130,11 +130,11 @@ def test_a_place_that_cannot_be_written_is_left_for_the_cache(
     assert library("x86_64-windows", 3).parent != first.parent  # another version of the package keeps its own
 
 
-def test_no_place_at_all_is_told(sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_no_place_at_all_is_reported(sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "cache").write_text("in the way")
     (sources / "bin").write_text("in the way")
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
-    with pytest.raises(CompilationError, match="HANDOVER_CACHE must be a folder that can be written"):
+    with pytest.raises(CompilationError, match="HANDOVER_CACHE must be a writable folder"):
         compile_runtime(["x86_64-windows"])
 
 
@@ -174,7 +174,7 @@ def test_without_a_compiler_the_extra_is_named():
 
 
 @pytest.mark.usefixtures("sources", "no_compiler")
-def test_the_command_tells_it_in_one_line_and_writes_nothing(tmp_path: Path):
+def test_the_command_says_it_in_one_line_and_writes_nothing(tmp_path: Path):
     out = tmp_path / "out"
     done = CliRunner().invoke(main, ["build", "Push", "--platform", "all", "--out", str(out)])
     assert done.exit_code == 2
@@ -186,7 +186,7 @@ def test_the_command_tells_it_in_one_line_and_writes_nothing(tmp_path: Path):
 
 
 @pytest.mark.usefixtures("sources", "compiled")
-def test_the_command_compiles_what_it_is_told_to_and_packs_that(tmp_path: Path):
+def test_the_command_compiles_what_it_is_asked_to_and_packs_that(tmp_path: Path):
     out = tmp_path / "out"
     call = ["build", "Push", "--platform", "x86_64-windows,aarch64-darwin", "--platform", "host", "--out", str(out)]
     done = CliRunner().invoke(main, call)

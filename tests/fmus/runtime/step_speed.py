@@ -55,7 +55,7 @@ def open_host(name: str, fmu: Path) -> CtypesHost:
 
 
 def fmu_loop(loops: ctypes.CDLL, host: CtypesHost) -> Callable[[], Measured]:
-    """Return what makes a round of steps in C and tells microseconds a step."""
+    """Return a function that makes a round of steps in C and returns microseconds a step."""
     assert host.initialise() == OK
     kind = "Real" if host.fmi == 2 else "Float64"
     functions = [getattr(host.library, f"fmi{host.fmi}{name}") for name in (f"Set{kind}", "DoStep", f"Get{kind}")]
@@ -79,7 +79,7 @@ def fmu_loop(loops: ctypes.CDLL, host: CtypesHost) -> Callable[[], Measured]:
 
 
 def timed(body: list[str], names: dict[str, object]) -> Callable[[], Measured]:
-    """Return what runs the lines STEPS times and tells microseconds a time."""
+    """Return a function that runs the lines STEPS times and returns microseconds each."""
     lines = ["def run(k_last):", "    for k in range(k_last):", *(f"        {line}" for line in body)]
     exec("\n".join(lines), names)
     run: Callable[[int], None] = names["run"]  # pyright: ignore[reportAssignmentType]

@@ -1,4 +1,4 @@
-"""Calls that the standards forbid, and failures: answered with an error and a log line, and the process lives."""
+"""Calls that the standards forbid, and failures: they return an error with a log line, and the process survives."""
 
 import ctypes
 import math

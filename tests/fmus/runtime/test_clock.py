@@ -42,7 +42,7 @@ def clock(host: CtypesHost) -> "ctypes.Array[ctypes.c_uint32]":
     return (ctypes.c_uint32 * 1)(host.references["sample_clock"])
 
 
-def test_the_model_description_tells_of_the_clock(workshop: Workshop):
+def test_the_model_description_names_the_clock(workshop: Workshop):
     file = workshop.fmu(SAMPLED, 3)
     assert validate_fmu(str(file)) == []
     host = workshop.host(SAMPLED, 3)
@@ -168,7 +168,7 @@ def test_a_step_past_a_tick_is_refused_where_it_must_not_return_early(workshop: 
     assert host.step(0.0, P) == OK
 
 
-def test_a_host_that_has_activated_the_clock_is_told_of_a_tick_once_and_then_refused(workshop: Workshop):
+def test_a_host_that_has_activated_the_clock_is_reported_of_a_tick_once_and_then_refused(workshop: Workshop):
     host = started(workshop, early_return=True)
     tick(host)
     assert host.step(0.0, P) == OK
@@ -216,7 +216,7 @@ def test_fmpys_own_simulation_which_knows_no_clocks_is_the_same_with_event_mode(
     assert np.array_equal(runs[0], runs[1])
 
 
-def test_the_clock_is_refused_at_a_wrong_time_and_what_is_right_is_told(workshop: Workshop):
+def test_the_clock_is_refused_at_a_wrong_time_and_what_is_right_is_reported(workshop: Workshop):
     host = started(workshop)
     tick(host)
     assert host.step(0.0, 0.01) == OK

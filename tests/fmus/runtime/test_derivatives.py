@@ -42,7 +42,7 @@ def outputs(host: CtypesHost) -> NDArray[np.float64]:
 
 
 def jacobian_by_differences(host: CtypesHost) -> NDArray[np.float64]:
-    """Central differences in initialisation mode, where outputs follow inputs at once."""
+    """Central differences in initialisation mode, where outputs follow inputs without a step."""
     columns: list[NDArray[np.float64]] = []
     for name, size in INPUTS.items():
         at = host.get(name, size)

@@ -111,7 +111,7 @@ def test_the_ball_comes_to_rest_and_its_events_end(workshop: Workshop):
     assert not host.event_needed
 
 
-def test_an_early_return_tells_where_the_step_ended_and_that_an_event_waits(workshop: Workshop):
+def test_an_early_return_says_where_the_step_ended_and_that_an_event_waits(workshop: Workshop):
     host = workshop.host(BALL, 3, event_mode=True, early_return=True)
     host.initialise()
     assert handle(host) == RELEASE
@@ -133,7 +133,7 @@ def test_an_early_return_tells_where_the_step_ended_and_that_an_event_waits(work
     assert host.get("v") == [-E * before]
 
 
-def test_a_known_event_at_a_steps_end_is_told_without_early_return(workshop: Workshop):
+def test_a_known_event_at_a_steps_end_is_reported_without_early_return(workshop: Workshop):
     host = workshop.host(BALL, 3, event_mode=True)
     host.initialise()
     handle(host)

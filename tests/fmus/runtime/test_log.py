@@ -1,4 +1,4 @@
-"""What a host is told, and what it can choose to be told."""
+"""What is logged for a host, and which categories it can choose."""
 
 import ctypes
 import json
@@ -63,7 +63,7 @@ def test_a_long_traceback_keeps_its_end_within_what_hosts_of_fmi_2_print(worksho
     assert all(m.endswith("RuntimeError: the deepest reason") for m in messages.values())
 
 
-def test_a_refused_kind_of_instance_is_told_with_its_name(workshop: Workshop):
+def test_a_refused_kind_of_instance_is_reported_with_its_name(workshop: Workshop):
     host = workshop.host(BLOCK, 3)
     made = host.library.fmi3InstantiateModelExchange(b"me", b"", b"", False, False, None, host.logger3)
     assert not made
@@ -74,7 +74,7 @@ def test_a_refused_kind_of_instance_is_told_with_its_name(workshop: Workshop):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_while_logging_is_off_only_errors_are_told(workshop: Workshop, fmi: int):
+def test_while_logging_is_off_only_errors_are_reported(workshop: Workshop, fmi: int):
     host = workshop.host(BLOCK, fmi)
     assert host.initialise() == OK
     assert host.log == []
@@ -120,7 +120,7 @@ def test_an_unknown_category_is_refused_with_the_known_ones_and_changes_nothing(
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("on", [True, False])
-def test_a_warning_is_told_while_logging_is_on(workshop: Workshop, fmi: int, on: bool):
+def test_a_warning_is_reported_while_logging_is_on(workshop: Workshop, fmi: int, on: bool):
     host = workshop.host(BLOCK, fmi)
     host.free()
     file = host.folder / "resources" / "unit.json"
@@ -134,7 +134,7 @@ def test_a_warning_is_told_while_logging_is_on(workshop: Workshop, fmi: int, on:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_our_own_master_tells_a_units_name_once(workshop: Workshop, fmi: int):
+def test_our_own_master_says_a_units_name_once(workshop: Workshop, fmi: int):
     s = System()
     s.add("walker", workshop.fmu(BLOCK, fmi), gain=10.0, a=1e308)
     with pytest.raises(InitializationError) as raised, Master(s):

@@ -59,7 +59,7 @@ def test_a_serialised_state_continues_in_another_instance(workshop: Workshop, fm
     assert ten_steps(other) == ten_steps(host)
 
 
-def test_a_state_saved_while_initialising_goes_back_to_initialising(workshop: Workshop):
+def test_a_state_saved_while_initialising_rolls_back_to_initialising(workshop: Workshop):
     host = workshop.host("every_kind:EveryKind", 3)
     host.enter()
     host.set("gain", [4.0])

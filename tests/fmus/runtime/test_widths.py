@@ -103,7 +103,7 @@ def test_a_step_whose_output_no_single_holds_is_an_error(
         ("Boolean", "u8", "is of type UInt8"),
     ],
 )
-def test_a_call_of_another_type_is_told_the_variables_own(workshop: Workshop, width: str, name: str, message: str):
+def test_a_call_of_another_type_is_reported_the_variables_own(workshop: Workshop, width: str, name: str, message: str):
     host = workshop.host(BLOCK, 3)
     host.initialise()
     assert transfer(host, "Get", width, name, (ctypes.c_double * 1)()) == ERROR
@@ -113,7 +113,7 @@ def test_a_call_of_another_type_is_told_the_variables_own(workshop: Workshop, wi
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_an_output_outside_its_width_is_an_error_that_tells_the_range(workshop: Workshop, fmi: int):
+def test_an_output_outside_its_width_is_an_error_that_says_the_range(workshop: Workshop, fmi: int):
     host = workshop.host(BLOCK, fmi)
     width = "Integer" if fmi == 2 else "Int16"
     shift = (ctypes.c_int * 1)(-1) if fmi == 2 else (ctypes.c_int16 * 1)(-1)

@@ -42,7 +42,7 @@ def test_fmi_3_names_types_bounds_and_starts(workshop: Workshop):
     )
 
 
-def test_fmi_2_tells_the_range_of_narrow_integers_by_min_and_max(workshop: Workshop):
+def test_fmi_2_says_the_range_of_narrow_integers_by_min_and_max(workshop: Workshop):
     assert validate_fmu(str(workshop.fmu(BLOCK, 2))) == []
     variables = declared(workshop.fmu(BLOCK, 2), "ModelVariables/ScalarVariable")
     limits = {name: limits_of(v[0]) for name, v in variables.items()}
@@ -66,7 +66,7 @@ def limits_of(element: ET.Element) -> dict[str, str]:
     return {name: element.attrib[name] for name in ("min", "max", "start") if name in element.attrib}
 
 
-def test_the_page_tells_widths(workshop: Workshop):
+def test_the_page_says_widths(workshop: Workshop):
     with zipfile.ZipFile(workshop.fmu(BLOCK, 3)) as archive:
         page = archive.read("documentation/index.html").decode()
     assert "<code>x</code></td><td>Float32</td>" in page

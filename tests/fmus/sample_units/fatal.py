@@ -1,4 +1,4 @@
-"""Blocks that end or stop the process that steps them, at an input that is out of the ordinary."""
+"""Blocks that crash or block the process that steps them, at an unusual input."""
 
 import ctypes
 import threading
@@ -55,7 +55,7 @@ class Crashing:
 
 
 class Hanging(Crashing):
-    """y = u, while u is small; then it never answers."""
+    """y = u, while u is small; then it never returns."""
 
     def die(self) -> None:
         """Wait for what nobody does."""

@@ -1,4 +1,4 @@
-"""A block that does to its interpreter whatever is asked for."""
+"""A block that does something harmful to its interpreter, chosen by a parameter or an input."""
 
 import ctypes
 import enum

@@ -238,7 +238,7 @@ def test_what_no_body_has_is_refused(changes: dict[str, Any], text: str):
         FreeFlyer(replace(Params(), **changes))
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_together():
     with pytest.raises(InvalidFlyerParameters) as caught:
         FreeFlyer(Params(mass=0.0, I_B=-np.eye(3), q_WB_0=np.zeros(4)))
     assert len(caught.value.faults) == 3

@@ -1,4 +1,4 @@
-"""The hand, the object and a gripper that a test leads by the nose."""
+"""The hand, the object and a gripper that the test moves."""
 
 import math
 from dataclasses import replace
@@ -38,7 +38,7 @@ def off(x: float, y: float = 0.0, z: float = 0.0) -> Floats:
 
 
 class Scene:
-    """A unit and its time; the gripper is where `move` says and closes when it is told to."""
+    """A unit and its time; the gripper is where `move` says and closes on command."""
 
     def __init__(self, params: Params, p_WG: Floats = PLACE) -> None:
         self.unit, self.i = HandAndObject(params), 0
@@ -66,7 +66,7 @@ class Scene:
         return [a for a, b in zip(all_of_them, [None, *all_of_them], strict=False) if a is not b]
 
 
-def test_starts_as_told():
+def test_starts_as_declared():
     y = HandAndObject(Params()).outputs(0.0, Inputs())
     np.testing.assert_array_equal(y.p_WO, [-0.10, -0.57, 0.0])
     np.testing.assert_array_equal(y.p_WH, [-0.40, 0.10, -0.05])
@@ -83,7 +83,7 @@ def test_a_free_object_stays_where_it_is():
     np.testing.assert_array_equal(y.f_G, np.zeros(3))
 
 
-def test_gripper_follows_its_command_at_its_rate_and_tells_empty_from_full():
+def test_gripper_follows_its_command_at_its_rate_and_distinguishes_empty_from_full():
     scene = Scene(IDLE, np.array([0.5, 0.0, 0.0]))
     assert scene.go(0.32, closure=1.0).gripper_angle == pytest.approx(1.2 - 0.6 * 0.32)
     assert scene.go(2.0).gripper_angle == pytest.approx(0.60)

@@ -17,7 +17,7 @@ from handover.plants.helix.handover_partner import (
 )
 from handover.plants.helix.tendon_arm import Inputs as ArmInputs
 from handover.plants.helix.tendon_arm import TendonArm
-from handover.plants.helix.tendon_design import Params as ArmParams
+from handover.plants.helix.tendon_parameters import Params as ArmParams
 
 STILL = Params(tremor_rms=0.0, drift_rms=0.0)
 AT_BALL = np.array([0.17, 0.01, -0.59])

@@ -13,7 +13,7 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.exudyn_edge import SolverFailure
 from handover.plants.helix.tendon_arm import Inputs, Outputs, StepSizeError, TendonArm
-from handover.plants.helix.tendon_design import InvalidArmParameters, Params
+from handover.plants.helix.tendon_parameters import InvalidArmParameters, Params
 
 CALIBRATED = np.repeat([0.12, 0.24, 0.24], 3)
 ANGLES = np.deg2rad([0.0, 120.0, 240.0])
@@ -212,7 +212,7 @@ def test_says_nothing_leaves_no_file_and_gives_the_same_bits_in_another_process(
     script = (
         "import hashlib, numpy as np\n"
         "from handover.plants.helix.tendon_arm import Inputs, TendonArm\n"
-        "from handover.plants.helix.tendon_design import Params\n"
+        "from handover.plants.helix.tendon_parameters import Params\n"
         "arm = TendonArm(Params())\n"
         "for i in range(5):\n"
         "    arm.step(i * 0.02, 0.02, Inputs(dl_t=np.array([-6, 3, 2, -4, 0, 4, 3, -6, 2]) * 1e-3))\n"

@@ -36,7 +36,7 @@ def test_ticks_are_the_inverted_characteristic(distance: float):
 
 
 @given(st.floats(0.004, 0.065))
-def test_a_rounded_reading_tells_the_distance_to_within_a_tick(distance: float):
+def test_a_rounded_reading_says_the_distance_to_within_a_tick(distance: float):
     reading = SENSOR.reading(SENSOR.ticks(distance, 1.0, 1.0))
     tick = abs(SENSOR.distance(reading + 1.0) - SENSOR.distance(reading))
     assert SENSOR.distance(reading) == pytest.approx(distance, abs=tick)
@@ -89,7 +89,7 @@ def test_a_characteristic_that_cannot_be_inverted_is_refused(changes: dict[str, 
         sensor(**changes)
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_together():
     with pytest.raises(InvalidSensorParameters) as caught:
         sensor(b=0.003, nearest=0.0)
     assert len(caught.value.faults) == 3

@@ -39,7 +39,7 @@ def test_a_ray_meets_the_outline(thing: Thing, bearing: float, distance: float, 
 
 
 def met_of(thing: Thing, x: float, y: float, heading: float) -> tuple[float, float] | None:
-    return SOLIDS[thing].met(x, y, math.cos(heading), math.sin(heading))
+    return SOLIDS[thing].intersect(x, y, math.cos(heading), math.sin(heading))
 
 
 def around(distance: float, cosine: float) -> Any:

@@ -12,7 +12,7 @@ from handover.plants.ir_grasp.hand import FINGERS, JOINTS, finger_points, sensor
 from handover.plants.ir_grasp.objects import SOLIDS, Thing
 from handover.plants.ir_grasp.parameters import SEES_NOTHING, InvalidSceneParameters, Params
 from handover.plants.ir_grasp.scene import GraspScene, Inputs, InvalidCommand, Outputs, StepSizeError
-from handover.plants.ir_grasp.world import DT, PULLEYS, STIFFNESS, GraspWorld, beginning, resting_posture
+from handover.plants.ir_grasp.world import DT, PULLEYS, STIFFNESS, GraspWorld, initial_snapshot, resting_posture
 
 STEP = 0.015
 AROUND = Params(p_WH_0=np.array([-0.13, 0.0]), sigma_0=0.1)
@@ -54,7 +54,7 @@ def test_outputs_are_of_the_declared_shapes_and_take_no_time():
 
 
 def test_pictures_show_the_hand_where_the_physics_has_it():
-    world = GraspWorld(AROUND, beginning(AROUND))
+    world = GraspWorld(AROUND, initial_snapshot(AROUND))
     for k in range(1800):
         world.advance((-0.11 - 7e-5 * k, 0.01 * math.sin(0.007 * k), 2e-4 * k, 1.0))
     _, (_, _, *phalanges) = world.snapshot
@@ -75,7 +75,7 @@ def test_range_is_where_the_sensors_ray_meets_the_object(thing: Thing, aside: fl
     for o, d, value in zip(origins, directions, y.range, strict=True):
         x_O, y_O = np.array([[c, s], [-s, c]]) @ (o - y.p_WO)
         d_x, d_y = np.array([[c, s], [-s, c]]) @ d
-        met = SOLIDS[thing].met(x_O, y_O, d_x, d_y)
+        met = SOLIDS[thing].intersect(x_O, y_O, d_x, d_y)
         assert value == pytest.approx(met[0] if met else SEES_NOTHING, abs=1e-9)
 
 
@@ -192,7 +192,7 @@ def test_joints_keep_to_their_limits():
 @pytest.mark.parametrize("thing", [Thing.CYLINDER, Thing.PAPER_BOX_A])
 def test_a_pushed_object_slides_to_rest(thing: Thing):
     p = replace(AROUND, thing=thing, p_WH_0=np.array([-0.5, 0.0]))
-    sigma, (palm, (x, y, yaw, *_), *phalanges) = beginning(p)
+    sigma, (palm, (x, y, yaw, *_), *phalanges) = initial_snapshot(p)
     world = GraspWorld(p, (sigma, (palm, (x, y, yaw, 0.3, 0.4, 0.0), *phalanges)))
     steps = 0
     while math.hypot(*world.snapshot[1][1][3:5]) > 1e-9:
@@ -205,7 +205,7 @@ def test_a_pushed_object_slides_to_rest(thing: Thing):
 
 def test_a_spun_object_turns_to_rest():
     p = replace(AROUND, p_WH_0=np.array([-0.5, 0.0]))
-    sigma, (palm, (x, y, yaw, *_), *phalanges) = beginning(p)
+    sigma, (palm, (x, y, yaw, *_), *phalanges) = initial_snapshot(p)
     world = GraspWorld(p, (sigma, (palm, (x, y, yaw, 0.0, 0.0, 10.0), *phalanges)))
     steps = 0
     while world.snapshot[1][1][5] > 1e-9:
@@ -268,7 +268,7 @@ def test_a_hand_in_the_object_is_refused(changes: dict[str, Any], part: str):
         GraspScene(replace(AROUND, **changes))
 
 
-def test_faults_of_the_parameters_are_told_at_once():
+def test_faults_of_the_parameters_are_reported_together():
     with pytest.raises(InvalidSceneParameters) as caught:
         GraspScene(Params(p_WO_0=np.array([0.58, 0.0]), b=0.003, nearest=0.07))
     assert len(caught.value.faults) == 4

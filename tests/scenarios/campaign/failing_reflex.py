@@ -1,4 +1,4 @@
-"""Reflexes that do to their process what units may do, to see what a campaign makes of it."""
+"""Reflexes that crash, hang or otherwise fail, to test how a campaign handles it."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""A campaign goes on where it stopped: what is done is kept, what is lost or damaged is done anew."""
+"""A campaign resumes where it stopped: runs that are done are kept, runs that are lost or damaged are repeated."""
 
 import json
 import shutil
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -40,13 +40,13 @@ def folder(finished: Path, tmp_path: Path) -> CampaignFolder:
     return CampaignFolder(tmp_path / "c")
 
 
-def go_on(
+def resume(
     folder: CampaignFolder, plan: CampaignPlan = PLAN, pool: InProcessPool | None = None
 ) -> tuple[list[str], list[RunCounts]]:
-    """Return which runs were begun, and what was told."""
-    pool, value = pool or InProcessPool(), list[RunCounts]()
-    run_campaign(prepared(plan), folder, pool, value.append)
-    return pool.begun, value
+    """Resume a campaign; return which runs were begun, and the counts that were reported."""
+    pool, counts = pool or InProcessPool(), list[RunCounts]()
+    run_campaign(prepared(plan), folder, pool, counts.append)
+    return pool.begun, counts
 
 
 def without_times(table: Path) -> list[dict[str, Any]]:
@@ -64,9 +64,9 @@ def test_each_run_has_a_row_in_the_plans_order(finished: Path):
 
 
 def test_what_is_done_is_not_begun_again(folder: CampaignFolder):
-    begun, value = go_on(folder)
+    begun, counts = resume(folder)
     assert begun == []
-    assert value == [RunCounts(total=4, kept=4, ended=4)]
+    assert counts == [RunCounts(total=4, kept=4, ended=4)]
 
 
 def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path, tmp_path: Path):
@@ -77,36 +77,36 @@ def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path
 
     folder = CampaignFolder(tmp_path / "c")
     with pytest.raises(KeyboardInterrupt):
-        go_on(folder, pool=InProcessPool(interrupt))
+        resume(folder, pool=InProcessPool(interrupt))
     assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0], NAMES[2]]
-    begun, value = go_on(folder)
+    begun, counts = resume(folder)
     assert begun == [NAMES[1], NAMES[3]]
-    assert value[0] == RunCounts(total=4, kept=2, ended=2)
+    assert counts[0] == RunCounts(total=4, kept=2, ended=2)
     assert without_times(folder.table) == without_times(finished)
 
 
-def test_a_run_whose_answer_did_not_come_is_in_the_table_all_the_same(tmp_path: Path):
+def test_a_run_whose_result_did_not_come_is_in_the_table_nevertheless(tmp_path: Path):
     class Mute(InProcessPool):
         def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
             for _ in super().run_jobs(jobs[:1]):
                 raise KeyboardInterrupt
             yield from ()
 
-    folder, value = CampaignFolder(tmp_path / "c"), list[RunCounts]()
+    folder, counts = CampaignFolder(tmp_path / "c"), list[RunCounts]()
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(prepared(PLAN), folder, Mute(), value.append)
+        run_campaign(prepared(PLAN), folder, Mute(), counts.append)
     assert CampaignTable.read(folder.table).column("run").tolist() == [NAMES[0]]
-    assert value[-1] == RunCounts(total=4, ended=1)
+    assert counts[-1] == RunCounts(total=4, ended=1)
 
 
 def test_a_lost_run_is_a_row_with_its_reason_and_tried_again(tmp_path: Path):
     folder = CampaignFolder(tmp_path / "c")
-    _, value = go_on(folder, pool=InProcessPool(lambda job: "its machine burnt" if job.name == NAMES[0] else ""))
-    assert value[-1] == RunCounts(total=4, ended=3, lost=1)
+    _, counts = resume(folder, pool=InProcessPool(lambda job: "its machine burnt" if job.name == NAMES[0] else ""))
+    assert counts[-1] == RunCounts(total=4, ended=3, lost=1)
     row = CampaignTable.read(folder.table).rows[0]
     assert (row["status"], row["success"], row["reason"]) == ("lost", None, "its machine burnt")
     assert (row["forward"], row["simulated_seconds"], row["steps"]) == (0.03, None, None)
-    begun, _ = go_on(folder)
+    begun, _ = resume(folder)
     assert begun == [NAMES[0]]
     assert CampaignTable.read(folder.table).column("status").tolist() == ["done"] * 4
 
@@ -118,23 +118,23 @@ def test_a_run_whose_summary_is_damaged_is_done_anew(folder: CampaignFolder, con
         summary.unlink()
     else:
         summary.write_text(content)
-    assert go_on(folder)[0] == [NAMES[2]]
+    assert resume(folder)[0] == [NAMES[2]]
     assert len(CampaignTable.read(folder.table)) == 4
 
 
 def test_a_run_that_was_interrupted_is_none(folder: CampaignFolder):
     summary = folder.runs / NAMES[2] / "summary.json"
     summary.write_text(json.dumps({**json.loads(summary.read_text()), "complete": False}))
-    assert go_on(folder)[0] == [NAMES[2]]
+    assert resume(folder)[0] == [NAMES[2]]
 
 
 def test_a_run_in_which_a_unit_failed_is_done(folder: CampaignFolder):
     summary = folder.runs / NAMES[2] / "summary.json"
     failed = {"complete": False, "success": False, "failure": {"kind": "x"}, "reason": "the hand broke"}
     summary.write_text(json.dumps({**json.loads(summary.read_text()), **failed}))
-    begun, value = go_on(folder)
+    begun, counts = resume(folder)
     assert begun == []
-    assert value == [RunCounts(total=4, kept=4, ended=4, failed=1)]
+    assert counts == [RunCounts(total=4, kept=4, ended=4, failed=1)]
     row = CampaignTable.read(folder.table).rows[2]
     assert (row["status"], row["success"], row["reason"]) == ("failed", None, "the hand broke")
 
@@ -146,7 +146,7 @@ def test_the_table_is_made_anew_from_the_runs(folder: CampaignFolder, damage: st
         folder.table.unlink()
     else:
         folder.table.write_bytes(folder.table.read_bytes()[:2000])
-    assert go_on(folder)[0] == []
+    assert resume(folder)[0] == []
     assert CampaignTable.read(folder.table).rows == before
 
 
@@ -154,13 +154,13 @@ def test_left_overs_of_killed_runs_are_removed(folder: CampaignFolder):
     left = folder.runs / f".{NAMES[0]}.abc"
     left.mkdir()
     (left / "signals.parquet.part").write_text("x")
-    go_on(folder)
+    resume(folder)
     assert not left.exists()
 
 
 def test_more_repetitions_add_runs(folder: CampaignFolder):
     more = replace(PLAN, repetitions=3)
-    begun, _ = go_on(folder, more)
+    begun, _ = resume(folder, more)
     assert begun == [run.name for run in more.runs() if run.repetition == 2]
     table = CampaignTable.read(folder.table)
     assert table.column("run").tolist() == [run.name for run in more.runs()]

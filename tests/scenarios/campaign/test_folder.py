@@ -1,4 +1,4 @@
-"""A folder is of one campaign: another one, or something else, is refused and left as it was."""
+"""A folder is of one campaign: one of another campaign, or of something else, is rejected and left as it was."""
 
 import json
 import os
@@ -150,10 +150,10 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path, fmus: dict[str, P
 
 def test_a_second_command_is_refused(folder: CampaignFolder, fmus: dict[str, Path]):
     with folder_locked(folder.path):
-        assert refusal(folder, PLAN, fmus) == f"another command carries this campaign out (process {os.getpid()})"
+        assert refusal(folder, PLAN, fmus) == f"another command is running this campaign (process {os.getpid()})"
 
 
-def test_a_call_killed_before_it_told_its_campaign_is_no_obstacle(tmp_path: Path, fmus: dict[str, Path]):
+def test_a_call_killed_before_it_wrote_its_campaign_is_no_obstacle(tmp_path: Path, fmus: dict[str, Path]):
     folder = CampaignFolder(tmp_path / "c")
     folder.path.mkdir()
     (folder.path / "campaign.json.part").write_text("{")

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.campaign import local_cluster as dask_crew
+from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.run_server import RunServer
 from handover.scenarios.campaign.table import CampaignTable
@@ -41,15 +41,15 @@ def sweep(monkeypatch: pytest.MonkeyPatch, pool: WorkerPool) -> Result:
     def given(_workers: int | None) -> Generator[WorkerPool, None, None]:
         yield pool
 
-    monkeypatch.setattr(dask_crew, "local_cluster", given)
+    monkeypatch.setattr(local_cluster, "local_cluster", given)
     return CliRunner().invoke(main, CALL)
 
 
-def interrupt(_order: RunJob) -> str:
+def interrupt(_job: RunJob) -> str:
     raise KeyboardInterrupt
 
 
-def test_a_mark_for_workers_that_cannot_be_written_is_told(here: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_mark_for_workers_that_cannot_be_written_is_reported(here: Path, monkeypatch: pytest.MonkeyPatch):
     """It is the first that a campaign which goes on writes."""
     assert sweep(monkeypatch, InProcessPool(interrupt)).exit_code == 1
     before = sorted(here.rglob("*"))
@@ -83,7 +83,7 @@ def test_a_run_without_room_stops_it_and_what_is_done_stays(monkeypatch: pytest.
 
 
 def test_words_of_a_full_disk_stop_nothing(monkeypatch: pytest.MonkeyPatch):
-    result = sweep(monkeypatch, InProcessPool(lambda _order: f"its camera says: {FULL}"))
+    result = sweep(monkeypatch, InProcessPool(lambda _job: f"its camera says: {FULL}"))
     assert result.exit_code == 3
     assert "3 lost" in result.output
     assert "cannot be written" not in result.output

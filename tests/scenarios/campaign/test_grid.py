@@ -1,4 +1,4 @@
-"""`name=values` texts of a sweep: what they mean, and what is told of those that mean nothing."""
+"""`name=values` texts of a sweep: what they mean, and the errors for invalid ones."""
 
 import pytest
 
@@ -92,12 +92,12 @@ def test_arrays_stand_between_semicolons():
         ("place=lfet", "place: 'lfet' is none of front, front_left, left, back_left; did you mean left"),
     ],
 )
-def test_what_means_nothing_is_told_in_a_line(text: str, fault: str):
+def test_what_means_nothing_is_reported_in_a_line(text: str, fault: str):
     (value,) = faults(text)
     assert value.startswith(fault)
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_together():
     assert len(faults("alpha=9", "alpha=0.1", "beta=1", "radius=0:1")) == 4
 
 

@@ -1,4 +1,4 @@
-"""A plan is refused as a whole before any of its runs begins."""
+"""An invalid plan is rejected as a whole before any of its runs begins."""
 
 import re
 
@@ -20,7 +20,7 @@ def test_texts_of_the_same_values_make_the_same_plan():
     assert checked_plan(one) == checked_plan(other) == other
 
 
-def test_values_that_do_not_fit_each_other_are_told_with_their_point():
+def test_values_that_do_not_fit_each_other_are_reported_with_their_point():
     wrong = plan(points=[{"shift_least": "0.04"}, {"shift_least": "0.06"}, {"shift_least": "9"}])
     with pytest.raises(InvalidParameter) as caught:
         checked_plan(wrong)
@@ -30,7 +30,7 @@ def test_values_that_do_not_fit_each_other_are_told_with_their_point():
     ]
 
 
-def test_of_many_faults_the_first_are_told_and_how_many_more():
+def test_of_many_faults_the_first_are_reported_and_how_many_more():
     wrong = plan(points=[{"shift_least": f"0.0{n}"} for n in range(51, 75)])
     with pytest.raises(InvalidParameter) as caught:
         checked_plan(wrong)

@@ -1,4 +1,4 @@
-"""A run server answers for each order, whatever the run does to its process, and leaves whole folders or none."""
+"""A run server returns a result for each job, whatever a run does to its process, and leaves no incomplete folder."""
 
 import json
 import os
@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from crew_orders import bad_job, job
-from living import children, lives, until
+from processes import children, lives, until
+from sample_jobs import bad_job, job
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.plan import PlannedRun
@@ -125,7 +125,7 @@ def test_a_run_without_a_summary_leaves_nothing(
     assert list((tmp_path / "runs").iterdir()) == []
 
 
-def test_what_is_refused_is_told(server: ServerProcess, tmp_path: Path):
+def test_an_invalid_job_is_lost_with_the_reason(server: ServerProcess, tmp_path: Path):
     assert "has no parameter 'gloss'" in server.run_job(job(tmp_path / "runs", "run", "gloss=1"), yes).lost
     unknown = replace(job(tmp_path / "runs"), scenario="juggle")
     assert "no scenario 'juggle'" in server.run_job(unknown, yes).lost
@@ -140,7 +140,7 @@ def test_what_a_run_prints_is_kept_beside_its_record(server: ServerProcess, buil
 
 
 @slow
-def test_a_run_that_was_carried_out_twice_is_there_once(server: ServerProcess, tmp_path: Path):
+def test_a_run_that_was_executed_twice_is_there_once(server: ServerProcess, tmp_path: Path):
     for _ in range(2):
         assert server.run_job(job(tmp_path / "runs"), yes).lost == ""
     assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]

@@ -1,4 +1,4 @@
-"""Schedulers that cannot be used are refused in one line, before anything is sent to them."""
+"""Schedulers that cannot be used are reported in one line, before anything is sent to them."""
 
 import asyncio
 import socket

@@ -102,6 +102,6 @@ def test_the_lady_tasting_tea():
     assert two_proportions(3, 4, 1, 4) == pytest.approx(34 / 70)
 
 
-def test_with_three_trials_of_theirs_hardly_a_count_can_be_told_apart():
+def test_with_three_trials_of_theirs_hardly_a_count_can_be_distinguished():
     assert compatible_counts(2, 3, 3) == (0, 3)
     assert compatible_counts(0, 4, 4) == (0, 3)  # 4 of 4: p = 2 / C(8, 4)

@@ -39,7 +39,7 @@ def table() -> CampaignTable:
     return CampaignTable(table_of(PLAN, rows()))
 
 
-def test_columns_are_typed_and_told(table: CampaignTable):
+def test_columns_are_typed_and_reported(table: CampaignTable):
     schema: Any = table.table.schema
     kinds = {name: str(schema.field(name).type) for name in table.table.column_names}
     assert kinds == {
@@ -112,7 +112,7 @@ def test_it_is_written_seldom_while_runs_come_fast(tmp_path: Path, monkeypatch: 
     assert 9 <= len(written) <= 10  # 0.05 s each in 100 s
 
 
-def test_a_table_that_is_none_or_torn_is_told(tmp_path: Path, table: CampaignTable):
+def test_a_table_that_is_none_or_torn_is_reported(tmp_path: Path, table: CampaignTable):
     with pytest.raises(InvalidRunFolder, match=r"it has no runs\.parquet"):
         CampaignTable.read(tmp_path)
     pq.write_table(table.table, tmp_path / "runs.parquet")

@@ -1,19 +1,19 @@
-"""A worker of a cluster carries out what is wanted only."""
+"""A worker of a cluster executes only jobs whose results are still wanted."""
 
 from pathlib import Path
 from typing import Any
 
 import pytest
-from crew_orders import job
 from distributed import Client
+from sample_jobs import job
 
 from handover.scenarios.campaign import worker
 from handover.scenarios.campaign.worker import ServerProcess
 from handover.scenarios.results.run_folder import versions
 
 
-def test_an_order_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """The scheduler takes orders back later than the worker is asked to end them."""
+def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The scheduler cancels jobs later than the worker is asked to end them."""
     started: list[ServerProcess] = []
 
     def started_server() -> ServerProcess:

@@ -71,7 +71,7 @@ def test_metrics_that_are_not_numbers_leave_gaps(tmp_path: Path):
     )
 
 
-def test_a_parameter_that_some_points_leave_alone_is_told_as_a_gap(tmp_path: Path):
+def test_a_parameter_that_some_points_leave_alone_is_reported_as_a_gap(tmp_path: Path):
     points = [
         {"strategy": "reflex", "thing": "cylinder"},
         {"strategy": "reflex", "thing": "baby_cup_a"},

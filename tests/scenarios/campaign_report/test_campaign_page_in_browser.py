@@ -59,7 +59,7 @@ def test_a_campaigns_page_is_no_wider_than_a_phone(browser: Browser, campaign: C
         assert overflow(page) <= 0
 
 
-def test_a_page_tells_what_became_of_every_run(campaign: CampaignFolder):
+def test_a_page_says_what_became_of_every_run(campaign: CampaignFolder):
     html = campaign.report.read_text(encoding="utf-8")
     assert "in 2 of 3 runs done the task succeeded; 1 was lost." in html
     assert "its worker went away" in html

@@ -1,4 +1,4 @@
-"""Where points stand along an axis."""
+"""Where points are placed along an axis."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_a_number_is_an_axis_with_its_unit():
     assert not along.listed
 
 
-def test_an_angle_is_told_in_degrees():
+def test_an_angle_is_reported_in_degrees():
     assert layout("ir_grasp", {"turn_most": "0"}, {"turn_most": "3.14159265"}).title == "turn most (°)"
 
 
@@ -38,7 +38,7 @@ def test_of_two_parameters_the_number_is_the_axis_and_the_name_a_colour():
     assert np.all(np.diff(along.places[[0, 2, 1, 3]]) >= along.room)
 
 
-def test_a_switch_is_told_by_its_name():
+def test_a_switch_is_reported_by_its_name():
     along = layout("ir_grasp", {"perturbed": "true"}, {"perturbed": "false"})
     assert [name for _, name in along.ticks or ()] == ["perturbed", "not perturbed"]
 
@@ -63,7 +63,7 @@ def test_names_that_need_more_room_than_there_is_are_a_list():
     assert along.listed
 
 
-def test_a_parameter_that_goes_with_another_is_not_told_twice():
+def test_a_parameter_that_goes_with_another_is_not_reported_twice():
     points = [{"alpha": a, "control_period": p} for a, p in (("0.1", "1.38"), ("0.2", "1.51"), ("0.4", "1.45"))]
     assert layout("helix_handover", *points).title == "alpha"
 

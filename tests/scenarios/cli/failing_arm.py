@@ -1,4 +1,4 @@
-"""An arm that fails while it runs, to see what a run makes of it."""
+"""An arm that fails during a run, to test how the run ends."""
 
 from handover.plants.helix.tendon_arm import Inputs, Outputs, TendonArm
 

@@ -1,4 +1,4 @@
-"""Ctrl-C as a campaign comes to its end: the table is complete, the workers are ended, and it counts nonetheless."""
+"""Ctrl-C as a campaign comes to its end: the table is complete, the workers are ended, the interruption counts."""
 
 import contextlib
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -60,7 +60,7 @@ class InterruptedEnd:
 
 def test_as_the_table_is_completed(tmp_path: Path):
     def progress(counts: RunCounts) -> None:
-        if counts.ended == len(NAMES):  # told as the runs are found that have ended without an answer
+        if counts.ended == len(NAMES):  # reported when runs are found that have ended without a result
             interrupt()
 
     folder = CampaignFolder(tmp_path / "c")

@@ -1,4 +1,4 @@
-"""How far a campaign has come, as it is told."""
+"""How the progress of a campaign is printed."""
 
 import io
 import itertools
@@ -25,7 +25,7 @@ def test_what_is_left_is_reckoned_from_the_runs_of_this_call(counts: RunCounts, 
     assert format_time_left(counts, elapsed) == text
 
 
-def test_failed_and_lost_runs_are_told_where_there_are_any():
+def test_failed_and_lost_runs_are_reported_where_there_are_any():
     assert format_progress(RunCounts(total=60, ended=12)) == "12 of 60 runs done"
     assert format_progress(RunCounts(total=60, ended=12, failed=2, lost=1)) == "12 of 60 runs done, 2 failed, 1 lost"
 

@@ -1,4 +1,4 @@
-"""What the end of a campaign prints: at most a screen."""
+"""The summary that is printed at the end of a campaign: at most a screen."""
 
 import os
 from pathlib import Path
@@ -40,7 +40,7 @@ def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest
     assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
 
 
-def test_of_many_points_and_reasons_the_first_are_told(capsys: pytest.CaptureFixture[str]):
+def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.CaptureFixture[str]):
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": f"0.{n}"} for n in range(100, 200)])
     rows = [
         RunRow(run=run, status="failed", success=None, reason=f"the hand broke {run.point % 10} times")
@@ -53,7 +53,7 @@ def test_of_many_points_and_reasons_the_first_are_told(capsys: pytest.CaptureFix
     assert len(output.splitlines()) <= 24
 
 
-def test_a_page_that_is_older_than_the_table_is_not_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_page_that_is_older_than_the_table_is_not_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     plan, folder = CampaignPlan(scenario="ir_grasp", points=[{}]), CampaignFolder(tmp_path)
     results = CampaignResults({"scenario": "ir_grasp", "points": [{}]}, CampaignTable(table_of(plan, [])))
     for file in (folder.table, folder.report):

@@ -54,7 +54,7 @@ def test_every_unit_of_the_catalog_passes(unit: str, fmi: int):
     assert_passes(unit, fmi)
 
 
-def test_a_fault_is_told_with_status_1(broken: Path):
+def test_a_fault_is_reported_with_status_1(broken: Path):
     result = check(broken)
     assert result.exit_code == 1
     lines = result.output.splitlines()
@@ -67,7 +67,7 @@ def test_a_fault_is_told_with_status_1(broken: Path):
     assert lines[-1] == "not usable as it is (1 fault)"
 
 
-def test_a_unit_that_runs_against_the_standard_is_told_as_that(tmp_path: Path):
+def test_a_unit_that_runs_against_the_standard_is_reported_as_that(tmp_path: Path):
     file = tmp_path / "x.fmu"
     with zipfile.ZipFile(cached("Push", 2)) as source, zipfile.ZipFile(file, "w") as target:
         for name in source.namelist():
@@ -85,7 +85,7 @@ def test_what_cannot_be_tried_says_where_the_reason_is(tmp_path: Path):
             target.writestr(name, source.read(name).replace(b'causality="independent"', b'causality="local"'))
     result = check(file)
     assert result.exit_code == 1
-    assert "  -        run          not tried: its description cannot be used, see there" in result.output.splitlines()
+    assert "  -        run          not tried: its description is invalid, see there" in result.output.splitlines()
     assert result.output.splitlines()[-1].startswith("not usable as it is (1 fault")
 
 
@@ -98,7 +98,7 @@ def test_what_cannot_be_tried_says_where_the_reason_is(tmp_path: Path):
         (3, b"x = 1\ny = '\xf6'\n", "not UTF-8: "),
     ],
 )
-def test_a_source_that_python_cannot_read_is_told_with_file_and_line(
+def test_a_source_that_python_cannot_read_is_reported_with_file_and_line(
     tmp_path: Path, fmi: int, spoilt: bytes, fault: str
 ):
     file = tmp_path / "x.fmu"
@@ -123,7 +123,7 @@ def test_the_worst_of_several_files_decides(broken: Path):
     assert "not usable as it is" in result.output
 
 
-def test_files_that_are_not_there_are_all_told_before_anything_is_checked(broken: Path, tmp_path: Path):
+def test_files_that_are_not_there_are_all_reported_before_anything_is_checked(broken: Path, tmp_path: Path):
     result = check(broken, tmp_path / "missing.fmu", tmp_path, Path(os.devnull))
     assert result.exit_code == 2
     assert "missing.fmu: no such file" in result.output
@@ -133,7 +133,7 @@ def test_files_that_are_not_there_are_all_told_before_anything_is_checked(broken
 
 
 @pytest.mark.parametrize("arguments", [[], ["--timeout", "0", "x.fmu"], ["--timeout", "soon", "x.fmu"]])
-def test_a_bad_call_is_refused(arguments: list[str]):
+def test_a_usage_error_is_refused(arguments: list[str]):
     assert check(*arguments).exit_code == 2
 
 
@@ -149,7 +149,7 @@ def test_json_holds_what_was_found(broken: Path):
     assert "lead out" in finding["what"]
 
 
-def test_any_file_is_told_without_a_traceback(tmp_path: Path):
+def test_any_file_is_reported_without_a_traceback(tmp_path: Path):
     for content in (b"", b"PK\x03\x04", b"PK\x05\x06" + bytes(18), os.urandom(5000)):
         file = tmp_path / "x.fmu"
         file.write_bytes(content)

@@ -120,7 +120,7 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
     ],
 )
-def test_a_bad_call_is_refused_with_what_would_be_right(tmp_path: Path, arguments: tuple[str, ...], sentence: str):
+def test_a_usage_error_is_refused_with_valid_values(tmp_path: Path, arguments: tuple[str, ...], sentence: str):
     out = tmp_path / "out"
     assert_refused(call(*arguments, "--out", out) if arguments[0] != "list" else call(*arguments), sentence, out)
 
@@ -155,7 +155,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_built(tmp_pa
     assert len(result.output.splitlines()) == 1
 
 
-def test_a_platform_that_is_not_known_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_platform_that_is_not_known_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "foo")
     for arguments in (("build", "TendonArm", "--out", tmp_path / "u"), ("run", "helix_handover", "--out", tmp_path)):
         result = call(*arguments)
@@ -163,7 +163,7 @@ def test_a_platform_that_is_not_known_is_told_in_one_line(tmp_path: Path, monkey
         assert len(result.output.splitlines()) == 1
 
 
-def test_a_cache_that_cannot_be_used_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_cache_that_cannot_be_used_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "file").write_text("precious")
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "file"))
     result = call("run", "helix_handover", "--out", tmp_path / "r")
@@ -219,7 +219,7 @@ def test_build_makes_a_unit_of_ones_own_from_the_working_directory(tmp_path: Pat
     assert call("check", "made/Spring.fmi3.fmu").exit_code == 0
 
 
-def test_a_module_of_ones_own_that_does_not_load_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_users_module_that_does_not_load_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
@@ -233,7 +233,7 @@ def test_a_unit_that_is_named_twice_is_built_once(tmp_path: Path):
     assert [Path(line).name for line in result.output.split()] == ["Push.fmi3.fmu"]
 
 
-def test_a_folder_that_the_system_does_not_make_is_told_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_folder_that_cannot_be_made_is_reported_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def refuse(path: Path, **_: object) -> None:
         raise FileNotFoundError(2, "No such file or directory", str(path))
 
@@ -242,7 +242,7 @@ def test_a_folder_that_the_system_does_not_make_is_told_by_its_name(tmp_path: Pa
     assert_refused(result, f"output folder {tmp_path / 'out'}: it cannot be written to: No such file or directory")
 
 
-def test_a_folder_in_the_place_of_an_fmu_is_told_with_what_to_do(tmp_path: Path):
+def test_a_folder_in_the_place_of_an_fmu_is_reported_with_what_to_do(tmp_path: Path):
     result = call("run", "helix_handover", "--unit", f"arm={tmp_path}", "--out", tmp_path / "out")
     assert_refused(result, "a folder, not a file; zip what is in it", tmp_path / "out")
 

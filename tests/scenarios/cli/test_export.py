@@ -64,7 +64,7 @@ def test_an_exported_scenario_gives_the_same_signals_as_the_scenario(name: str, 
         (("ir_grasp", "--ssp", "folder.ssp"), "there is a folder of that name"),
     ],
 )
-def test_what_cannot_be_exported_is_told_and_nothing_is_written(
+def test_what_cannot_be_exported_is_reported_and_nothing_is_written(
     arguments: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)

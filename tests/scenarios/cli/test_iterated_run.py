@@ -1,4 +1,4 @@
-"""`handover run` with an iterated coupling: what its summary tells, and how it ends where units do not agree."""
+"""`handover run` with an iterated coupling: its summary, and how it ends where the units do not converge."""
 
 import json
 from fractions import Fraction
@@ -24,7 +24,7 @@ def run(file: Path, out: Path, *arguments: str) -> Result:
     return CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
 
 
-def test_the_summary_tells_how_much_was_iterated(masses: Path, tmp_path: Path):
+def test_the_summary_says_how_much_was_iterated(masses: Path, tmp_path: Path):
     result = run(masses, tmp_path / "out", "--algorithm", "newton")
     assert result.exit_code == 0, result.output
     metrics = json.loads((tmp_path / "out" / "summary.json").read_text())["metrics"]
@@ -36,7 +36,7 @@ def test_units_that_do_not_agree_end_the_run_with_status_3(masses: Path, tmp_pat
     strict = ("--tolerance", "1e-15", "--iterations", "2")
     result = run(masses, tmp_path / "out", "--algorithm", "fixed-point", *strict)
     assert result.exit_code == 3, result.output
-    assert "came to no solution in 2 iterations" in result.output
+    assert "found no solution in 2 iterations" in result.output
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert "b.f -> a.f still moves by" in summary["reason"]
 

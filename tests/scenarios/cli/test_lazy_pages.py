@@ -1,4 +1,4 @@
-"""What only some calls of the command need is not loaded by the others: who asks for help does not wait for plots."""
+"""Modules that only some commands need are not loaded by the others: help does not wait for plots."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from handover.scenarios.cli.command import COMMANDS, main
 
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
-HELP = HEAVY | {"numpy", "rich", "pymunk", "cosim", "fmus"}
+HELP = HEAVY | {"numpy", "rich", "pymunk", "handover.cosim", "handover.fmus"}
 _CALL = """
 import sys
 from handover.scenarios.cli.entry import main
@@ -31,7 +31,7 @@ def loaded_by(*arguments: str) -> set[str]:
     return set(done.stderr.split())
 
 
-def test_what_carries_runs_out_loads_neither_pages_nor_statistics():
+def test_what_executes_runs_loads_neither_pages_nor_statistics():
     line = "import sys, handover.scenarios.cli.run, handover.scenarios.cli.sweep; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
     assert not (PAGES | {"matplotlib"}) & set(done.stdout.split())
@@ -55,7 +55,7 @@ def test_a_list_of_a_scenario_loads_no_other_robots():
 
 
 @pytest.mark.parametrize("name", [c.name for c in COMMANDS])
-def test_a_command_is_in_the_help_as_it_tells_itself(name: str):
+def test_a_command_is_in_the_help_as_it_says_itself(name: str):
     context = click.Context(main)
     deferred = main.get_command(context, name)
     loaded = main.resolve_command(context, [name])[1]

@@ -1,4 +1,4 @@
-"""Limits of wall time that are no numbers are refused by the option's name."""
+"""Limits of wall time that are no numbers are usage errors that name the option."""
 
 import math
 from typing import Any

@@ -34,7 +34,7 @@ def error_at_end(out: Path) -> float:
     return float(np.max(np.abs(np.array([record[s][-1] for s in STATES]) - PLAIN.exact(1.0))))
 
 
-def test_what_is_chosen_is_done_and_told(ssp: Path, tmp_path: Path):
+def test_what_is_chosen_is_done_and_reported(ssp: Path, tmp_path: Path):
     chosen = ("--algorithm", "newton", "--tolerance", "1e-6", "--iterations", "20", "--extrapolation", "linear")
     result = run(ssp, tmp_path / "chosen", *chosen, "--format", "csv", "--format", "csv")
     assert result.exit_code == 0, result.output
@@ -53,7 +53,7 @@ def test_what_is_chosen_is_done_and_told(ssp: Path, tmp_path: Path):
     assert "steps" not in read(tmp_path / "chosen", "summary.json")
 
 
-def test_a_step_that_follows_its_error_is_told_with_what_it_came_to(ssp: Path, tmp_path: Path):
+def test_a_step_that_follows_its_error_is_reported_with_what_it_came_to(ssp: Path, tmp_path: Path):
     control = ("--adaptive", "1e-3", "--adaptive-absolute", "1e-4", "--first-step", "1/5", "--largest-step", "1/4")
     result = run(ssp, tmp_path / "out", *control, "--smallest-step", "1e-5", "--extrapolation", "linear")
     assert result.exit_code == 0, result.output

@@ -36,7 +36,7 @@ def test_without_a_name_it_lists_the_experiments():
         (["ir-table", "--seed", "-1"], "-1 is not in the range x>=0"),
     ],
 )
-def test_a_call_that_cannot_be_carried_out_is_refused_and_leaves_nothing(
+def test_a_call_that_cannot_be_executed_is_refused_and_leaves_nothing(
     arguments: list[str], content: str, tmp_path: Path
 ):
     result = paper(*arguments, "--out", tmp_path / "c")

@@ -1,4 +1,4 @@
-"""`handover report`: a page of what a folder has; where it has not enough, a line says what, and nothing is written."""
+"""`handover report`: a page of what a folder has; if something is missing, one line says so, and nothing is written."""
 
 import errno
 import json
@@ -48,7 +48,7 @@ def test_the_page_goes_where_it_is_asked_for(copy: Path, tmp_path: Path):
     assert report(copy, "--out", tmp_path) == (2, f"Error: {tmp_path} is a folder; name a file for the page\n")
 
 
-def test_a_run_of_which_an_older_version_told_less_has_a_page(copy: Path):
+def test_a_run_of_which_an_older_version_said_less_has_a_page(copy: Path):
     unknown = dict.fromkeys(("title", "headline", "told_parameters", "system", "versions", "units"), ...)
     change(copy / "run.json", **unknown)
     change(copy / "summary.json", units=..., wall_seconds=...)
@@ -87,7 +87,7 @@ def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
         ("signals.parquet", "PAR1", "its signals.parquet is damaged"),
     ],
 )
-def test_what_is_damaged_is_told_in_a_line(copy: Path, file: str, content: str | None, value: str):
+def test_what_is_damaged_is_reported_in_a_line(copy: Path, file: str, content: str | None, value: str):
     if content is None:
         (copy / file).unlink()
     else:

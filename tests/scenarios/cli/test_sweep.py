@@ -1,4 +1,4 @@
-"""`handover sweep`: what it prints, with which status it ends, and what a call is refused for."""
+"""`handover sweep`: its output, its exit status, and the usage errors."""
 
 import contextlib
 from collections.abc import Callable, Generator
@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from clusters import closed_port
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.cosim.record.file_lock import folder_locked
 from handover.fmus.build import cached
-from handover.scenarios.campaign import local_cluster as dask_crew
-from handover.scenarios.campaign import plan_check
+from handover.scenarios.campaign import local_cluster, plan_check
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunJob
@@ -44,7 +43,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def sweep(
-    monkeypatch: pytest.MonkeyPatch, *call: str, before: Callable[[RunJob], str] = lambda _order: ""
+    monkeypatch: pytest.MonkeyPatch, *call: str, before: Callable[[RunJob], str] = lambda _job: ""
 ) -> tuple[Result, list[str]]:
     """Return how a command ended, and which runs it began."""
     pool = InProcessPool(before)
@@ -53,7 +52,7 @@ def sweep(
     def in_process_pool(_workers: int | None) -> Generator[InProcessPool, None, None]:
         yield pool
 
-    monkeypatch.setattr(dask_crew, "local_cluster", in_process_pool)
+    monkeypatch.setattr(local_cluster, "local_cluster", in_process_pool)
     return CliRunner().invoke(main, call), pool.begun
 
 
@@ -65,7 +64,7 @@ def refuse_workers(monkeypatch: pytest.MonkeyPatch) -> None:
         raise PoolError("there are none")
         yield InProcessPool()
 
-    monkeypatch.setattr(dask_crew, "local_cluster", refuse)
+    monkeypatch.setattr(local_cluster, "local_cluster", refuse)
 
 
 def raising(error: BaseException, at: int) -> Callable[[RunJob], str]:
@@ -114,7 +113,7 @@ def test_a_complete_campaign_starts_no_workers(here: Path, monkeypatch: pytest.M
     refuse_workers(monkeypatch)
     result = CliRunner().invoke(main, call)
     assert result.exit_code == 0, result.output
-    assert result.stderr == "c has all of its runs; none was carried out\n"
+    assert result.stderr == "c has all of its runs; nothing was run\n"
     assert "2 of 2 runs done" in result.stdout
     assert [(here / "c" / name).stat().st_mtime_ns for name in ("runs.parquet", "report.html")] == written
     (here / "c" / "report.html").unlink()
@@ -122,7 +121,7 @@ def test_a_complete_campaign_starts_no_workers(here: Path, monkeypatch: pytest.M
     assert (here / "c" / "report.html").is_file()
 
 
-def test_a_run_that_cannot_be_read_is_carried_out_again(here: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_run_that_cannot_be_read_is_repeated(here: Path, monkeypatch: pytest.MonkeyPatch):
     sweep(monkeypatch, *CALL)
     (here / "c" / "runs" / ALL[1] / "summary.json").write_text("{")
     result, begun = sweep(monkeypatch, *CALL)
@@ -144,7 +143,7 @@ def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
-def test_a_lost_run_is_told_by_the_status(monkeypatch: pytest.MonkeyPatch):
+def test_a_lost_run_is_reported_by_the_status(monkeypatch: pytest.MonkeyPatch):
     result, _ = sweep(monkeypatch, *CALL, before=lambda job: "its machine burnt" if job.name == ALL[0] else "")
     assert result.exit_code == 3
     assert "1 of 2 runs done, 1 lost" in result.output
@@ -183,7 +182,7 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
         (["ir_grasp", "--first-step", "0.1"], "with --adaptive only"),
     ],
 )
-def test_bad_calls_are_told_in_a_line_and_leave_nothing(
+def test_usage_errors_are_reported_in_a_line_and_leave_nothing(
     here: Path, call: list[str], sentence: str, monkeypatch: pytest.MonkeyPatch
 ):
     result, begun = sweep(monkeypatch, "sweep", *call)
@@ -203,7 +202,7 @@ def test_a_campaign_under_way_is_refused_before_anything_else(here: Path, monkey
     with folder_locked(here / "c"):
         result, begun = sweep(monkeypatch, *CALL)
     assert (result.exit_code, begun) == (2, [])
-    assert result.output.startswith("Error: output folder c: another command carries this campaign out")
+    assert result.output.startswith("Error: output folder c: another command is running this campaign")
 
 
 def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: pytest.MonkeyPatch):
@@ -218,7 +217,7 @@ def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: py
     assert list(here.iterdir()) == []
 
 
-def test_a_unit_in_a_place_that_it_does_not_fit_is_told_at_once(here: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_unit_in_a_place_that_it_does_not_fit_is_reported_at_once(here: Path, monkeypatch: pytest.MonkeyPatch):
     result, begun = sweep(monkeypatch, *CALL, "--unit", f"reflex={cached('GraspScene', 3)}")
     assert result.exit_code == 2, result.output
     assert "reflex.sigma_cmd is an input, not an output" in result.output

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a campaign in order; nothing that it started stays."""
+"""Ctrl-C and SIGTERM end a campaign cleanly; no process that it started remains."""
 
 import os
 import signal
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from sweeping import Going, ended, runs_in, sweeping, wait_for
+from sweep_process import SweepProcess, ended, runs_in, sweeping, wait_for
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import CampaignInterruption
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 CALL = ["ir_grasp", "--repeat", "200", "-p", "strategy=forward", "--workers", "2", "--no-report"]
 
 
-def family_of(going: Going) -> list[psutil.Process]:
+def family_of(going: SweepProcess) -> list[psutil.Process]:
     return psutil.Process(going.pid).children(recursive=True)
 
 

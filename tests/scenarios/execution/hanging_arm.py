@@ -1,4 +1,4 @@
-"""An arm that hangs while it runs, in Python or in native code, to see whether Ctrl-C gets out of it.
+"""An arm that hangs while it runs, in Python or in native code, to test that Ctrl-C ends the run.
 
 The file that HANGING_ARM_TELLS names is made just before.
 """

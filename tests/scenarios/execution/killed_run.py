@@ -1,4 +1,4 @@
-"""The command `handover` in a process that tells when its run has passed a time, so that it can be ended there."""
+"""The command `handover` in a process that prints when its run has passed a time, so that it can be killed there."""
 
 import signal
 import subprocess
@@ -19,7 +19,7 @@ main(sys.argv[4:])
 
 
 def tell_from(passed: float, waits: float) -> None:
-    """Let runs of this process tell from one simulated time on that they have passed it, and wait at another."""
+    """Let runs of this process print from one simulated time on that they have passed it, and wait at another."""
     import handover.scenarios.cli.run
 
     @contextmanager

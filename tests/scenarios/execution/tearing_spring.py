@@ -1,4 +1,4 @@
-"""A spring that can tear, to see what a run makes of it."""
+"""A spring that can tear, to test how a run ends when a unit fails."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Units that crash or hang: the command names them, keeps the record, leaves nothing else and answers 3."""
+"""Units that crash or hang: the command names them, keeps the record, leaves nothing else and exits with status 3."""
 
 import json
 import sys
@@ -68,7 +68,7 @@ def test_a_crash_as_units_are_made_is_named_and_leaves_nothing(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_unit_that_holds_the_whole_process_is_told_by_the_parent(tmp_path: Path):
+def test_a_unit_that_holds_the_whole_process_is_reported_by_the_parent(tmp_path: Path):
     s = System()
     s.add("bad", build_block("endless_blocks:HoldsTheInterpreter", 3, tmp_path, step=Fraction(1, 10)))
     ssp = write_ssp(s, tmp_path / "held.ssp", "held", Fraction(1))

@@ -1,4 +1,4 @@
-"""A disk that is full at one of the files of a run: told in a line, with status 3, and nothing is half there."""
+"""A disk that is full at one of the files of a run: reported in one line, with status 3, and no file is incomplete."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ FILES = ["run.json", "signals.csv", "summary.json", "report.html"]
 
 
 @pytest.mark.parametrize("full", FILES)
-def test_a_full_disk_is_told_and_what_was_recorded_is_kept(full: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_full_disk_is_reported_and_the_record_is_kept(full: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     replace = os.replace
 
     def refuse(source: Any, target: Any) -> None:

@@ -14,7 +14,7 @@ from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
-from handover.scenarios.cli.listing import print_summary
+from handover.scenarios.cli.run_summary import print_summary
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
@@ -74,8 +74,8 @@ def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
     ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
     assert ended in (-signal.SIGKILL, 1)
     assert call(*arguments, whole).exit_code == 0
-    (killed / "checkpoint.zip.part").write_text("of a process that died as it wrote one")
-    RunFolder.of_run(killed).add_to_run(failure={"kind": "killed"})  # as whoever completes the folder of a dead run
+    (killed / "checkpoint.zip.part").write_text("of a process that crashed while it wrote one")
+    RunFolder.of_run(killed).add_to_run(failure={"kind": "killed"})  # as the supervisor does for a crashed run
     result = call("resume", killed)
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
@@ -135,7 +135,7 @@ def test_page_and_figures_of_the_part_do_not_outlast_going_on_without_a_report(c
     assert not (copy / "figures").exists()
 
 
-def test_a_run_that_can_go_on_is_told_how(copy: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_run_that_can_go_on_is_reported_how(copy: Path, capsys: pytest.CaptureFixture[str]):
     summary: dict[str, Any] = {
         "scenario": "ir_grasp",
         "success": False,

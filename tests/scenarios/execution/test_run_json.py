@@ -1,4 +1,4 @@
-"""What a run's folder tells of its title, parameters, units and connections, so that a page can be made of it later."""
+"""A run's folder has its title, parameters, units and connections, so that a page can be made of it later."""
 
 import json
 import sys
@@ -30,7 +30,7 @@ def test_units_of_parameters_are_written_as_one_reads_them():
     assert found["torque"].endswith(" N·m")
 
 
-def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):
+def test_a_scenario_says_how_it_is_presented_and_wired(tmp_path: Path):
     ended = run(IrGrasp, tmp_path / "out", "thing=paper_box_a")
     found = read(tmp_path / "out", "run.json")
     assert found["title"] == IrGrasp.title
@@ -53,7 +53,7 @@ def test_a_scenario_tells_how_it_is_presented_and_wired(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_an_ssp_tells_the_same_and_a_unit_without_period_has_none(tmp_path: Path):
+def test_an_ssp_says_the_same_and_a_unit_without_period_has_none(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), "--adaptive", "1e-3"])
     assert done.exit_code == 0, done.output
@@ -65,7 +65,7 @@ def test_an_ssp_tells_the_same_and_a_unit_without_period_has_none(tmp_path: Path
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no process can be forked that tells")
-def test_a_run_that_crashed_tells_its_units_but_not_their_cost(tmp_path: Path):
+def test_a_run_that_crashed_says_its_units_but_not_their_cost(tmp_path: Path):
     going = start(tmp_path, failing_ssp(tmp_path, "crashes"), "--out", "r")
     going.communicate(timeout=120)
     assert going.returncode == 3
@@ -74,7 +74,7 @@ def test_a_run_that_crashed_tells_its_units_but_not_their_cost(tmp_path: Path):
     assert {(u["steps"], u["cpu_seconds"]) for u in units} == {(None, None)}
 
 
-def test_units_are_told_as_their_sources_have_them_and_pictures_as_binary():
+def test_units_are_reported_as_their_sources_have_them_and_pictures_as_binary():
     s = System()
     a, b = s.add("a", native_fmu("workshop", 3)), s.add("b", native_fmu("si", 3))
     s.connect(a.y.length, b.u.length_in)

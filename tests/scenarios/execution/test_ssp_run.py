@@ -1,4 +1,4 @@
-"""`handover run FILE.ssp`: what it leaves, and how it answers what it cannot run."""
+"""`handover run FILE.ssp`: the files that it writes, and the errors for files that it cannot run."""
 
 import hashlib
 import json
@@ -135,7 +135,7 @@ def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
     assert not out.exists()
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path: Path):
+def test_a_file_that_is_not_there_is_reported(tmp_path: Path):
     result = run(tmp_path / "missing.ssp")
     assert result.exit_code == 2, result.output
     assert result.output == f"Error: {tmp_path / 'missing.ssp'}: there is no such file\n"

@@ -47,7 +47,7 @@ def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_a_metric_that_is_not_finite_is_null_and_told_as_undefined(value: float):
+def test_a_metric_that_is_not_finite_is_null_and_reported_as_undefined(value: float):
     made = metric_data(Metric(value, "m", "a length"))
     assert made == {"value": None, "unit": "m", "description": "a length"}
     assert format_metric(made) == "undefined"
@@ -57,7 +57,7 @@ def test_a_metric_that_is_not_finite_is_null_and_told_as_undefined(value: float)
     ("value", "unit", "text"),
     [(0.1, "kg", "100 g"), (2e3, "Pa", "2 kPa"), (7.2e4, "s", "20 h"), (0.0123, "m", "12.3 mm"), (1.0, "rad", "57.3°")],
 )
-def test_a_metric_is_told_in_the_unit_in_which_pages_show_it(value: float, unit: str, text: str):
+def test_a_metric_is_reported_in_the_unit_in_which_pages_show_it(value: float, unit: str, text: str):
     assert format_metric(metric_data(Metric(value, unit, ""))) == text
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from failing_systems import IN_TERMINAL, failing_ssp, start, wait_until
-from living import lives, until
+from processes import lives, until
 
 from handover.cosim.record.reader import Record
 
@@ -102,7 +102,7 @@ def test_ctrl_z_stops_both_and_going_on_lets_both_go_on(arguments: tuple[str | P
     assert going.returncode == 1
 
 
-def test_a_bad_call_is_answered_as_ever(tmp_path: Path):
+def test_a_usage_error_is_answered_as_ever(tmp_path: Path):
     going = start(tmp_path, "nonsense")
     _, errors = going.communicate(timeout=60)
     assert going.returncode == 2

@@ -28,13 +28,13 @@ def test_what_is_not_given_has_its_default():
         ("alpha", "not of the form name=value"),
     ],
 )
-def test_a_bad_parameter_is_refused_with_what_would_be_right(given: str, text: str):
+def test_a_bad_parameter_is_refused_with_valid_values(given: str, text: str):
     with pytest.raises(InvalidParameter) as caught:
         parse_parameters(HelixHandover, [given])
     assert text in str(caught.value)
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_together():
     with pytest.raises(InvalidParameter) as caught:
         parse_parameters(HelixHandover, ["alpha=2", "radius=-1", "nothing=3", "alpha=0.1"])
     assert len(caught.value.faults) == 4

@@ -54,7 +54,7 @@ def test_a_spin_about_a_principal_axis_needs_no_torque_but_the_force_that_leads_
     assert errors.R_model == pytest.approx(np.tile([0.0, 0.0, 5.0 * 0.4 / (70.0 * INERTIA[2])], (5, 1)))
 
 
-def test_thrust_that_turns_with_the_robot_is_told_as_at_the_beginning_of_the_step():
+def test_thrust_that_turns_with_the_robot_is_reported_as_at_the_beginning_of_the_step():
     w, f_B = np.array([0.0, 0.0, 3.0]), np.array([2.0, 0.0, 0.0])
     phi = TIMES[:, np.newaxis] * w
     angle = phi[:, 2]  # integral of the thrust's direction, held for a step and turned with it

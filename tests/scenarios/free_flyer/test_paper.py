@@ -1,4 +1,4 @@
-"""What the free-flyer's code has as defaults is what its `paper.toml` tells the origin of."""
+"""The defaults of the free-flyer's code are the values whose origins its `paper.toml` gives."""
 
 from pathlib import Path
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from origins import assert_every_default_has_its_origin
+from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.free_flyer
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams

@@ -1,4 +1,4 @@
-"""What the code has as defaults is what `paper.toml` tells the origin of."""
+"""The code's defaults are the values whose origins `paper.toml` gives."""
 
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import handover.scenarios.helix
 from handover.controllers.helix.servo_parameters import Params as ServoParams
 from handover.plants.helix.handover_partner import Params as HandParams
 from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.tendon_design import Params as ArmParams
+from handover.plants.helix.tendon_parameters import Params as ArmParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix.cameras import calibration
 from handover.scenarios.helix.parameters import Parameters, Place, Tuning

@@ -19,7 +19,7 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.ir_grasp.parameters import Parameters, Situation, asked_for
+from handover.scenarios.ir_grasp.parameters import Parameters, Situation, pregrasp_position
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.task import Task
 
@@ -69,7 +69,7 @@ def test_a_moved_cylinder_is_grasped(run: tuple[Path, dict[str, Any]]):
     assert record["scene.touching"][-1] >= 2
 
 
-def test_the_summary_tells_what_the_record_shows(run: tuple[Path, dict[str, Any]]):
+def test_the_summary_says_what_the_record_shows(run: tuple[Path, dict[str, Any]]):
     folder, summary = run
     record, metrics = Record(folder / "signals.parquet"), summary["metrics"]
     phase = record["reflex.phase"]
@@ -85,7 +85,7 @@ def test_the_summary_tells_what_the_record_shows(run: tuple[Path, dict[str, Any]
     drawn = Situation.draw(Parameters(), 0)
     assert metrics["moved"]["value"] == pytest.approx(np.linalg.norm(drawn.p_WO))
     assert metrics["turned"]["value"] == pytest.approx(drawn.turn)
-    off = drawn.p_WH_pregrasp - asked_for(Parameters().thing, Parameters().standoff)
+    off = drawn.p_WH_pregrasp - pregrasp_position(Parameters().thing, Parameters().standoff)
     assert metrics["vision_position_error"]["value"] == pytest.approx(np.linalg.norm(off))
     assert metrics["vision_yaw_error"]["value"] == pytest.approx(drawn.yaw)
     stop = Stop(int(record["reflex.stop"][-1]))
@@ -144,7 +144,7 @@ def test_as_printed_the_refinement_runs_to_its_end():
 
 @pytest.mark.slow
 def test_a_blind_hand_that_closes_55_mm_nearer_does_nearly_as_well_as_the_reflex():
-    """The control that the class tells of: with a standoff so large, coming nearer is what counts."""
+    """The control in the class's docstring: with a standoff so large, coming nearer is what counts."""
     seeds = range(1000, 1010)
     near = [grasp(seed, strategy=Strategy.FORWARD, forward=0.055).success for seed in seeds]
     assert sum(near) >= 9

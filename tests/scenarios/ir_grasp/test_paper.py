@@ -1,4 +1,4 @@
-"""What the grasp's code has as defaults is what its `paper.toml` tells the origin of."""
+"""The defaults of the grasp's code are the values whose origins its `paper.toml` gives."""
 
 from pathlib import Path
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from origins import assert_every_default_has_its_origin
+from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.ir_grasp
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams

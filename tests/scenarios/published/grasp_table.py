@@ -18,7 +18,7 @@ def grasp_table(
     status: Callable[[PlannedRun], str] = lambda _run: "done",
     **metrics: Callable[[PlannedRun], float],
 ) -> CampaignTable:
-    """Return a table of the whole plan in which runs succeed, fail to run, and have metrics as told."""
+    """Return a table of the whole plan in which runs succeed, fail to run, and have metrics as given."""
 
     def row(run: PlannedRun) -> Mapping[str, Any]:
         done = status(run) == "done"

@@ -1,4 +1,4 @@
-"""Claims go to JSON and back, and are told in words."""
+"""Claims go to JSON and back, and are formatted in words."""
 
 import json
 from dataclasses import replace

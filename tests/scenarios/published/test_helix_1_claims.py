@@ -46,7 +46,7 @@ def test_a_gripper_that_closed_beside_the_ball_has_moved_its_arm():
     assert judged(table, "Every handover").measured == "0 of 24"
 
 
-def test_a_run_that_crashed_counts_neither_way_and_is_told():
+def test_a_run_that_crashed_counts_neither_way_and_is_reported():
     rows = table_of(PUBLISHED).table.to_pylist()
     rows[0] |= {"status": "failed", "success": None, "arm_time": None}
     claim = judged(CampaignTable(pa.Table.from_pylist(rows)), "Every handover")

@@ -7,7 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -33,7 +33,7 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     return {claim["claim"]: claim for claim in json.loads((folder / "claims.json").read_text("utf-8"))}
 
 
-def test_an_arm_that_has_no_time_to_move_is_told_as_such(tmp_path: Path):
+def test_an_arm_that_has_no_time_to_move_is_reported_as_such(tmp_path: Path):
     claims = one_run(tmp_path / "campaign", patience="1")
     closes = next(claim for text, claim in claims.items() if "begins to close" in text)
     assert isinstance(closes, dict)

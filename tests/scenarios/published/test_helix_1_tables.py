@@ -29,7 +29,7 @@ def test_steps_are_beside_the_published_times_over_their_time_steps():
     assert table.rows[2][4] == "15–19"
 
 
-def test_a_place_tells_its_runs_and_which_lost_the_ball():
+def test_a_place_shows_its_runs_and_which_lost_the_ball():
     rows = {row[0]: row[1:] for row in Helix1().tables(table_of(TIMES))[2].rows}
     assert rows["front"][2] == "20.0, 21.0"
     assert rows["back-left"][2] == "26.0, never ✗"

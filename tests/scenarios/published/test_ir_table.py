@@ -61,7 +61,7 @@ def test_a_quick_one_has_as_many_runs_of_a_cell_as_the_paper():
     assert (len(plan.points), plan.repetitions) == (5 * 2 * 4, 3)
 
 
-def test_every_published_value_tells_its_origin():
+def test_every_published_value_has_its_origin():
     text = resources.files("handover.scenarios.ir_grasp").joinpath("paper.toml").read_text(encoding="utf-8")
     for name, entry in tomli.loads(text)["published"].items():
         assert set(entry) == {"value", "unit", "where", "status"}, name
@@ -105,7 +105,7 @@ def test_a_hand_that_fails_as_often_as_theirs_reproduces_their_rate():
     assert (claim.measured, claim.verdict) == ("60/80 (75 %)", Verdict.REPRODUCED)
 
 
-def test_the_control_arm_is_told_beyond_the_paper(claims: Sequence[Claim]):
+def test_the_control_arm_is_reported_beyond_the_paper(claims: Sequence[Claim]):
     beyond = [claim for claim in claims if claim.beyond]
     assert len(beyond) == 4
     assert {claim.verdict for claim in beyond} == {Verdict.REPRODUCED}

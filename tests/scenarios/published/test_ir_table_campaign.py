@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign import run_campaign
@@ -39,7 +39,7 @@ def test_distances_are_those_at_which_the_hand_closed(campaign: tuple[CampaignFo
     assert thumb == pytest.approx(0.010, abs=0.004)  # the target, and what the threshold of the cost allows
 
 
-def test_a_table_tells_why_the_hand_closed(campaign: tuple[CampaignFolder, CampaignTable]):
+def test_a_table_says_why_the_hand_closed(campaign: tuple[CampaignFolder, CampaignTable]):
     closing = IrTable().tables(campaign[1])[3]
     why = {row[0]: row[1] for row in closing.rows}
     assert why["blind, perturbed"] == "1 blind"

@@ -1,4 +1,4 @@
-"""Claims get their verdicts by the rules that they tell."""
+"""Claims get their verdicts by the rules that they state."""
 
 import pytest
 
@@ -6,8 +6,8 @@ from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.published.published_experiment import Verdict
 from handover.scenarios.published.verdicts import (
     FEW,
-    fewest_for,
     majority_claim,
+    min_trials_for,
     no_worse_claim,
     order_claim,
     rare_claim,
@@ -26,7 +26,7 @@ def test_a_rate_is_reproduced_if_the_counts_are_compatible(measured: tuple[int, 
     assert rate_claim("It holds 11 of 15.", "table I", (11, 15), measured).verdict is verdict
 
 
-def test_a_rate_tells_both_counts_the_interval_and_what_would_have_passed():
+def test_a_rate_shows_both_counts_the_interval_and_what_would_have_passed():
     claim = rate_claim("It holds 11 of 15.", "table I", (11, 15), (80, 80))
     assert (claim.published, claim.measured) == ("11/15 (73 %)", "80/80 (100 %)")
     assert claim.interval == pytest.approx((0.025 ** (1 / 80), 1.0))
@@ -34,7 +34,7 @@ def test_a_rate_tells_both_counts_the_interval_and_what_would_have_passed():
     assert "any count of ours from 36 to 73 of 80 would have passed" in claim.reason
 
 
-def test_a_rate_of_so_few_trials_that_nothing_could_be_told_apart_gets_no_verdict():
+def test_a_rate_of_so_few_trials_that_nothing_could_be_distinguished_gets_no_verdict():
     claim = rate_claim("It holds 2 of 3.", "table I", (2, 3), (3, 3))
     assert claim.verdict is NOT_COMPARABLE
     assert "no count of ours out of 3 could have been told from theirs" in claim.reason
@@ -71,7 +71,7 @@ def test_no_worse_takes_an_interval_below_the_margin(worse: int, n: int, verdict
 
 @pytest.mark.parametrize("share", [0.01, 0.05, FEW, 0.2, 1 / 3, 0.5, 0.8, 0.9, 0.975, 0.99])
 def test_the_fewest_trials_are_the_first_whose_interval_can_end_below_a_share(share: float):
-    assert fewest_for(share) == next(n for n in range(1, 1000) if success_interval(0, n).high < share)
+    assert min_trials_for(share) == next(n for n in range(1, 1000) if success_interval(0, n).high < share)
 
 
 def test_runs_in_which_only_the_first_succeeds_do_not_count_against_it():
@@ -92,7 +92,7 @@ def test_what_does_not_happen_has_its_whole_interval_below_a_tenth(measured: tup
     assert rare_claim("It does not touch.", "sec. I", "", measured).verdict is verdict
 
 
-def test_a_claim_without_a_verdict_keeps_its_figures_and_tells_why():
+def test_a_claim_without_a_verdict_keeps_its_figures_and_says_why():
     judged = rate_claim("Blind holds 2 of 15.", "table I", (2, 15), (16, 80))
     claim = without_verdict(judged, "It was chosen so.")
     assert claim.verdict is NOT_COMPARABLE

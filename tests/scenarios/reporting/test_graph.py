@@ -54,7 +54,7 @@ def test_there_and_back_lie_apart():
     assert np.linalg.norm(there[10] - back[10]) > 0.3
 
 
-def test_signals_of_a_pair_share_an_arrow_that_tells_them():
+def test_signals_of_a_pair_share_an_arrow_that_names_them():
     html = html_of(
         ["arm", "hand"],
         [connection("arm.p_WG", "hand.p_WG", size=3), connection("arm.grip", "hand.grip", unit="1"),
@@ -101,13 +101,13 @@ def test_without_a_system_there_is_no_section():
     ("period", "sampled", "text"),
     [(0.02, False, "20 ms"), (1 / 30, True, "33.3 ms, sampled"), (2.0, False, "2 s"), (None, False, "steps vary")],
 )
-def test_rates_are_told_as_one_reads_them(period: float | None, sampled: bool, text: str):
+def test_rates_are_reported_as_one_reads_them(period: float | None, sampled: bool, text: str):
     assert rate(unit("u", period=period, sampled=sampled)) == text
 
 
-def test_a_damaged_system_is_told_as_the_runs_fault(tmp_path: Path):
+def test_a_damaged_system_is_reported_as_the_runs_fault(tmp_path: Path):
     (tmp_path / "run.json").write_text(json.dumps({"scenario": "x", "parameters": {}, "system": {"units": [1]}}))
     (tmp_path / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
-    with pytest.raises(InvalidRunFolder, match="what it tells of its units is damaged"):
+    with pytest.raises(InvalidRunFolder, match="its description of the units is damaged"):
         write_run_page(RunFolder.of_run(tmp_path))
     assert not (tmp_path / "report.html").exists()

@@ -26,7 +26,7 @@ def test_names_that_are_html_are_text(tmp_path: Path):
     assert page.count("</script>") == page.count("<script")
 
 
-def test_a_page_without_plots_is_small_and_tells_the_browser_to_ask_for_nothing(tmp_path: Path):
+def test_a_page_without_plots_is_small_and_forbids_the_browser_to_ask_for_anything(tmp_path: Path):
     page = page_of(tmp_path, Markup("<p>text</p>"))
     assert len(page) < 30_000
     policy = page.partition('Content-Security-Policy" content="')[2].partition('"')[0].replace("&#39;", "'")

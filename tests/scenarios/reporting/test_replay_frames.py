@@ -26,7 +26,7 @@ def test_a_short_record_is_shown_whole(n: int):
     np.testing.assert_array_equal(frame_rows(time), np.arange(n))
 
 
-def test_phases_are_told_when_they_begin(tmp_path: Path):
+def test_phases_are_reported_when_they_begin(tmp_path: Path):
     phase = pa.field("servo.phase", pa.int64(), metadata={"items": "0 WAIT, 1 GIVEN_UP"})
     columns = [pa.array([0.0, 1.0, 2.0, 3.0]), pa.array([0, 0, 1, 1])]
     schema = pa.schema([pa.field("time", pa.float64()), phase])

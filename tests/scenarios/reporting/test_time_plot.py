@@ -68,7 +68,7 @@ def test_groups_have_one_colour_and_a_palette_keeps_it_where_others_are_missing(
 
 
 @pytest.mark.parametrize(("unit", "told"), [("mm", "full: 2.5 mm"), ("°", "full: 2.5°"), ("", "full: 2.5")])
-def test_levels_are_told_with_their_unit(unit: str, told: str):
+def test_levels_are_reported_with_their_unit(unit: str, told: str):
     plot = TimePlot(title="", quantity="x", unit=unit, curves=(), levels=(Level(label="full", value=2.5),))
     assert plot.level_labels == (told,)
 

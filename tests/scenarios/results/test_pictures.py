@@ -1,4 +1,4 @@
-"""Camera pictures in a run's folder: what is written is read back, and nothing of an earlier end stays."""
+"""Camera pictures in a run's folder: they are read back as written, and none of an earlier run remain."""
 
 import json
 from pathlib import Path
@@ -51,7 +51,7 @@ def test_pictures_of_an_earlier_end_do_not_stay(tmp_path: Path):
 
 
 @pytest.mark.parametrize("content", ["[{]", '[{"t": 0.0}]', "[1]", '{"a": 1}'])
-def test_a_damaged_list_is_told_as_such(content: str, tmp_path: Path):
+def test_a_damaged_list_is_reported_as_such(content: str, tmp_path: Path):
     (tmp_path / "pictures").mkdir()
     (tmp_path / "pictures" / "pictures.json").write_text(content)
     with pytest.raises(InvalidRunFolder, match=r"its pictures\.json is damaged"):

@@ -26,7 +26,7 @@ def test_a_folder_with_something_in_it_is_refused(tmp_path: Path):
     assert (tmp_path / "mine").read_text() == "precious"
 
 
-def test_a_file_in_the_way_is_told(tmp_path: Path):
+def test_a_file_in_the_way_is_reported(tmp_path: Path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidRunFolder, match="file of that name"):
         RunFolder(tmp_path / "file")
@@ -43,7 +43,7 @@ def test_a_place_without_permission_is_refused(tmp_path: Path, monkeypatch: pyte
         RunFolder(tmp_path / "new")
 
 
-def test_a_package_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch):
+def test_a_package_that_is_not_installed_is_reported(monkeypatch: pytest.MonkeyPatch):
     def missing(package: str) -> str:
         raise importlib.metadata.PackageNotFoundError(package)
 

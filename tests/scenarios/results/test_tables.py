@@ -1,4 +1,4 @@
-"""What the end of a run and its report tell of the master: conversions, steps, pace, failures."""
+"""What a run's output and its report say about the master: conversions, steps, pace, failures."""
 
 import json
 from fractions import Fraction
@@ -55,7 +55,7 @@ def run(file: Path, out: Path, *arguments: str) -> str:
 
 
 @pytest.mark.parametrize("pairs", [1, 4])
-def test_conversions_are_told_in_run_json_terminal_and_report(pairs: int, tmp_path: Path):
+def test_conversions_are_reported_in_run_json_terminal_and_report(pairs: int, tmp_path: Path):
     s = System()
     for i in range(pairs):
         a, b = s.add(f"a{i}", native_fmu("workshop", 3)), s.add(f"b{i}", native_fmu("si", 3))
@@ -82,7 +82,7 @@ def test_conversions_are_told_in_run_json_terminal_and_report(pairs: int, tmp_pa
     assert sum(" -> " in row[0] for row in rows if row) == 3 * pairs
 
 
-def test_the_report_tells_how_units_were_coupled(tmp_path: Path):
+def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear")
     page, summary = Page(out / "report.html"), json.loads((out / "summary.json").read_text())
@@ -100,7 +100,7 @@ def test_the_report_tells_how_units_were_coupled(tmp_path: Path):
     assert any(row[2:3] == ["varies"] for row in page.rows)
 
 
-def test_iterations_are_told_once():
+def test_iterations_are_reported_once():
     metrics = {"iterations": {"value": 2.5}, "rollbacks": {"value": 7.0}}
     master = {"algorithm": "newton", "tolerance": 1e-8, "iterations": 100, "extrapolation": "hold", "adaptive": None,
               "repeat_discarded": True}  # fmt: skip
@@ -127,4 +127,4 @@ def test_a_failure_s_log_is_shown_and_what_is_not_known_is_not_zero(tmp_path: Pa
     write_run_page(folder)
     page = Page(folder.report)
     assert page.pre == "tendon <3> tore\nsorry"
-    assert page.headings == ["What was told of arm", "Master", "Files"]
+    assert page.headings == ["Log of arm", "Master", "Files"]

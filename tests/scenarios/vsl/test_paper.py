@@ -1,4 +1,4 @@
-"""What the code has as defaults is what `paper.toml` tells the origin of."""
+"""The code's defaults are the values whose origins `paper.toml` gives."""
 
 import dataclasses
 import math
@@ -100,7 +100,7 @@ def test_the_arm_starts_where_the_scenario_has_it_start(paper: Paper):
     np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(paper["arm"]["q_0"]["value"]))
 
 
-def test_the_training_is_as_told(paper: Paper):
+def test_the_training_is_as_stated(paper: Paper):
     as_paper = {name: entry["value"] for name, entry in paper["training"].items()}
     points = next(p.default for p in vsl_train.params if p.name == "points")
     assert as_paper.pop("points") == points

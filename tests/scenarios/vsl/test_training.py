@@ -130,7 +130,7 @@ def test_another_seed_gives_another_model():
         (["--plant", "text.fmu"], "not an FMU"),
     ],
 )
-def test_a_bad_call_is_told_in_a_line(arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_usage_errors_take_a_line(arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.json").mkdir()
     (tmp_path / "text.fmu").write_text("text")
@@ -166,13 +166,13 @@ def test_an_arm_that_teaches_nothing_is_refused(arm: str, text: str, tmp_path: P
     assert not (tmp_path / "m.json").exists()
 
 
-def test_a_folder_that_goes_away_is_told_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def gone(training: VslTraining, _progress: Callable[[float, float], None]) -> tuple[VslModel, Errors]:
         (tmp_path / "a").rmdir()
         return shipped(), training.errors(shipped(), points(10, np.zeros(3), np.zeros(3)))
 
     (tmp_path / "a").mkdir()
-    monkeypatch.setattr(VslTraining, "carry_out", gone)
+    monkeypatch.setattr(VslTraining, "train", gone)
     result = call("--out", tmp_path / "a" / "m.json")
     assert result.exit_code == 2
     assert "No such file or directory" in result.output

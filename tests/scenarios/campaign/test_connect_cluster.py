@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from clusters import scheduler, worker
-from crew_orders import bad_job, job
-from living import lives, parent, servers, until
+from processes import lives, parent, servers, until
+from sample_jobs import bad_job, job
 
 from handover.scenarios.campaign.local_cluster import connect_cluster
 from handover.scenarios.campaign.scheduler import scheduler_address
@@ -29,7 +29,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str, None, No
         yield address
 
 
-def test_threads_of_a_worker_carry_out_runs_side_by_side(address: str, tmp_path: Path):
+def test_threads_of_a_worker_execute_runs_in_parallel(address: str, tmp_path: Path):
     runs = tmp_path / "runs"
     jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
     jobs.append(bad_job(runs, "Crashes", tmp_path))
@@ -46,8 +46,8 @@ def test_threads_of_a_worker_carry_out_runs_side_by_side(address: str, tmp_path:
 def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp_path: Path):
     runs = tmp_path / "runs"
     jobs = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
-    (tmp_path / "orders").write_bytes(pickle.dumps(jobs))
-    program = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders"), address]
+    (tmp_path / "jobs").write_bytes(pickle.dumps(jobs))
+    program = [sys.executable, str(Path(__file__).with_name("pool_program.py")), str(tmp_path / "jobs"), address]
     with worker(tmp_path, address, threads=2) as process:
         with subprocess.Popen(program) as command:
             try:
@@ -109,11 +109,11 @@ def test_a_worker_that_does_not_see_the_folder_is_refused(
 def test_workers_that_are_killed_are_replaced(address: str, tmp_path: Path):
     runs = tmp_path / "runs"
     with worker(tmp_path, address) as process, connect_cluster(address) as pool:
-        entries: list[str] = []
+        names: list[str] = []
         for result in pool.run_jobs([job(runs, f"run_{i}", seed=i) for i in range(4)]):
-            if not entries:
+            if not names:
                 (server,) = servers(process)
                 os.kill(parent(server), signal.SIGKILL)
             assert result.lost == ""
-            entries.append(result.name)
-    assert sorted(entries) == [f"run_{i}" for i in range(4)]
+            names.append(result.name)
+    assert sorted(names) == [f"run_{i}" for i in range(4)]

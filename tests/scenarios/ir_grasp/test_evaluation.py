@@ -74,7 +74,7 @@ def test_an_object_that_comes_along_and_stays_is_held():
 @pytest.mark.parametrize(
     ("phase", "stop_reasons"), [(Phase.PULL, "during the pull"), (Phase.SHAKE, "during the shake")]
 )
-def test_an_object_that_slipped_out_is_not_held_and_it_is_told_when(phase: Phase, stop_reasons: str):
+def test_an_object_that_slipped_out_is_not_held_and_it_is_reported_when(phase: Phase, stop_reasons: str):
     lost: dict[str, Any] = {"p_HO": (0.2, 0.0), "touching": 0}
     between = [(5.0, signals(Phase.SHAKE))] if phase is Phase.SHAKE else []
     evaluator = grasp(*between, (5.5, signals(phase, **lost)), *((t, signals(Phase.DONE, **lost)) for t in (7.0, 7.4)))
@@ -91,7 +91,7 @@ def test_a_hand_that_closed_beside_the_object_says_where_it_is():
     assert "without touching the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
 
 
-def test_a_finger_that_sees_nothing_is_told_from_one_at_the_end_of_its_range():
+def test_a_finger_that_sees_nothing_is_distinguished_from_one_at_the_end_of_its_range():
     def stop_reasons(seen: float, true: float) -> list[str]:
         closing = signals(Phase.CLOSE, index=(seen, true))
         metrics = follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics

@@ -110,7 +110,7 @@ def test_a_path_that_never_began_fails_without_errors():
     assert not outcome.metrics
 
 
-def test_points_that_fell_between_two_periods_are_told():
+def test_points_that_fell_between_two_periods_are_reported():
     metrics = follow(PathEvaluator(Parameters(points=2), hybrid=False), *path(0.01, 0.02, 0.03)).outcome().metrics
     assert metrics["points_visited"].value == 3
     assert metrics["points_visited"].description.startswith("points visited of the path's 4; the others fell between")
@@ -118,7 +118,7 @@ def test_points_that_fell_between_two_periods_are_told():
     assert metrics["points_visited"].description == "points visited of the path's 2"
 
 
-def test_links_below_the_ground_are_told():
+def test_links_below_the_ground_are_reported():
     above = follow(PathEvaluator(Parameters(), hybrid=False), *path(0.01, 0.02)).outcome()
     assert above.metrics["lowest"].value == pytest.approx(0.04)
     assert "ground" not in above.reason
@@ -129,7 +129,7 @@ def test_links_below_the_ground_are_told():
     assert below.outcome().reason.endswith("the links dipped 42.1 mm below it")
 
 
-def test_the_hybrid_tells_of_its_forward_model_and_of_extrapolation():
+def test_the_hybrid_reports_its_forward_model_and_of_extrapolation():
     evaluator = follow(PathEvaluator(HybridParameters(), hybrid=True), *path(0.003, 0.003, outside=True))
     metrics = evaluator.outcome().metrics
     assert metrics["estimate_error"].value == pytest.approx(0.0025)

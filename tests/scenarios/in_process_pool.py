@@ -1,4 +1,4 @@
-"""A worker pool in this process, for tests of what is around worker pools: it carries runs out one after another."""
+"""A worker pool in this process, for tests of the code that uses worker pools: it executes runs one after another."""
 
 import os
 import shutil
@@ -10,9 +10,9 @@ from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 
 
 class InProcessPool:
-    """Carries out real runs; `before` is called with each order and may raise, or return why the run is lost."""
+    """Executes real runs; `before` is called with each job and may raise, or return why the run is lost."""
 
-    def __init__(self, before: Callable[[RunJob], str] = lambda _order: "") -> None:
+    def __init__(self, before: Callable[[RunJob], str] = lambda _job: "") -> None:
         self.begun: list[str] = []
         self._before = before
 

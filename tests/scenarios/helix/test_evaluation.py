@@ -108,7 +108,7 @@ def test_a_moment_is_shown_once():
     assert list(moments(follow((0.0, signals(Phase.WAIT))))) == ["start"]
 
 
-def test_where_the_model_was_is_told_of_the_moment_at_which_the_gripper_began_to_close():
+def test_where_the_model_was_is_reported_of_the_moment_at_which_the_gripper_began_to_close():
     metrics = follow((7.9, signals(Phase.DESCEND)), (8.0, signals(Phase.GRASP))).outcome().metrics
     assert metrics["model_travel"].value == pytest.approx(0.0, abs=1e-12)
     assert metrics["model_mismatch"].value == metrics["arm_travel"].value == pytest.approx(np.hypot(0.16, 0.1))

@@ -1,4 +1,4 @@
-"""Runs of native units that are cut off and go on."""
+"""Runs of native units that are killed and resumed from a checkpoint."""
 
 import sys
 from fractions import Fraction
@@ -14,9 +14,9 @@ from handover.cosim.system.system import System
 
 STOP, EVERY = Fraction(20), Fraction(7, 2)
 PASSED = 10.0
-"""When a run tells that it may be killed, s."""
+"""Time at which a run prints that it may be killed, s."""
 WAITS = 10.4
-"""When it waits for that, before its next checkpoint, s."""
+"""Time at which it waits to be killed, before its next checkpoint, s."""
 
 
 def record_of(folder: Path) -> Path:
@@ -51,8 +51,8 @@ def run(folder: Path, *others: Observer) -> None:
         master.run(STOP, [recorder, *others, write])
 
 
-def go_on(folder: Path) -> float:
-    """Go on from the checkpoint, with more of them; return its time."""
+def resume(folder: Path) -> float:
+    """Resume from the checkpoint and write further ones; return its time."""
     c = read_checkpoint(checkpoint_of(folder))
     with Master(oscillator()) as master:
         c.restore(master)
@@ -63,7 +63,7 @@ def go_on(folder: Path) -> float:
 
 
 def stop_to_be_killed(t: float, signals: Signals) -> None:  # noqa: ARG001
-    """Tell when a time is passed, go on for a while, and wait before the next checkpoint is written."""
+    """Print when PASSED is reached, go on, and wait at WAITS, before the next checkpoint is written."""
     if t >= PASSED:
         sys.stdout.write("passed\n")
         sys.stdout.flush()

@@ -43,7 +43,7 @@ def test_contradictions_are_refused(changes: dict[str, Any], text: str):
         HandAndObject(replace(Params(), **changes))
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_together():
     with pytest.raises(InvalidHandParameters) as caught:
         HandAndObject(Params(motion=Motion.GIVE, aperture=0.01, pull_direction=np.zeros(3)))
     assert len(caught.value.faults) >= 3

@@ -1,11 +1,11 @@
-"""A campaign of 60 runs loses nothing when a worker or its command is killed, and repeats nothing."""
+"""A campaign of 60 runs loses and repeats no run when a worker or its command is killed."""
 
 import signal
 from pathlib import Path
 
 import pytest
 from clusters import scheduler, worker
-from sweeping import ended, runs_in, sweeping, wait_for, without_times, workers_of
+from sweep_process import ended, runs_in, sweeping, wait_for, without_times, workers_of
 
 from handover.scenarios.campaign.table import CampaignTable
 

@@ -1,4 +1,4 @@
-"""A program that gives jobs to a worker pool, local or at an address, and prints the results; tests kill it meanwhile."""
+"""A program that runs jobs in a worker pool, local or at an address, and prints the results; tests kill it."""
 
 import pickle
 import sys

@@ -1,4 +1,4 @@
-"""What a master calls of its units, in order."""
+"""Records the calls that a master makes to its units, in order."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.system.system import System
 
 
-class Called(Heartbeat):
+class CallLog(Heartbeat):
     """A heartbeat that keeps every call as (instance, call)."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A refused call leaves an instance as it is, to the last byte of its state."""
+"""A rejected call leaves an instance as it is, to the last byte of its state."""
 
 import ctypes
 

@@ -1,10 +1,10 @@
-"""A call asks once whether a scheduler is where it says."""
+"""A command asks only once whether there is a scheduler at the address."""
 
 import contextlib
 from collections.abc import Generator
 
 import pytest
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign import scheduler as scheduler_address
@@ -26,9 +26,9 @@ def test_workers_are_those_of_the_scheduler_that_has_answered(checked: bool, mon
 
     monkeypatch.setattr(scheduler_address, "scheduler_address", result)
     monkeypatch.setattr(local_cluster, "connect_cluster", connect_cluster)
-    workforce = PoolConfig(scheduler="h:1")
+    config = PoolConfig(scheduler="h:1")
     if checked:
-        workforce.check()
-    with workforce.start():
+        config.check()
+    with config.start():
         assert asked == ["h:1", "tcp://h:1"]
-    assert str(workforce) == "the workers of h:1"
+    assert str(config) == "the workers of h:1"

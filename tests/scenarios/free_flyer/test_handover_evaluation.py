@@ -107,7 +107,7 @@ def test_a_lost_object_ends_the_run_soon():
     assert follow(evaluator, (21.6, signals(Phase.SIGNAL, Holder.FREE))).over
 
 
-def test_a_pull_that_never_came_is_told_with_the_greatest_speed():
+def test_a_pull_that_never_came_is_reported_with_the_greatest_speed():
     waiting = [(t, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.0123)) for t in (40.0, 60.0)]
     ends = [(t, signals(Phase.GIVEN_UP, Holder.GRIPPER)) for t in (82.0, 83.0)]
     evaluator = follow(to_person(), *given()[:6], *waiting, *ends)
@@ -119,13 +119,13 @@ def test_a_pull_that_never_came_is_told_with_the_greatest_speed():
     assert "transfer_time" not in outcome.metrics
 
 
-def test_a_robot_that_did_not_arrive_tells_how_near_it_came():
+def test_a_robot_that_did_not_arrive_says_how_near_it_came():
     far = [(t, signals(Phase.MOVE_TO_HANDOVER, Holder.GRIPPER, away=0.31)) for t in (20.0, 60.0)]
     evaluator = follow(to_person(), *given()[:3], *far, (70.0, signals(Phase.GIVEN_UP, Holder.GRIPPER, away=0.31)))
     assert "came no nearer than 0.31 m" in evaluator.outcome().reason
 
 
-def test_a_gripper_that_closed_beside_the_object_is_told():
+def test_a_gripper_that_closed_beside_the_object_is_reported():
     evaluator = follow(to_person(), *given()[:2], (12.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.4)))
     assert "found nothing" in evaluator.outcome().reason
 
@@ -153,7 +153,7 @@ def test_the_staged_failure_must_have_been_noticed():
 
 
 def asked_again() -> HandoverEvaluator:
-    """Return a watch that saw a first push at 20 s, found in vain, and another signal at 30 s."""
+    """Return an evaluator that saw a first push at 20 s, without success, and another signal at 30 s."""
     evaluator = HandoverEvaluator(HandoverParameters(), ("GRIPPER",), failures=1)
     return follow(
         evaluator,
@@ -175,13 +175,13 @@ def test_a_push_in_vain_is_kept_apart_from_the_one_that_counts():
     assert (transfer.in_vain, transfer.felt, transfer.speed) == ([20.0], 40.0, 0.03)
 
 
-def test_a_wait_after_a_failed_reception_is_told_from_the_last_signal():
+def test_a_wait_after_a_failed_reception_is_distinguished_from_the_last_signal():
     reason = follow(asked_again(), (92.0, signals(Phase.GIVEN_UP, Holder.HAND, failed=1))).outcome().reason
     assert "never felt a push within 62 s" in reason
     assert "below 0.004 m/s" in reason
 
 
-def test_a_robot_that_gave_up_on_the_way_to_the_object_is_not_told_of_the_handover_place():
+def test_a_robot_that_gave_up_on_the_way_to_the_object_is_not_reported_of_the_handover_place():
     way = [(t, signals(Phase.MOVE_TO_OBJECT, Holder.FREE, away=0.6)) for t in (1.0, 30.0)]
     reason = follow(to_person(), *way, (61.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.6))).outcome().reason
     assert reason == "the robot gave up in phase MOVE_TO_OBJECT; nobody holds it"

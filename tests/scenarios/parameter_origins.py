@@ -1,4 +1,4 @@
-"""Compares the defaults of declared parameters with the group of a `paper.toml` that tells their origin."""
+"""Compares the defaults of declared parameters with the group of a `paper.toml` that gives their origins."""
 
 from typing import Any
 
@@ -8,11 +8,11 @@ from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.variable import Causality
 
 
-def assert_every_default_has_its_origin(facts: dict[str, dict[str, Any]], params: type[Any]) -> None:
-    """All parameters but the seed are told, with the code's values and units."""
+def assert_every_default_has_its_origin(group: dict[str, dict[str, Any]], params: type[Any]) -> None:
+    """The group has all parameters but the seed, with the code's values and units."""
     declared = {v.name: v for v in declared_variables(params, Causality.PARAMETER)}
-    assert set(facts) == set(declared) - {"seed"}
-    for name, entry in facts.items():
+    assert set(group) == set(declared) - {"seed"}
+    for name, entry in group.items():
         default: Any = getattr(params(), name)
         value = default.name.lower() if declared[name].items else default
         assert np.array_equal(value, entry["value"]), name

@@ -1,4 +1,4 @@
-"""How a system is stepped, as its options and its units ask: with which ensemble, coupling and stepper."""
+"""Chooses how a system is stepped, by its options and its units: with which ensemble, coupling and stepper."""
 
 from collections.abc import Sequence
 
@@ -21,14 +21,13 @@ from handover.cosim.system.system import System
 
 
 class StepperFactory:
-    """Makes what steps a system; what does not go together is refused before anything is loaded.
+    """Makes what steps a system; options that do not fit it are rejected before anything is loaded.
 
     Attributes:
         schedule: the grid and the order of the units.
 
     Raises:
-        ScheduleError: see `Schedule`, `check_control` and `check_off_grid`, or units make circles that cannot be
-            solved.
+        ScheduleError: see `Schedule`, `check_control` and `check_off_grid`, or there are cycles that cannot be solved.
     """
 
     def __init__(self, system: System, options: MasterOptions) -> None:
@@ -48,30 +47,30 @@ class StepperFactory:
     @property
     def iterates(self) -> bool:
         """Whether units repeat steps after a rollback."""
-        going_back = self._options.algorithm is not Algorithm.JACOBI
-        return going_back and any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
+        rolls_back = self._options.algorithm is not Algorithm.JACOBI
+        return rolls_back and any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
 
     def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
-        """Load the units; whoever gave `endings` carries them out, also if this fails."""
+        """Load the units; the caller closes `cleanups`, also if this fails."""
         load = EventEnsemble if self.has_events else Ensemble
         ensemble = load(self._system, heartbeat, cleanups)
         ensemble.measures_cpu = self._options.cpu_times
         return ensemble
 
     def initialize(self, ensemble: Ensemble) -> None:
-        """Take the units through initialisation mode, algebraic loops solved."""
+        """Take the units through initialisation mode; algebraic loops are solved."""
         schedule = self.schedule
         values = InitialValues(ensemble, schedule.groups, schedule.initial_passes, self._solver)
         ensemble.initialize(schedule.slots, values)
 
     def couple(self, ensemble: Ensemble) -> Coupling:
-        """Return what the algorithm does with units that are due."""
+        """Return the coupling of the algorithm."""
         if self._options.algorithm is Algorithm.JACOBI:
             return Jacobi(ensemble)
         return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
 
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
-        """Return what moves initialised units through time, as a compiled plan where that does the same."""
+        """Return a stepper for initialised units, which is a compiled plan where that does the same."""
         control = self._options.adaptive
         if isinstance(ensemble, EventEnsemble) or control is not None:
             log_fallback("steps may end anywhere")
@@ -85,7 +84,7 @@ class StepperFactory:
         return plan or GridStepper(self.schedule, coupling, ensemble.extrapolated_inputs)
 
     def _groups(self) -> Sequence[Group]:
-        """Return the units that are not sampled, those together that have to agree at each step."""
+        """Return the units that are not sampled, in groups that iterate together at each step."""
         if not self._options.algorithm.iterates:
             return self.schedule.continuous_groups
         groups = groups_of_data_flow(self._system, [s.unit for s in self.schedule.continuous], self.schedule.loops)

@@ -1,4 +1,4 @@
-"""Campaigns by the real command, in processes of their own, for tests that disturb them."""
+"""Campaigns by the command `handover sweep` in processes of their own, for tests that interrupt or kill them."""
 
 import contextlib
 import subprocess
@@ -13,34 +13,34 @@ import psutil
 from handover.scenarios.campaign.table import CampaignTable
 
 _ENTRY = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()"]
-Going = subprocess.Popen[str]
+SweepProcess = subprocess.Popen[str]
 
 
 @contextlib.contextmanager
-def sweeping(*arguments: str | Path) -> Generator[Going, None, None]:
+def sweeping(*arguments: str | Path) -> Generator[SweepProcess, None, None]:
     """Start `handover sweep`; at the end it and what it started are ended."""
     call = [*_ENTRY, "sweep", *map(str, arguments)]
-    going = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    sweep = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        yield going
+        yield sweep
     finally:
-        end(going)
+        end(sweep)
 
 
-def ended(going: Going) -> tuple[int, str, str]:
+def ended(sweep: SweepProcess) -> tuple[int, str, str]:
     """Wait for the end of a command; return its status and what it printed."""
-    out, errors = going.communicate(timeout=600)
-    return going.returncode, out, errors
+    out, errors = sweep.communicate(timeout=600)
+    return sweep.returncode, out, errors
 
 
-def end(going: "subprocess.Popen[Any]") -> None:
+def end(sweep: "subprocess.Popen[Any]") -> None:
     """End a process and its descendants."""
-    if going.poll() is None:
-        family = [psutil.Process(going.pid), *psutil.Process(going.pid).children(recursive=True)]
+    if sweep.poll() is None:
+        family = [psutil.Process(sweep.pid), *psutil.Process(sweep.pid).children(recursive=True)]
         for process in family:
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
-    going.wait()
+    sweep.wait()
 
 
 def workers_of(process: int) -> list[psutil.Process]:
@@ -50,17 +50,17 @@ def workers_of(process: int) -> list[psutil.Process]:
 
 
 def runs_in(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return the runs that are done, and what changes when one is done again."""
+    """Return the runs that are done, with the inode and time of their summaries, which change if a run is repeated."""
     runs = [p for p in (folder / "runs").glob("[!.]*") if p.is_dir()]
-    facts = {p.name: (p / "summary.json").stat() for p in runs}
-    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in facts.items()}
+    stats = {p.name: (p / "summary.json").stat() for p in runs}
+    return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in stats.items()}
 
 
-def wait_for(condition: Callable[[], Any], going: Going) -> None:
-    """Wait until something is so, while a command goes on."""
+def wait_for(condition: Callable[[], Any], sweep: SweepProcess) -> None:
+    """Wait until a condition is true, while a command runs."""
     deadline = time.monotonic() + 300
     while not condition():
-        assert going.poll() is None, going.communicate()
+        assert sweep.poll() is None, sweep.communicate()
         assert time.monotonic() < deadline
         time.sleep(0.05)
 

@@ -1,4 +1,4 @@
-"""Processes that live, by /proc, and waiting for what comes."""
+"""Processes that are alive, by /proc, and waiting for a condition."""
 
 import contextlib
 import time
@@ -7,19 +7,19 @@ from pathlib import Path
 
 
 def lives(process: int) -> bool:
-    """Return whether a process is there and no zombie."""
+    """Return whether a process exists and is no zombie."""
     with contextlib.suppress(ProcessLookupError, FileNotFoundError):
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False
 
 
 def children(process: int) -> list[int]:
-    """Return the processes that a process has started and that are there."""
-    found: list[int] = []
+    """Return the processes that a process has started and that exist."""
+    processes: list[int] = []
     with contextlib.suppress(ProcessLookupError, FileNotFoundError):
         for thread in Path(f"/proc/{process}/task").iterdir():
-            found += map(int, (thread / "children").read_text().split())
-    return found
+            processes += map(int, (thread / "children").read_text().split())
+    return processes
 
 
 def family(process: int) -> list[int]:
@@ -28,7 +28,7 @@ def family(process: int) -> list[int]:
 
 
 def servers(process: int) -> list[int]:
-    """Return the run servers below a process; the runs that they have forked bear their name."""
+    """Return the run servers below a process; the runs that they have forked have the same command line."""
 
     def named(process: int) -> bool:
         with contextlib.suppress(ProcessLookupError, FileNotFoundError):
@@ -44,9 +44,9 @@ def parent(process: int) -> int:
     return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
 
 
-def until(there: Callable[[], bool], seconds: float = 60.0) -> None:
-    """Wait until something is so, for at most some time."""
+def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait until a condition is true, for at most some seconds."""
     end = time.monotonic() + seconds
-    while not there():
-        assert time.monotonic() < end, "it did not come"
+    while not condition():
+        assert time.monotonic() < end, "the condition did not become true"
         time.sleep(0.05)

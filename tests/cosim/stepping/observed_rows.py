@@ -1,4 +1,4 @@
-"""What observers of a run see."""
+"""Rows of signals that an observer of a run sees."""
 
 from fractions import Fraction
 
@@ -10,7 +10,7 @@ from handover.cosim.system.system import System
 Rows = dict[float, tuple[float, ...]]
 
 
-def seen(system: System, stop: Fraction, *names: str, options: MasterOptions | None = None) -> Rows:
+def observed_rows(system: System, stop: Fraction, *names: str, options: MasterOptions | None = None) -> Rows:
     """Run a system; return the values of signals by time, which must increase."""
     rows: Rows = {}
 

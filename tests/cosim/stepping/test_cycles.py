@@ -1,4 +1,4 @@
-"""Which units iterate: those in a cycle, that are due together; the others step once in the order of the data."""
+"""Which units iterate: those of a cycle that are due together; the others step once, in the order of the data flow."""
 
 import json
 from collections import Counter
@@ -34,7 +34,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     return counted
 
 
-def test_units_off_the_circle_step_once(steps: Counter[str]):
+def test_units_off_the_cycle_step_once(steps: Counter[str]):
     s = System()
     after = s.add("after", native_fmu("gain"), period=PERIOD)
     ramp = s.add("ramp", native_fmu("integrator"), u=1.0, period=PERIOD)
@@ -73,7 +73,7 @@ def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorit
 
 
 @both
-def test_what_does_not_converge_is_told_with_signals_time_and_iterations(algorithm: Algorithm):
+def test_what_does_not_converge_is_reported_with_signals_time_and_iterations(algorithm: Algorithm):
     system = TwoMasses(k_c=4000.0).system(PERIOD)
     options = MasterOptions(algorithm=algorithm, tolerance=1e-15, max_iterations=2)
     with pytest.raises(NotConverged) as caught, Master(system, options) as master:
@@ -82,7 +82,7 @@ def test_what_does_not_converge_is_told_with_signals_time_and_iterations(algorit
     assert e.t == 0.0
     assert e.iterations == 2
     assert [name for name, _ in e.moving] == ["b.f -> a.f"]
-    assert "a, b: iterating at t = 0 s came to no solution in 2 iterations" in str(e)
+    assert "a, b: iterating at t = 0 s found no solution in 2 iterations" in str(e)
     assert "b.f -> a.f still moves by" in str(e)
     assert json.loads(json.dumps(e.as_data()))["moving"].keys() == {"b.f -> a.f"}
 
@@ -101,7 +101,7 @@ def test_units_of_several_rates_iterate_with_those_of_their_own(algorithm: Algor
 
 
 @both
-def test_a_circle_may_hold_signals_that_are_not_real(algorithm: Algorithm):
+def test_a_cycle_may_hold_signals_that_are_not_real(algorithm: Algorithm):
     s = System()
     a, b = s.add("a", native_fmu("discrete_passer"), count_in=3), s.add("b", native_fmu("discrete_passer"))
     s.connect(a.y.count, b.u.count_in)

@@ -1,4 +1,4 @@
-"""The table that a killed campaign has left is completed from its runs' folders."""
+"""The table of a killed campaign is rebuilt from its runs' folders."""
 
 import json
 import shutil
@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
-from own_crew import InProcessPool
+from in_process_pool import InProcessPool
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -74,7 +74,7 @@ def test_a_lost_run_stays_lost(tmp_path: Path):
     assert table.column("reason")[0] == "its worker went away"
 
 
-def test_it_is_left_to_the_command_that_is_at_work(folder: CampaignFolder):
+def test_it_is_left_alone_while_a_command_works_on_the_campaign(folder: CampaignFolder):
     before = cut(folder, rows=1)
     with folder.held():
         rebuild_table(folder)
@@ -84,7 +84,7 @@ def test_it_is_left_to_the_command_that_is_at_work(folder: CampaignFolder):
 @pytest.mark.parametrize(
     "change", [{"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}, {"points": 3}, {"points": [3]}]
 )
-def test_what_another_version_has_left_or_is_damaged_is_left(change: dict[str, object], folder: CampaignFolder):
+def test_a_damaged_campaign_or_one_of_another_version_is_left(change: dict[str, object], folder: CampaignFolder):
     before = cut(folder, rows=1)
     file = folder.path / "campaign.json"
     file.write_text(json.dumps({**json.loads(file.read_text(encoding="utf-8")), **change}), encoding="utf-8")
@@ -92,9 +92,9 @@ def test_what_another_version_has_left_or_is_damaged_is_left(change: dict[str, o
     assert folder.table.read_bytes() == before
 
 
-def test_the_page_tells_of_all_runs_that_are_done(folder: CampaignFolder):
+def test_the_page_shows_all_runs_that_are_done(folder: CampaignFolder):
     cut(folder, rows=1)
-    with folder.held():  # as a command that is at work holds it
+    with folder.held():  # as a running command does
         assert "1 of 2 runs so far" in page_of(folder)
     assert "so far" not in page_of(folder)
 

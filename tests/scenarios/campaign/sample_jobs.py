@@ -1,4 +1,4 @@
-"""Orders for worker pools: short grasps, also with units that fail."""
+"""Jobs for worker pools: short grasps, also with units that fail."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -11,7 +11,7 @@ from handover.scenarios.catalog import SCENARIOS
 
 
 def job(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_grasp", seed: int = 3) -> RunJob:
-    """Return an order of a run that goes well."""
+    """Return the job of a run that succeeds."""
     runs.mkdir(exist_ok=True)
     fmus = {unit: str(cached(block, 3)) for unit, block in SCENARIOS[scenario].units.items()}
     options = MasterOptions()
@@ -21,7 +21,7 @@ def job(runs: Path, name: str = "run", *parameters: str, scenario: str = "ir_gra
 
 
 def bad_job(runs: Path, reflex: str, built: Path, name: str = "bad", call_limit: float | None = None) -> RunJob:
-    """Return an order of a run with a reflex of `failing_reflex`, whose FMU is built into a folder."""
+    """Return the job of a run with a reflex of `failing_reflex`, whose FMU is built into a folder."""
     good = job(runs, name)
     fmu = built / f"{reflex}.fmu"
     if not fmu.exists():

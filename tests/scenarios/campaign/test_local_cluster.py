@@ -1,4 +1,4 @@
-"""An embedded crew carries out orders whatever is killed, and leaves no process and no half folder."""
+"""A local cluster runs all jobs whatever is killed, and leaves no process and no incomplete folder."""
 
 import os
 import pickle
@@ -10,8 +10,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from crew_orders import bad_job, job
-from living import family, lives, parent, servers, until
+from processes import family, lives, parent, servers, until
+from sample_jobs import bad_job, job
 
 from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
@@ -33,12 +33,12 @@ def runs(tmp_path: Path) -> Path:
     return tmp_path / "runs"
 
 
-def carried_out(pool: WorkerPool, jobs: Sequence[RunJob]) -> list[JobResult]:
+def results_of(pool: WorkerPool, jobs: Sequence[RunJob]) -> list[JobResult]:
     return sorted(pool.run_jobs(jobs), key=lambda result: result.name)
 
 
 def going(runs: Path) -> bool:
-    """Return whether both of two workers carry out a run."""
+    """Return whether two workers execute a run each."""
     return len(list(runs.glob(".*/signals.tail"))) == 2
 
 
@@ -46,32 +46,32 @@ def test_all_are_answered_and_one_that_fails_ends_no_other(pool: WorkerPool, run
     jobs = [*(job(runs, f"run_{i}", seed=i) for i in range(5)), bad_job(runs, "Crashes", tmp_path)]
     jobs.append(bad_job(runs, "IsKilled", tmp_path, "killed"))
     pool.check(runs)
-    value = carried_out(pool, jobs)
-    assert [result.name for result in value] == ["bad", "killed", *(f"run_{i}" for i in range(5))]
-    assert [result.name for result in value if result.lost] == ["killed"]
-    assert "was killed" in value[1].lost
+    results = results_of(pool, jobs)
+    assert [result.name for result in results] == ["bad", "killed", *(f"run_{i}" for i in range(5))]
+    assert [result.name for result in results if result.lost] == ["killed"]
+    assert "was killed" in results[1].lost
     assert sorted(p.name for p in runs.iterdir()) == ["bad", *(f"run_{i}" for i in range(5))]
     assert len(servers(os.getpid())) == 2  # each worker has had a run
 
 
 def test_a_killed_worker_is_replaced_and_its_run_begun_anew(pool: WorkerPool, runs: Path):
     jobs = [job(runs, f"run_{i}", seed=i) for i in range(8)]
-    value: list[str] = []
+    names: list[str] = []
     for result in pool.run_jobs(jobs):
-        if not value:
+        if not names:
             server = servers(os.getpid())[0]
             os.kill(parent(server), signal.SIGKILL)
             until(lambda: not lives(server))  # noqa: B023 (awaited here)
-        value.append(result.name)
+        names.append(result.name)
         assert result.lost == ""
-    assert sorted(value) == sorted(p.name for p in runs.iterdir()) == [f"run_{i}" for i in range(8)]
+    assert sorted(names) == sorted(p.name for p in runs.iterdir()) == [f"run_{i}" for i in range(8)]
 
 
 def test_a_run_that_always_takes_its_worker_with_it_is_given_up(pool: WorkerPool, runs: Path, tmp_path: Path):
-    (value,) = pool.run_jobs([bad_job(runs, "KillsItsWorker", tmp_path)])
-    assert value.lost == "its worker was lost 4 times: killed, or out of memory"
+    (result,) = pool.run_jobs([bad_job(runs, "KillsItsWorker", tmp_path)])
+    assert result.lost == "its worker was lost 4 times: killed, or out of memory"
     until(lambda: list(runs.iterdir()) == [])  # the last worker's server sees to that when its worker is gone
-    assert carried_out(pool, [job(runs)])[0].lost == ""
+    assert results_of(pool, [job(runs)])[0].lost == ""
 
 
 def test_an_iteration_that_is_left_ends_its_runs(pool: WorkerPool, runs: Path, tmp_path: Path):
@@ -101,8 +101,8 @@ def test_a_command_that_is_ended_leaves_no_process_and_says_nothing(
     number: signal.Signals, status: int, runs: Path, tmp_path: Path
 ):
     hanging = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
-    (tmp_path / "orders").write_bytes(pickle.dumps(hanging))
-    command = [sys.executable, str(Path(__file__).with_name("crew_program.py")), str(tmp_path / "orders")]
+    (tmp_path / "jobs").write_bytes(pickle.dumps(hanging))
+    command = [sys.executable, str(Path(__file__).with_name("pool_program.py")), str(tmp_path / "jobs")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as process:
         try:
             until(lambda: going(runs))

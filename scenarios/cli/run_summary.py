@@ -1,0 +1,80 @@
+"""What a command prints of a run that has ended or crashed, and with which exit status it ends."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import click
+
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.scenarios.cli.console import open_console, print_rows
+from handover.scenarios.execution.child_process import ChildEnd
+from handover.scenarios.execution.crash import Crash
+from handover.scenarios.execution.exit_status import TASK_FAILED, UNIT_FAILED
+from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
+from handover.scenarios.results.summary import RunResult
+from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows
+from handover.scenarios.results.task import Task
+
+_MAX_CONVERSIONS = 8
+"""Conversions of physical units that are listed at the end of a run."""
+
+
+def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder) -> None:
+    """Print how a run ended, the metrics named in the headline, and where its report or results are."""
+    console = open_console()
+    summary = result.summary
+    verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
+    console.print(f"{summary['scenario']} {verdict}: ", end="")
+    console.print(summary["reason"], markup=False, soft_wrap=True)
+    metrics = summary["metrics"]
+    rows = [(metrics[n]["description"] or n, format_metric(metrics[n])) for n in headline if n in metrics]
+    rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
+    rows += pace_rows(summary)
+    rows += _conversion_rows(folder)
+    print_rows(console, rows)
+    place = f"report: {folder.report}" if folder.report.exists() else f"results: {folder.path}"
+    console.print(place, markup=False, soft_wrap=True)
+    if folder.checkpoint.exists():
+        console.print(f"to resume: handover resume {shlex.quote(str(folder.path))}", markup=False, soft_wrap=True)
+
+
+def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
+    conversions = [format_conversion(c) for c in folder.read_run().get("conversions", [])]
+    left = len(conversions) - _MAX_CONVERSIONS
+    more = [(f"{left} conversions more", "in the report")] if left > 0 else []
+    return [(f"converted: {ends}", change) for ends, change in conversions[:_MAX_CONVERSIONS]] + more
+
+
+def exit_with(result: RunResult, task: Task) -> NoReturn:
+    """Print how a run ended, and exit with the status for that."""
+    if result.failure:
+        click.echo(str(result.failure), err=True)
+    print_summary(result, task.experiment.headline, task.folder)
+    sys.exit(UNIT_FAILED if result.failure else 0 if result.outcome.success else TASK_FAILED)
+
+
+_SIGNAL_STATUS = 128  # shells add it to a signal's number
+
+
+def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
+    """Complete the folder of a run that crashed, print how it did, and return the exit status.
+
+    For the arguments see `Crash`.
+    """
+    crash = Crash(heartbeat, end, wall)
+    sys.stderr.write(f"{crash.message}\n")
+    if crash.folder is None:
+        return UNIT_FAILED if crash.failure is not None else _SIGNAL_STATUS + (end.signal or 0)
+    try:
+        result = crash.complete(crash.folder)
+        from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
+
+        with disk_errors_reported(crash.folder.path):
+            write_run_page(crash.folder)
+        print_summary(result, (), crash.folder)
+    except RecordNotWritten as e:
+        sys.stderr.write(f"{e}\n")
+    return UNIT_FAILED
