@@ -74,7 +74,7 @@ def test_the_table_of_robots_names_their_units_and_scenarios():
 
 
 def is_plant(unit: str) -> bool:
-    return UNITS[unit].block.startswith("plants.")
+    return UNITS[unit].block.startswith("handover.plants.")
 
 
 def test_the_table_of_units_has_their_steps_and_standards():

@@ -3,7 +3,7 @@
 import contextlib
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,6 @@ from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
 from handover.scenarios.cli.run_summary import exit_with
-from handover.scenarios.cli.ssp import reject_for_ssp, ssp_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
@@ -28,6 +27,30 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.task import Task
+
+_option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
+_STOP = _option(
+    "--stop",
+    help="When the run ends: at the first communication point at or after it.  [default: the file's own stop time]",
+)
+_STEP = _option("--step", help="Communication step of all units.  [default: what each FMU proposes]")
+
+
+def ssp_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--stop` and `--step`, which are for SSPs."""
+    return _STOP(_STEP(command))
+
+
+def reject_for_ssp(**given: Any) -> None:
+    """Reject options that are for scenarios.
+
+    Raises:
+        UsageError: one of them is given.
+    """
+    used = [name for name, value in given.items() if value]
+    if used:
+        raise UsageError(f"{', '.join(used)}: for scenarios; an SSP has its parameters and units inside")
+
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 
