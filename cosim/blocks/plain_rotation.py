@@ -143,7 +143,7 @@ def multiply(M: Matrix, v: Vector) -> Vector:
 
 
 rotate = multiply
-"""Return R v of a rotation matrix."""
+"""Return R v of a rotation matrix: a name for what is meant where `multiply` is done, at no second call."""
 
 
 def inverse_rotate(R: Matrix, v: Vector) -> Vector:

@@ -5,6 +5,7 @@ of the same process or its parent process, reads there which call hangs or crash
 the same call has been under way.
 """
 
+import ctypes
 import json
 import mmap
 import struct
@@ -166,8 +167,6 @@ class Heartbeat:
     @property
     def address(self) -> int:
         """Address of the cells, for C code."""
-        import ctypes
-
         return ctypes.addressof(ctypes.c_char.from_buffer(self.memory))
 
 

@@ -1,6 +1,6 @@
 """Solvers of x = g(x), the equations of coupled units: relaxed fixed-point iteration and Newton's method.
 
-x are the signals that lead back in a cycle, and g evaluates the units of it once, which is the dear part.
+x are the signals that lead back in a cycle, and g evaluates the units of it once, which is the expensive part.
 """
 
 from collections.abc import Callable, Mapping

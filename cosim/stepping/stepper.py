@@ -98,11 +98,10 @@ class GridStepper:
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks, the coupling's state and that of extrapolated inputs; see `Stepper`."""
-        extrapolated_inputs = (
-            {} if self._extrapolated_inputs is None else {"lines": self._extrapolated_inputs.get_state()}
-        )
+        inputs = self._extrapolated_inputs
+        extrapolation = {} if inputs is None else {"lines": inputs.get_state()}
         ticks = {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
-        return {**ticks, "coupling": self._coupling.get_state(), **extrapolated_inputs}
+        return {**ticks, "coupling": self._coupling.get_state(), **extrapolation}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Restore the ticks that `get_state` returned."""

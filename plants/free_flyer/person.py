@@ -241,11 +241,11 @@ class FlyerPerson:
         self.p = lerp(self._from, p, s)
         self.q = nlerp(self._from_q, q, s)
 
-    def _move_along(self, dt: float, axis: Vector, speed: float, ramp: float, distance: float) -> None:
-        """Move along an axis with a speed that rises smoothly in the time `ramp`, until the distance is reached."""
+    def _move_along(self, dt: float, axis: Vector, speed: float, ramp: float, length: float) -> None:
+        """Move along an axis with a speed that rises smoothly in the time `ramp`, until the length is reached."""
         self._speed = min(1.0, self._speed + dt / ramp)
         x = self._speed
-        self._travelled = min(distance, self._travelled + dt * speed * x * x * (3.0 - 2.0 * x))
+        self._travelled = min(length, self._travelled + dt * speed * x * x * (3.0 - 2.0 * x))
         self.p = add_scaled(self._from, self._travelled, axis)
 
     def _at_object(self, seen: Perception) -> tuple[Vector, Quaternion]:

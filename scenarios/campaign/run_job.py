@@ -19,7 +19,7 @@ from handover.scenarios.execution.runner import run_task
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
-from handover.scenarios.results.summary import ElapsedTime, refused_run, refused_summary
+from handover.scenarios.results.summary import ElapsedTime, unstarted_run, unstarted_summary
 from handover.scenarios.results.task import Task
 
 _REFUSALS = (InitializationError, UnitFailure, WiringError, ScheduleError)
@@ -46,8 +46,8 @@ def record_failed_job(job: RunJob, folder: Path, failure: UnitFailure, spent: El
 
 def _write_refusal(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
     task.folder.make()
-    task.folder.write_run(refused_run(task, refusal))
-    task.folder.write_summary(refused_summary(task, refusal, spent))
+    task.folder.write_run(unstarted_run(task, refusal))
+    task.folder.write_summary(unstarted_summary(task, refusal, spent))
 
 
 def _task(job: RunJob, folder: Path) -> Task:

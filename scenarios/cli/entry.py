@@ -6,6 +6,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 from handover.scenarios.execution.exit_status import ABORTED
 
+if TYPE_CHECKING:
+    from handover.cosim.fmu.heartbeat import Heartbeat
+    from handover.scenarios.execution.child_process import ChildEnd
+
+_SUPERVISED = ("run", "resume")
+"""Commands that load units, which may crash the process that they are in."""
+
 
 def open_standard_streams() -> None:
     """Open standard streams that are closed, as by a daemon or by `>&-`, to the null device.
@@ -20,14 +27,6 @@ def open_standard_streams() -> None:
         if getattr(sys, name) is None:
             mode = "w" if number else "r"
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
-
-
-if TYPE_CHECKING:
-    from handover.cosim.fmu.heartbeat import Heartbeat
-    from handover.scenarios.execution.child_process import ChildEnd
-
-_SUPERVISED = ("run", "resume")
-"""Commands that load units, which may crash the process that they are in."""
 
 
 def main() -> None:

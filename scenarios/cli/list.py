@@ -42,6 +42,9 @@ def print_catalog() -> None:
         ):
             console.print(f"  {heading}", style="italic")
             print_rows(console, [("", name.ljust(width), summary) for name, summary in rows])
+    if others := sorted(set(UNITS) - {unit for system in SYSTEMS for unit in system.units}):
+        console.print("Units that no scenario uses", style="bold")
+        print_rows(console, [("", name.ljust(width), UNITS[name].summary) for name in others])
 
 
 def print_scenario(experiment: type[Experiment[Any]]) -> None:

@@ -38,6 +38,12 @@ def hull(points: Floats) -> Mesh:
     return Mesh(points[kept], np.searchsorted(kept, triangles))
 
 
+def circle(radius: float, corners: int = 24) -> Floats:
+    """Return the corners of a regular polygon in a circle about the origin, shape (corners, 2), counter-clockwise."""
+    angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
 def prism(outline: Floats, low: float, high: float) -> Mesh:
     """Return a convex outline, shape (n, 2), extruded along z from `low` to `high`, with sharp edges."""
     return faceted(hull(np.vstack([np.column_stack([outline, np.full(len(outline), z)]) for z in (low, high)])))

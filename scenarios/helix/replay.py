@@ -11,7 +11,7 @@ from handover.cosim.record.reader import Record
 from handover.plants.helix.shapes import Limb, gripper, hand
 from handover.plants.helix.stereo_camera import Params as CameraParams
 from handover.plants.helix.tendon_parameters import Params as ArmParams
-from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, merged, prism, rod
+from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, circle, merged, prism, rod
 from handover.scenarios.helix.cameras import camera_of
 
 _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
@@ -25,7 +25,6 @@ _FRUSTUM = 0.09
 _PICTURE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 """Corners of a picture, in halves of its width and height from its middle."""
 
-_ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 _OCTAGON = np.radians(np.arange(22.5, 360.0, 45.0))
 
 
@@ -54,7 +53,7 @@ def _plates(record: Record) -> list[Body]:
     backbone, lengths = record["arm.backbone"], ArmParams().tendon_length
     ends = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / float(np.sum(lengths)) * (backbone.shape[1] - 1)
     radius = _PLATE_RADIUS * CameraParams().arm_radius
-    outline = radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+    outline = circle(radius)
     mesh = prism(outline, -_PLATE_THICKNESS / 2, _PLATE_THICKNESS / 2)
     plates: list[Body] = []
     for k in np.rint(ends).astype(int):

@@ -90,7 +90,7 @@ def run_header(facts: RunFacts) -> Markup:
     entries.append(_duration(facts))
     entries += [f"{name} {versions[key]}" for key, name in _VERSIONS.items() if key in versions]
     return Markup(
-        template("run_lead.html").render(
+        template("run_header.html").render(
             entries=[t for t in entries if t],
             verdict=_verdict(facts),
             good=summary["success"],

@@ -1,7 +1,7 @@
 """A run's `summary.json` (how it went) and `run.json` (what was run): declared, made, and checked as they are read.
 
 However a run ends, its summary is made here: `finished_summary`, also where a unit failed; `crashed_summary`, where the
-run's process ended; `refused_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
+run's process ended; `unstarted_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
 Keys stand in the files as the keyword arguments here name them.
 
 Also here: the metrics that every run has, whatever the scenario (`run_metrics`: CPU time, memory, iterations), and the
@@ -211,11 +211,18 @@ def finished_summary(
     metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
     steps: _OfSomeSummaries = {} if master.steps is None else {"steps": asdict(master.steps)}
     summary = Summary(
-        **configuration(task), complete=complete, success=outcome.success, reason=outcome.reason,
-        metrics={name: metric_data(metric) for name, metric in metrics.items()}, simulated_seconds=master.time, **steps,
-        wall_seconds=spent.wall, cpu_seconds=spent.cpu, units=_units(master),
+        **configuration(task),
+        complete=complete,
+        success=outcome.success,
+        reason=outcome.reason,
+        metrics={name: metric_data(metric) for name, metric in metrics.items()},
+        simulated_seconds=master.time,
+        **steps,
+        wall_seconds=spent.wall,
+        cpu_seconds=spent.cpu,
+        units=_units(master),
         failure=None if failure is None else failure.as_data(),
-    )  # fmt: skip
+    )
     if master.pacer is not None:
         summary["pace"] = master.pacer.report.as_data()
     return summary
@@ -230,24 +237,43 @@ def crash_facts(task: Task, master: Master) -> dict[str, Any]:
 
 
 def crashed_summary(
-    configuration: Configuration, units: Sequence[tuple[str, str, str]], reason: str, failure: dict[str, Any],
-    simulated: float, spent: ElapsedTime,
-) -> Summary:  # fmt: skip
+    configuration: Configuration,
+    units: Sequence[tuple[str, str, str]],
+    reason: str,
+    failure: dict[str, Any],
+    simulated: float,
+    spent: ElapsedTime,
+) -> Summary:
     """Return the summary of a run whose process crashed after so many simulated seconds."""
     return Summary(
-        **configuration, complete=False, success=False, metrics={}, simulated_seconds=simulated, cpu_seconds=spent.cpu,
+        **configuration,
+        complete=False,
+        success=False,
+        metrics={},
+        simulated_seconds=simulated,
+        cpu_seconds=spent.cpu,
         units=[UnitData(name=n, model=m, step=s, steps=None, cpu_seconds=None) for n, m, s in units],
-        reason=reason, wall_seconds=spent.wall, failure=failure,
-    )  # fmt: skip
+        reason=reason,
+        wall_seconds=spent.wall,
+        failure=failure,
+    )
 
 
-def refused_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> Summary:
+def unstarted_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> Summary:
     """Return the summary of a run that could not start."""
     reason = failure_reason(refusal) if isinstance(refusal, UnitFailure) else one_line(refusal)
     return Summary(
-        **configuration(task), complete=False, success=False, reason=reason, metrics={}, simulated_seconds=0.0,
-        wall_seconds=spent.wall, cpu_seconds=spent.cpu, units=[], failure=_refusal_data(refusal),
-    )  # fmt: skip
+        **configuration(task),
+        complete=False,
+        success=False,
+        reason=reason,
+        metrics={},
+        simulated_seconds=0.0,
+        wall_seconds=spent.wall,
+        cpu_seconds=spent.cpu,
+        units=[],
+        failure=_error_data(refusal),
+    )
 
 
 def unwritten_summary(run: Mapping[str, Any]) -> dict[str, Any]:
@@ -264,9 +290,9 @@ def begun_run(task: Task, master: Master) -> RunData:
     return _run_data(task, fmus, {"system": system, "conversions": conversions_of(master.system)})
 
 
-def refused_run(task: Task, refusal: CosimError) -> RunData:
+def unstarted_run(task: Task, refusal: CosimError) -> RunData:
     """Return the content of `run.json` for a run that could not start."""
-    return _run_data(task, task.fmus, {"failure": _refusal_data(refusal)})
+    return _run_data(task, task.fmus, {"failure": _error_data(refusal)})
 
 
 def failure_reason(failure: UnitFailure) -> str:
@@ -332,7 +358,7 @@ def _units(master: Master) -> list[UnitData]:
     return units
 
 
-def _refusal_data(refusal: CosimError) -> dict[str, Any]:
+def _error_data(refusal: CosimError) -> dict[str, Any]:
     if isinstance(refusal, InitializationError):
         return refusal.failure.as_data()
     if isinstance(refusal, UnitFailure):

@@ -6,7 +6,7 @@ from handover.controllers.vsl.paths import segments_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.vsl.parameters import Params as ArmParams
-from handover.scenarios.experiment.replay import Body, Line, Replay, ball, prism
+from handover.scenarios.experiment.replay import Body, Line, Replay, ball, circle, prism
 from handover.scenarios.vsl.parameters import Parameters
 
 _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
@@ -15,7 +15,6 @@ _RADIUS_RATIO = 1.2
 """Radius of servos, base and gripper over that of the links (assumed)."""
 _DENSITY, _BELOW = 2700.0, 0.03
 """Density of the ball that the load is drawn as, kg/m3, and how far below the gripper it hangs, m (assumed)."""
-_ROUND = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 
 def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Replay:
@@ -53,7 +52,7 @@ def _arm(shape: Floats) -> list[Line]:
 def _joints(shape: Floats) -> list[Body]:
     """Return the base, and the servos at shoulder and elbow."""
     radius = _RADIUS_RATIO * ArmParams().R_link
-    outline = radius * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
+    outline = circle(radius)
     base = prism(outline, 0.0, float(shape[0, 1, 2] - shape[0, 0, 2]))
     servos = [Body(label="arm", colour=_SERVO, mesh=ball(radius), p_WB=shape[:, k]) for k in (1, 12)]
     return [Body(label="arm", colour=_SERVO, mesh=base, p_WB=shape[:1, 0]), *servos]

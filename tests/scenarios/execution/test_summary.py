@@ -20,8 +20,8 @@ from handover.scenarios.results.summary import (
     faults_of,
     metric_data,
     peak_memory,
-    refused_run,
-    refused_summary,
+    unstarted_run,
+    unstarted_summary,
 )
 from handover.scenarios.results.tables import format_metric
 
@@ -36,14 +36,14 @@ def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
     task, spent = task_of(IrGrasp, tmp_path / "refused"), ElapsedTime(wall=2.0, cpu=1.0)
     finished = run(IrGrasp, tmp_path / "run").summary
     refusal = WiringError(["nothing feeds scene.goal"])
-    refused = refused_summary(task, refusal, spent)
+    refused = unstarted_summary(task, refusal, spent)
     units = [("scene", "GraspScene (FMI 3)", "15 ms")]
     crashed = crashed_summary(configuration(task), units, "it crashed", {"kind": "crash"}, 0.3, spent)
     assert set(finished) == set(crashed) == set(refused)
     for summary in (finished, crashed, refused):
         assert_of(Summary, summary)
     assert_of(RunData, json.loads((tmp_path / "run" / "run.json").read_text()))
-    assert_of(RunData, refused_run(task, refusal))
+    assert_of(RunData, unstarted_run(task, refusal))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

@@ -71,14 +71,20 @@ def test_inverse_residuals_lead_from_the_measured_tip_to_the_command():
 
 
 def test_key_follows_the_sources_of_the_plant_alone(tmp_path: Path):
+    plant, engine = (f"resources/sources/handover/{m}.py" for m in ("plants/vsl/arm", "cosim/blocks/block"))
+
     def key(name: str, **files: bytes) -> str:
-        sources = {"resources/sources/handover/plants/arm.py": b"1", "resources/sources/cosim/block.py": b"2", **files}
+        sources = {
+            "resources/sources/handover/plants/arm.py": b"1",
+            "resources/sources/handover/cosim/blocks/block.py": b"2",
+            **files,
+        }
         return content_key(write_archive(tmp_path / name, sources))
 
     first = key("a.fmu")
     assert key("b.fmu") == first
-    assert key("c.fmu", **{"resources/sources/handover/cosim/block.py": b"3"}) == first
-    assert key("d.fmu", **{"resources/sources/handover/plants/arm.py": b"3"}) != first
+    assert key("c.fmu", **{engine: b"3"}) == first
+    assert key("d.fmu", **{plant: b"3"}) != first
     with zipfile.ZipFile(tmp_path / "e.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", "1")
     assert content_key(tmp_path / "e.fmu") != first
