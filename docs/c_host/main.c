@@ -76,7 +76,7 @@ int main(int argc, char **argv) {
               f_fmi2SetReal(arm, &dl_t, 1, &pull) || f_fmi2ExitInitializationMode(arm);
     for (int k = 0; k < 50 && !bad; k++) bad = f_fmi2DoStep(arm, k * step, step, 1);
     if (!bad) bad = f_fmi2GetReal(arm, p_WG, 3, p) || f_fmi2Terminate(arm);
-    if (!bad) printf("gripper at x = %.4f m, z = %.4f m\n", p[0], p[1], p[2]);
+    if (!bad) printf("gripper at x = %.4f m, z = %.4f m\n", p[0], p[2]);
     f_fmi2FreeInstance(arm);
     return bad != 0;
 }

@@ -204,7 +204,7 @@ def test_fmpys_own_simulation_follows_the_events(workshop: Workshop):
 def test_a_block_has_all_of_the_event_methods_or_none():
     assert describe(BouncingBall).has_events
 
-    with pytest.raises(DeclarationError, match=r"Half.handle_event: a block that has advance has this method too"):
+    with pytest.raises(DeclarationError, match=r"Half.handle_event: a block with advance needs this method too"):
         describe(Half)
 
     class Sampled(BouncingBall):

@@ -146,10 +146,10 @@ def test_a_run_that_can_go_on_is_reported_how(copy: Path, capsys: pytest.Capture
     }
     ended = RunResult(outcome=Outcome(success=False, reason="interrupted"), summary=cast(Summary, summary))
     print_summary(ended, (), RunFolder.of_run(copy))
-    assert f"to go on: handover resume {copy}\n" in capsys.readouterr().out
+    assert f"to resume: handover resume {copy}\n" in capsys.readouterr().out
     (copy / "checkpoint.zip").unlink()
     print_summary(ended, (), RunFolder.of_run(copy))
-    assert "to go on" not in capsys.readouterr().out
+    assert "to resume" not in capsys.readouterr().out
 
 
 def assert_refused(folder: Path, data: str) -> None:
