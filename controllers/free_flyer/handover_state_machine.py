@@ -82,7 +82,7 @@ class Outputs:
     impedance: bool = output("impedance control is on")
     pose: bool = output("pose control is on")
     closure: Number = output("gripper command: 0 open, 1 closed", minimum=0.0, maximum=1.0)
-    light: bool = output("signal light: it comes on when the robot is ready for the person")
+    light: bool = output("signal light: its beginning tells the person that the robot is ready")
     failed_receptions: int = output("times that the gripper closed on nothing", minimum=0.0)
     speed_G: MetrePerSecond = output("speed of the gripper, low-passed, as it is monitored", minimum=0.0)
 

@@ -70,11 +70,11 @@ class Outputs:
     p_WG_goal: Vector3[Metre] = output("point of the path to move to, in the world")
     q_ref: Vector3[Radian] = output("joint angles that put the tip of a rigid arm there, [Gandarias2020] eqs. (2)-(4)")
     qd_ref: Vector3[RadianPerSecond] = output(
-        "joint velocities that lead there, by the inverse Jacobian, [Gandarias2020] eq. (8)"
+        "joint velocities on the way there, by the inverse Jacobian, [Gandarias2020] eq. (8)"
     )
     p_cmd: Vector2[Pascal] = output("pressure commands of links 2 and 3")
     segment: int = output("segment of the path, from 1; 0 before it begins")
-    moving: bool = output("the tip moves along the path")
+    moving: bool = output("the tip is on its way along the path")
     done: bool = output("the path has ended")
 
 
