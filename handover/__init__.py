@@ -1,4 +1,5 @@
 """Robots that hand objects over, as Functional Mock-up Units, and the master that co-simulates them.
 
-The five parts are folders beside this one; here are links to them, so that all is imported under this one name.
+`handover.cosim` is the engine; `handover.plants` and `handover.controllers` have the robots' models and controllers;
+`handover.fmus` makes units of them; `handover.scenarios` has the experiments and the command line.
 """

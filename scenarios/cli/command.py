@@ -4,6 +4,8 @@ from importlib import import_module
 
 import click
 
+from handover.scenarios.execution.exit_status import abort
+
 _HELP = """Robots that hand objects over, co-simulated as Functional Mock-up Units.
 
 \b
@@ -61,7 +63,10 @@ class DeferredCommand(click.Command):
     def load(self) -> click.Command:
         """Return the command itself."""
         module, _, attribute = self.path.partition(":")
-        command: click.Command = getattr(import_module(module), attribute)
+        try:
+            command: click.Command = getattr(import_module(module), attribute)
+        except KeyboardInterrupt:  # click would end with the status of a task that failed
+            abort()
         return command
 
 

@@ -2,9 +2,9 @@
 
 import os
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
-from handover.scenarios.execution.exit_status import ABORTED
+from handover.scenarios.execution.exit_status import abort
 
 if TYPE_CHECKING:
     from handover.cosim.fmu.heartbeat import Heartbeat
@@ -41,14 +41,14 @@ def main() -> None:
             run_to_end(_command)
         _command()
     except KeyboardInterrupt:
-        _abort()
+        abort()
 
 
 def _command() -> None:
     try:
         from handover.scenarios.cli.command import main as command
     except KeyboardInterrupt:
-        _abort()
+        abort()
     command()
 
 
@@ -56,8 +56,3 @@ def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:
     from handover.scenarios.cli.run_summary import report_crash  # only a run that crashed loads it
 
     return report_crash(heartbeat, end, wall)
-
-
-def _abort() -> NoReturn:
-    sys.stderr.write("Aborted!\n")
-    sys.exit(ABORTED)

@@ -1,4 +1,7 @@
-"""Exit statuses of the command `handover`, which its help explains."""
+"""Exit statuses of the command `handover`, which its help explains; loaded before all else of it."""
+
+import sys
+from typing import NoReturn
 
 TASK_FAILED, USAGE_ERROR, UNIT_FAILED = 1, 2, 3
 
@@ -7,3 +10,9 @@ INTERRUPTED = 1
 
 ABORTED = 130
 """Aborted by Ctrl-C: 128 + SIGINT, as shells have it."""
+
+
+def abort() -> NoReturn:
+    """End the process as Ctrl-C does it before a run has begun: a line, and the status of shells."""
+    sys.stderr.write("Aborted!\n")
+    sys.exit(ABORTED)

@@ -113,7 +113,7 @@ class GraspEvaluator(Evaluator):
             "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
             "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
-            "stop": Metric(stop, "1", f"number of why the refinement ended: {stop} is {self._stop}"),
+            "stop": Metric(stop, "1", f"why the refinement ended, by number: {stop} is {self._stop}"),
         }
         for i, finger in enumerate(("thumb", "index", "ring")):
             what = f"{finger} to object as the hand began to close"

@@ -2,12 +2,13 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
 
 from handover.scenarios.catalog import SCENARIOS, SYSTEMS
-from handover.scenarios.cli.command import COMMANDS, main
+from handover.scenarios.cli.command import COMMANDS, DeferredCommand, main
 
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
@@ -71,3 +72,13 @@ def test_scenarios_have_the_names_by_which_they_are_listed():
     assert [*SCENARIOS] == [experiment.name for experiment in SCENARIOS.values()]
     assert [*SCENARIOS] == [experiment.name for system in SYSTEMS for experiment in system.scenarios]
     assert "nothing" not in SCENARIOS
+
+
+def test_ctrl_c_while_a_command_loads_aborts_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "interrupted_command.py").write_text("raise KeyboardInterrupt\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        DeferredCommand("interrupted", "interrupted_command:command").load()
+    assert (ended.value.code, capsys.readouterr().err) == (130, "Aborted!\n")
