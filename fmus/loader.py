@@ -55,7 +55,10 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
-    return modules.load("handover.fmus.slave").Slave(getattr(modules.load(module), name), unit["form"], memory)
+    block = getattr(modules.load(module), name)
+    for deferred in getattr(block, "deferred", ()):  # here, in the host's own thread: libcosim steps units in others
+        modules.load(deferred)
+    return modules.load("handover.fmus.slave").Slave(block, unit["form"], memory)
 
 
 def warning(resources: str) -> str:

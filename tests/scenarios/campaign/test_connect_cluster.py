@@ -82,13 +82,12 @@ def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path):
 
 
 def test_a_worker_without_this_package_is_refused(address: str, tmp_path: Path):
-    (tmp_path / "scenarios").mkdir()
-    (tmp_path / "scenarios" / "__init__.py").touch()
+    (tmp_path / "handover.py").touch()
     places = f"{tmp_path}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     with (
         worker(tmp_path, address, PYTHONPATH=places),
         connect_cluster(address) as pool,
-        pytest.raises(PoolError, match=r"worker tcp://[\d.:]+ cannot run this package: .*scenarios\.campaign"),
+        pytest.raises(PoolError, match=r"worker tcp://[\d.:]+ cannot run this package: .*handover\.scenarios"),
     ):
         pool.check(tmp_path)
 
