@@ -28,6 +28,10 @@ SHORT = {"helix_handover": ("patience=1",)}
 LARGEST = 400_000
 
 
+def test_every_scenario_is_looked_at_here():
+    assert set(MUST_SHOW) == set(SCENARIOS)
+
+
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
 def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
     given = SHORT.get(name, ())
@@ -36,8 +40,7 @@ def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
     replay = SCENARIOS[name]().replay(parse_parameters(SCENARIOS[name], given), record)
     assert replay is not None
     drawn = [*replay.bodies, *replay.lines, *replay.fixed]
-    assert drawn
-    assert {d.label for d in drawn} >= MUST_SHOW.get(name, set())
+    assert {d.label for d in drawn} >= MUST_SHOW[name]
     for d in drawn:
         check(d, len(record.time))
     assert len(replay_section(replay, record).html) < LARGEST
