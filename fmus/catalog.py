@@ -39,15 +39,12 @@ class Entry:
         block: path of the block's class.
         step: its default communication step, in seconds.
         summary: one line for lists.
-        deferred: modules that the block's constructor imports, as they take long to load and its ports can be read
-            without them. A process that makes many instances imports them beforehand.
     """
 
     name: str
     block: str
     step: Fraction
     summary: str
-    deferred: tuple[str, ...] = ()
 
 
 _ENTRIES = (
@@ -56,7 +53,6 @@ _ENTRIES = (
         "handover.plants.helix.tendon_arm:TendonArm",
         Fraction(1, 50),
         "tendon-driven soft arm with a gripper",
-        ("handover.plants.helix.tendon_chain",),
     ),
     Entry(
         "HandoverPartner",
@@ -121,14 +117,12 @@ _ENTRIES = (
         "handover.controllers.free_flyer.impedance_controller:ImpedanceController",
         Fraction(2, 125),
         "makes the gripper yield like a spring and damper",
-        ("control",),
     ),
     Entry(
         "PoseController",
         "handover.controllers.free_flyer.pose_controller:PoseController",
         Fraction(2, 125),
         "flies to a pose",
-        ("control",),
     ),
     Entry(
         "HandoverStateMachine",

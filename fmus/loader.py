@@ -57,7 +57,7 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     module, _, name = unit["block"].partition(":")
     block = getattr(modules.load(module), name)
     for deferred in getattr(block, "deferred", ()):  # here, in the host's own thread: libcosim steps units in others
-        modules.load(deferred)
+        modules.import_from(deferred)
     return modules.load("handover.fmus.slave").Slave(block, unit["form"], memory)
 
 

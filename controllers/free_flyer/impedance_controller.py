@@ -113,6 +113,7 @@ class ImpedanceController:
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
     period: ClassVar[Fraction | None] = PERIOD
+    deferred: ClassVar[tuple[str, ...]] = ("control",)
 
     def __init__(self, params: Params) -> None:
         body, gains, period = params.body(), params.gains(), float(PERIOD)

@@ -150,6 +150,7 @@ class PoseController:
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
     period: ClassVar[Fraction | None] = PERIOD
+    deferred: ClassVar[tuple[str, ...]] = ("control",)
 
     def __init__(self, params: Params) -> None:
         body, self._T = params.body(), float(PERIOD)

@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "399a8d9ce067ac1b7ec31de6dbbda14ca6241e53177152431a10d9751caa54b5",
+   "key": "e268a9fde08f5dfa44154470169cd9c20ae11fd50d99421c1bdba81637ee1ab2",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

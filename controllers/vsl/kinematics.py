@@ -25,7 +25,7 @@ class Unreachable(ValueError):
     """The tip cannot be at a point; `p_WG` is the point, `fault` says why."""
 
     def __init__(self, p_WG: Floats, fault: str) -> None:
-        super().__init__(f"{place(p_WG)}: {fault}")
+        super().__init__(f"{format_point(p_WG)}: {fault}")
         self.p_WG, self.fault = p_WG, fault
 
 
@@ -135,6 +135,6 @@ def _cosine(x: float) -> float:
     return min(1.0, max(-1.0, x))
 
 
-def place(p_WG: Floats) -> str:
+def format_point(p_WG: Floats) -> str:
     """Return a point, shape (3,), m, as text for a message."""
     return "(" + ", ".join(f"{x:.4g}" for x in p_WG.tolist()) + ") m"

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics, place
+from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics, format_point
 from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
@@ -198,14 +198,14 @@ def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> 
         return None
     k, x, fault = bad[0]
     others = f" (and {len(bad) - 1} more of this segment)" if len(bad) > 1 else ""
-    return f"point {k} of {p.N}, {place(x)}{others}: {fault}"
+    return f"point {k} of {p.N}, {format_point(x)}{others}: {fault}"
 
 
 def _fault_between(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
     """Return where a segment whose points are good runs through a singularity between them, and which; or None."""
     for x in segment.sampled(math.ceil(segment.length / _MARGIN), p.V)[0]:
         if fault := _fault(x, kinematics):
-            return f"between its points, at {place(x)}: {fault}"
+            return f"between its points, at {format_point(x)}: {fault}"
     return None
 
 

@@ -20,7 +20,10 @@ class Block(Protocol):
     A block may offer more, see `EventfulBlock` and `DifferentiableBlock`.
 
     Class attributes: `feedthrough` names, by output, the inputs with direct feedthrough to it (within the same
-    communication point); `period` is the sampling period of a block that is sampled, in seconds, else None.
+    communication point); `period` is the sampling period of a block that is sampled, in seconds, else None. `deferred`,
+    which may be left out, names modules that the constructor imports late, as they take long to load and ports are read
+    without them: an FMU loads them when it is instantiated (not every library loads in the thread that a host steps
+    in), and a process that makes many instances loads them once beforehand.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]]

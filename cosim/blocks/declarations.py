@@ -176,10 +176,10 @@ def start_fault(v: Variable) -> str:
     if v.enumeration is not None:
         first = next(iter(v.enumeration))
         wanted = f"an item of {v.enumeration.__name__}, such as {v.enumeration.__name__}.{first.name}"
-        return "" if isinstance(start, v.enumeration) else f"start {_text(start)} is not {wanted}"
+        return "" if isinstance(start, v.enumeration) else f"start {short_repr(start)} is not {wanted}"
     types, wanted = _TYPES[v.kind]
     fits = isinstance(start, types) and (v.kind is Kind.BOOLEAN or not isinstance(start, bool))
-    return "" if fits else f"start {_text(start)} is not {wanted}"
+    return "" if fits else f"start {short_repr(start)} is not {wanted}"
 
 
 def _array_fault(start: Any, shape: tuple[int, ...]) -> str:
@@ -188,7 +188,7 @@ def _array_fault(start: Any, shape: tuple[int, ...]) -> str:
     except (TypeError, ValueError):
         start_shape = None
     if start_shape is None:
-        return f"start {_text(start)} is not an array of numbers, such as np.zeros({shape})"
+        return f"start {short_repr(start)} is not an array of numbers, such as np.zeros({shape})"
     return f"start has the shape {start_shape} where {shape} is declared" if start_shape != shape else ""
 
 
@@ -197,6 +197,7 @@ def _shape(start: Any) -> tuple[int, ...]:
     return np.shape(start) if getattr(start, "dtype", None) == np.uint8 else np.asarray(start, dtype=np.float64).shape
 
 
-def _text(value: Any) -> str:
-    shown = repr(value)
+def short_repr(value: Any) -> str:
+    """Return a value as text for a message: an array as lists, cut after 80 characters."""
+    shown = repr(value.tolist() if isinstance(value, np.ndarray) else value)
     return shown if len(shown) < 80 else shown[:77] + "..."

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.blocks.declarations import declared_variables
+from handover.cosim.blocks.declarations import declared_variables, short_repr
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 
 
@@ -13,23 +13,23 @@ def fault_of(port: Declared, value: Any) -> str | None:
     """Return what is wrong with a value for a port, with the valid values, or None."""
     if port.kind in (Kind.STRING, Kind.BINARY):
         wanted = str if port.kind is Kind.STRING else (bytes, bytearray, memoryview)
-        return None if isinstance(value, wanted) else f"{_text(value)} is not a {port.kind.value}"
+        return None if isinstance(value, wanted) else f"{short_repr(value)} is not a {port.kind.value}"
     if port.kind is Kind.BOOLEAN and not isinstance(value, (bool, np.bool_)):
-        return f"{_text(value)} is neither true nor false"
+        return f"{short_repr(value)} is neither true nor false"
     if port.kind is Kind.ENUMERATION and isinstance(value, str):
         if value.upper() not in [name.upper() for name, _ in port.items]:
-            return f"{_text(value)} is none of {', '.join(name.lower() for name, _ in port.items)}"
+            return f"{short_repr(value)} is none of {', '.join(name.lower() for name, _ in port.items)}"
         return None
     try:
         numbers = numbers_of(port, value)
     except (TypeError, ValueError):
-        return f"{_text(value)} is not {_wanted(port)}"
+        return f"{short_repr(value)} is not {_wanted(port)}"
     if not np.all(np.isfinite(numbers)):
-        return f"{_text(value)} is not finite"
+        return f"{short_repr(value)} is not finite"
     if port.kind is not Kind.REAL and not np.all(numbers == np.round(numbers)):
-        return f"{_text(value)} is not {_wanted(port)}"
+        return f"{short_repr(value)} is not {_wanted(port)}"
     if port.kind is Kind.ENUMERATION and int(numbers[0]) not in [v for _, v in port.items]:
-        return f"{_text(value)} is none of {', '.join(f'{v} ({n.lower()})' for n, v in port.items)}"
+        return f"{short_repr(value)} is none of {', '.join(f'{v} ({n.lower()})' for n, v in port.items)}"
     return _range_fault(port, value, numbers) or _width_fault(port, value, numbers)
 
 
@@ -81,15 +81,10 @@ def _range_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | Non
     low, high = port.minimum, port.maximum
     if (low is None or np.all(numbers >= low)) and (high is None or np.all(numbers <= high)):
         return None
-    return f"{_text(value)} is out of range: {range_of(port)}"
+    return f"{short_repr(value)} is out of range: {range_of(port)}"
 
 
 def _width_fault(port: Declared, value: Any, numbers: NDArray[Any]) -> str | None:
     if port.width is None or all(port.width.holds(number) for number in numbers.tolist()):
         return None
-    return f"{_text(value)} does not fit {port.width.range_text}"
-
-
-def _text(value: Any) -> str:
-    shown = repr(value.tolist() if isinstance(value, np.ndarray) else value)
-    return shown if len(shown) < 80 else shown[:77] + "..."
+    return f"{short_repr(value)} does not fit {port.width.range_text}"

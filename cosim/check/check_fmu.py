@@ -179,7 +179,7 @@ def check_fmu(path: Path, timeout: float) -> CheckReport:
                 continue
             section = _section(name, run_part)
             sections.append(section)
-            if section.level is Level.FAULT and not check.goes_on:
+            if section.level is Level.FAULT and not check.can_continue:
                 reason = f"not reached: see {name}"
     return CheckReport(path, tuple(sections))
 
@@ -195,11 +195,11 @@ def _section(name: str, run_part: Callable[[], tuple[str, list[Finding]]]) -> Se
 
 
 class _Check:
-    """One file's check; each part stores what the next ones need, and in `goes_on` whether they can follow."""
+    """One file's check; each part stores what the next ones need, and in `can_continue` whether they can follow."""
 
     def __init__(self, path: Path, timeout: float, scratch: Path) -> None:
         self.path, self.timeout, self.scratch = path, timeout, scratch
-        self.goes_on = self.is_described = False
+        self.can_continue = self.is_described = False
         self.parts = (
             ("archive", self._archive),
             ("description", self._description),
@@ -224,7 +224,7 @@ class _Check:
         self.fmi = version_of(self.path, self.root)
         variables = variables_of(self.root, self.fmi)
         own = [*variable_findings(self.root, self.fmi, variables), *structure_findings(self.root, self.fmi, variables)]
-        self.goes_on = True
+        self.can_continue = True
         n = len(variables)
         text = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"
         findings = [*standard_findings(self.path, own), *own]
@@ -234,7 +234,7 @@ class _Check:
     def _interface(self) -> tuple[str, list[Finding]]:
         findings = list(interface_findings(self.root, self.fmi))
         interface = next(self.root.named("CoSimulation"), None)
-        self.goes_on = interface is not None
+        self.can_continue = interface is not None
         self.interface = interface or self.root
         self.identifier = self.interface.get("modelIdentifier")
         step = default_step(self.root)
@@ -243,11 +243,11 @@ class _Check:
 
     def _binaries(self) -> tuple[str, list[Finding]]:
         findings = list(binary_findings(self.archive, self.fmi, self.identifier))
-        self.goes_on = all(f.level is not Level.FAULT for f in findings)
+        self.can_continue = all(f.level is not Level.FAULT for f in findings)
         return ", ".join(platforms_in(self.archive)), findings
 
     def _loading(self) -> tuple[str, list[Finding]]:
-        self.goes_on = False
+        self.can_continue = False
         self.folder = self.scratch / "fmu"
         self.archive.unpack(self.folder)
         functions = required_functions(self.fmi)
@@ -263,7 +263,7 @@ class _Check:
                 raise _Skipped("not tried: its description is invalid, see there") from e
             return "", [fault(e.fault)]
         step = default_step(self.root) or _STEP
-        capabilities = dict(_capabilities(self.interface, self.fmi))
+        capabilities = dict(_state_capabilities(self.interface, self.fmi))
         task = {
             "fmu": str(self.path.absolute()),
             "folder": str(self.folder),
@@ -279,7 +279,7 @@ class _Check:
         return ", ".join(parts) or "stopped", report.findings
 
 
-def _capabilities(interface: XmlElement, fmi: int) -> Iterator[tuple[str, bool]]:
+def _state_capabilities(interface: XmlElement, fmi: int) -> Iterator[tuple[str, bool]]:
     word = "state" if fmi == 2 else "State"
     keeps = says(interface, f"canGetAndSetFMU{word}")
     yield "keeps_state", keeps

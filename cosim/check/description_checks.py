@@ -40,7 +40,7 @@ def interface_findings(root: XmlElement, fmi: int) -> Iterator[Finding]:
     identifier = co_simulation.get("modelIdentifier")
     if not _IDENTIFIER.fullmatch(identifier):
         yield fault(f"modelIdentifier {identifier!r} is not an identifier of C", where=where, cure="letters, digits, _")
-    yield from _capabilities(co_simulation, fmi)
+    yield from _capability_findings(co_simulation, fmi)
     for experiment in root.named("DefaultExperiment"):
         yield from _experiment_findings(experiment)
 
@@ -66,7 +66,7 @@ def says(element: XmlElement, flag: str) -> bool:
     return element.get(flag) in ("true", "1")
 
 
-def _capabilities(co_simulation: XmlElement, fmi: int) -> Iterator[Finding]:
+def _capability_findings(co_simulation: XmlElement, fmi: int) -> Iterator[Finding]:
     if says(co_simulation, "needsExecutionTool"):
         yield note(
             "needs other software on each machine that runs it: the tool that it was exported from, or an interpreter"

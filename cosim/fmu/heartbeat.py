@@ -135,7 +135,7 @@ class Heartbeat:
     def status(self, status: int) -> None:
         self._cells[_STATUS] = status + 1
 
-    def tell(self, **facts: Any) -> None:
+    def record_facts(self, **facts: Any) -> None:
         """Keep facts, in addition to those kept before, for the report if this process crashes; JSON must hold them."""
         line = json.dumps({**self.facts, **facts})
         self._facts.clear()
@@ -143,7 +143,7 @@ class Heartbeat:
 
     def record_scratch_folder(self, folder: str) -> None:
         """Keep the path of a folder that is to be removed if this process crashes."""
-        self.tell(scratch=[*self.facts.get("scratch", []), folder])
+        self.record_facts(scratch=[*self.facts.get("scratch", []), folder])
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -208,8 +208,8 @@ class StallTimer:
         """The call that was under way at the last poll."""
         self._seconds, self._checked_at = 0.0, clock()
 
-    def elapsed(self) -> float:
-        """Poll; return the seconds for which the present call has been under way, 0 where there is none."""
+    def poll(self) -> float:
+        """Return the seconds for which the present call has been under way, 0 where there is none."""
         now, beat = self._clock(), self._heartbeat.beat
         passed, self._checked_at = now - self._checked_at, now
         if beat is None or beat != self.beat:

@@ -15,7 +15,6 @@ from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
-from handover.cosim.stepping.gauss_seidel import GaussSeidel
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.stepping.step_control import StepStatistics
@@ -105,7 +104,7 @@ class Master:
     @property
     def iterations(self) -> IterationCount:
         """Counts of iterated steps, their iterations and rollbacks."""
-        return self._coupling.count if isinstance(self._coupling, GaussSeidel) else IterationCount()
+        return IterationCount() if self._coupling is None else self._coupling.count
 
     @property
     def iterates(self) -> bool:

@@ -65,9 +65,11 @@ class StepperFactory:
 
     def couple(self, ensemble: Ensemble) -> Coupling:
         """Return the coupling of the algorithm."""
-        if self._options.algorithm is Algorithm.JACOBI:
-            return Jacobi(ensemble)
-        return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
+        match self._options.algorithm:
+            case Algorithm.JACOBI:
+                return Jacobi(ensemble)
+            case Algorithm.GAUSS_SEIDEL | Algorithm.FIXED_POINT | Algorithm.NEWTON:
+                return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
 
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         """Return a stepper for initialised units, which is a compiled plan where that does the same."""
@@ -81,7 +83,7 @@ class StepperFactory:
         if control is not None:
             return AdaptiveStepper(self.schedule, coupling, ensemble, control, self._options.order)
         plan = plan_stepper(self.schedule, ensemble, coupling, self._options, iterates=self.iterates)
-        return plan or GridStepper(self.schedule, coupling, ensemble.extrapolated_inputs)
+        return plan or GridStepper(self.schedule, coupling, ensemble.extrapolation)
 
     def _groups(self) -> Sequence[Group]:
         """Return the units that are not sampled, in groups that iterate together at each step."""

@@ -47,7 +47,7 @@ def settable_names(d: FmuDescription) -> list[str]:
     return [name for port in (*d.parameters.values(), *d.inputs.values()) for name in entry_names(port)]
 
 
-def taken_apart(d: FmuDescription, names: Collection[str]) -> FmuDescription:
+def split_arrays(d: FmuDescription, names: Collection[str]) -> FmuDescription:
     """Return a description in which the named arrays of scalars are scalars, as they are in the FMU itself."""
     if not names:
         return d

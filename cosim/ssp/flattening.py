@@ -23,10 +23,10 @@ _log = logging.getLogger(__name__)
 Node = tuple[str, str]
 """A connector: the path of its element, empty for the outermost system, and its name."""
 
-GIVES = {"output", "calculatedParameter"}
+OUTPUT_KINDS = {"output", "calculatedParameter"}
 """Kinds of connector that a component gives values by."""
 
-TAKES = {"input", "parameter"}
+INPUT_KINDS = {"input", "parameter"}
 """Kinds of connector that a component takes values by."""
 
 _WHOLE = (Kind.INTEGER, Kind.ENUMERATION)
@@ -182,9 +182,9 @@ class _Flattening:
     def _gives(self, end: SspEnd, node: Node) -> bool | None:
         """Return whether an end is a source within its system; None where it is neither source nor sink."""
         kind = self._connectors[node].kind
-        if kind not in GIVES | TAKES:
+        if kind not in OUTPUT_KINDS | INPUT_KINDS:
             return None
-        return kind in (TAKES if end.element is None else GIVES)
+        return kind in (INPUT_KINDS if end.element is None else OUTPUT_KINDS)
 
     def _follow(self, target: Node) -> None:
         """Follow what feeds a connector through the systems between; add a connection if it is a component's."""
@@ -246,7 +246,7 @@ def _connector_faults(component: SspComponent, path: str, d: FmuDescription) -> 
     faults: list[str] = []
     for c in component.connectors.values():
         entry = find_entry(ports, c.name)
-        if entry is not None and c.kind in TAKES | GIVES:
+        if entry is not None and c.kind in INPUT_KINDS | OUTPUT_KINDS:
             faults += [f"{c.where}{path}.{c.name} {fault}" for fault in _differences(c, entry[0])]
         elif c.kind in ("input", "output", "parameter"):
             near = nearest(c.name, variable_names(d))

@@ -14,7 +14,7 @@ from types import TracebackType
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
-from handover.cosim.ssp.connected_ports import entry_names, find_entry, taken_apart
+from handover.cosim.ssp.connected_ports import entry_names, find_entry, split_arrays
 from handover.cosim.ssp.flattening import FlatConnection, FlatSystem, Node, components_of, flatten
 from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.start_values import start_values
@@ -216,7 +216,7 @@ class SspFile:
         for name, component in flat.components.items():
             path = Path(self._folder.name) / component.member
             unit = system.add(name, path, period=step or component.period, sampled=component.sampled)
-            description = taken_apart(descriptions[name], grouping.apart.get(name, ()))
+            description = split_arrays(descriptions[name], grouping.apart.get(name, ()))
             system.units[name] = replace(unit, description=description, start=starts.get(name, {}))
         for source, target, linear in grouping.wires:
             system.connect(source, target, linear)

@@ -11,7 +11,7 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import Entry, entry_names
 from handover.cosim.ssp.parameter_set import SspValue
-from handover.cosim.system.conversion import LinearTransformation, conversion, pass_as_they_are
+from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
 
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
@@ -32,7 +32,7 @@ def converted(source: Unit, target: Unit) -> LinearTransformation | None:
     Raises:
         ValueError: they differ in dimension, or one of two that differ in name is not defined.
     """
-    if pass_as_they_are(source, target):
+    if needs_no_conversion(source, target):
         return None
     if not (source.defined and target.defined):
         undefined = (target if source.defined else source).symbol

@@ -236,7 +236,7 @@ class _Structure:
                 one, other = (c.source, c.target) if len(from_) < len(to) else (c.target, c.source)
                 faults.append(f"{one} is one array variable and each entry of {other} one; both must be of one kind")
                 continue
-            linear = c.transformation or self._system.change_by(c)
+            linear = c.transformation or self._system.transformation_of(c)
             for y, u in zip(from_, to, strict=True):
                 ends = {"startElement": c.source.unit, "startConnector": y}
                 ends |= {"endElement": c.target.unit, "endConnector": u}

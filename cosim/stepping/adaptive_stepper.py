@@ -119,7 +119,7 @@ class AdaptiveStepper:
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks, the step wanted, and the state of step control and extrapolation; see `Stepper`."""
-        extrapolated_inputs = self._ensemble.extrapolated_inputs
+        extrapolation = self._ensemble.extrapolation
         return {
             "tick": self._tick,
             "due": dict(self._due),
@@ -129,7 +129,7 @@ class AdaptiveStepper:
             "controller": self._controller.get_state(),
             "largest": self._error.get_state(),
             "statistics": dataclasses.asdict(self.statistics),
-            **({} if extrapolated_inputs is None else {"lines": extrapolated_inputs.get_state()}),
+            **({} if extrapolation is None else {"lines": extrapolation.get_state()}),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -141,8 +141,8 @@ class AdaptiveStepper:
         self._controller.set_state(state["controller"])
         self._error.set_state(state["largest"])
         self.statistics = StepStatistics(**state["statistics"])
-        if self._ensemble.extrapolated_inputs is not None:
-            self._ensemble.extrapolated_inputs.set_state(state["lines"])
+        if self._ensemble.extrapolation is not None:
+            self._ensemble.extrapolation.set_state(state["lines"])
 
     def _attempt(self, length: int) -> bool:
         """Try a step from the present states of the units; return whether it was accepted."""

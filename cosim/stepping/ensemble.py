@@ -55,9 +55,9 @@ class CleanupStack:
 class SavedStates(dict[str, State]):
     """Saved states by unit, with what the extrapolation of inputs remembers of these units."""
 
-    def __init__(self, states: Mapping[str, State], extrapolated_inputs: Mapping[str, Memory]) -> None:
+    def __init__(self, states: Mapping[str, State], memories: Mapping[str, Memory]) -> None:
         super().__init__(states)
-        self.extrapolated_inputs = extrapolated_inputs
+        self.memories = memories
 
 
 class Ensemble:
@@ -78,7 +78,7 @@ class Ensemble:
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self.measures_cpu = False
         """Whether CPU time is taken of steps."""
-        self.extrapolated_inputs: LinearExtrapolation | None = None
+        self.extrapolation: LinearExtrapolation | None = None
         """Sets the inputs that are extrapolated; None where all are held."""
         self._feedings: dict[str, Feeding] = {}
         self._finite: dict[str, FiniteCheck] = {}
@@ -123,7 +123,7 @@ class Ensemble:
 
     def extrapolate(self, tick: Fraction) -> None:
         """Extrapolate inputs linearly from now, the start, on; steps are multiples of `tick`, in seconds."""
-        self.extrapolated_inputs = LinearExtrapolation(self.system, self.instances, tick)
+        self.extrapolation = LinearExtrapolation(self.system, self.instances, tick)
 
     def feed(self, unit: str, t: float, dt: float | None = None) -> None:
         """Set a unit's inputs from their sources: as those are, or extrapolated for a step from t to t + dt.
@@ -132,8 +132,8 @@ class Ensemble:
             UnitFailure: the unit does not accept them.
         """
         self.gather(unit, t)
-        if self.extrapolated_inputs is not None and dt is not None:
-            self.extrapolated_inputs.feed(unit, t, dt)
+        if self.extrapolation is not None and dt is not None:
+            self.extrapolation.feed(unit, t, dt)
         self.instances[unit].set_inputs()
 
     def feeding(self, unit: str) -> Feeding:
@@ -173,8 +173,8 @@ class Ensemble:
             UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
-        if self.extrapolated_inputs is not None:
-            self.extrapolated_inputs.step(unit)
+        if self.extrapolation is not None:
+            self.extrapolation.step(unit)
 
     def publish(self, unit: str) -> None:
         """Fetch a unit's outputs, for observers and for the units that they feed.
@@ -185,8 +185,8 @@ class Ensemble:
         instance = self.instances[unit]
         instance.get_outputs()
         self._finite[unit](instance.time, instance.log)
-        if self.extrapolated_inputs is not None:
-            self.extrapolated_inputs.publish(unit)
+        if self.extrapolation is not None:
+            self.extrapolation.publish(unit)
 
     def save(self, units: Collection[str]) -> SavedStates:
         """Save the states of units, of all or none; `restore` rolls back to them, `forget` frees them.
@@ -194,7 +194,7 @@ class Ensemble:
         Raises:
             UnitFailure: a unit does not give its state.
         """
-        states = SavedStates({}, self.extrapolated_inputs.save(units) if self.extrapolated_inputs is not None else {})
+        states = SavedStates({}, self.extrapolation.save(units) if self.extrapolation is not None else {})
         try:
             for name in units:
                 states[name] = self.instances[name].save_state()
@@ -225,8 +225,8 @@ class Ensemble:
 
     def restore(self, states: Mapping[str, State]) -> None:
         """Set saved states and fetch the outputs that belong to them."""
-        if self.extrapolated_inputs is not None and isinstance(states, SavedStates):
-            self.extrapolated_inputs.restore(states.extrapolated_inputs)
+        if self.extrapolation is not None and isinstance(states, SavedStates):
+            self.extrapolation.restore(states.memories)
         for name, state in states.items():
             self.instances[name].restore_state(state)
             self.publish(name)

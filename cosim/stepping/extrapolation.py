@@ -178,7 +178,7 @@ class LinearExtrapolation:
             port=c.target.port,
             history=histories.setdefault(c.source.port, SampleHistory(values)),
             target=target.u[c.target.port][0],
-            change=system.change_by(c) or LinearTransformation(),
+            change=system.transformation_of(c) or LinearTransformation(),
             halves=0 if rate else 2 if feedthrough else 1,
             rate=rate[0] if rate else None,
         )

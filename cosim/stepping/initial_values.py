@@ -37,7 +37,7 @@ class ChainedDerivatives:
             if c.source.port not in self._outputs[c.source.unit]:
                 self._outputs[c.source.unit].append(c.source.port)
         self._back = [c for c in real if c in back]
-        self._factor = {c: change.factor if (change := ensemble.system.change_by(c)) else 1.0 for c in real}
+        self._factor = {c: change.factor if (change := ensemble.system.transformation_of(c)) else 1.0 for c in real}
 
     @property
     def are_given(self) -> bool:

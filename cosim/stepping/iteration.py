@@ -174,8 +174,8 @@ class IteratedStep:
     def _step_one(self, t: float, slot: Slot, x: Floats) -> None:
         self._ensemble.gather(slot.unit, t)
         self._interface.write(slot.unit, x)
-        if self._ensemble.extrapolated_inputs is not None:
-            self._ensemble.extrapolated_inputs.feed(slot.unit, t, slot.period, self._interface.parts(slot.unit, x))
+        if self._ensemble.extrapolation is not None:
+            self._ensemble.extrapolation.feed(slot.unit, t, slot.period, self._interface.parts(slot.unit, x))
         self._ensemble.instances[slot.unit].set_inputs()
         self._ensemble.step(slot.unit, t, slot.period)
         self._ensemble.publish(slot.unit)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.schedule import Slot
 
 
@@ -16,6 +17,7 @@ class Jacobi:
 
     def __init__(self, ensemble: Ensemble) -> None:
         self._ensemble = ensemble
+        self.count = IterationCount()
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
         """Fetch what steps that end at t have computed."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from handover.cosim.stepping.extrapolation import LinearExtrapolation
+from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.schedule import Schedule, Slot
 
 
@@ -41,7 +42,12 @@ class Coupling(Protocol):
 
     At a communication point t, `arrive` is called, then observers see the signals, then `depart`. Both get the units
     that are due there, in the schedule's order. A slot's `period` is the step to take, in seconds.
+
+    Attributes:
+        count: iterated steps, their iterations and rollbacks; all zero where nothing is iterated.
     """
+
+    count: IterationCount
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
         """Bring the signals to what observers see at t."""
@@ -63,13 +69,13 @@ class Coupling(Protocol):
 class GridStepper:
     """Communication points are whole ticks of the schedule's grid at which a unit is due: counted, so without drift.
 
-    `extrapolated_inputs` is what keeps the histories of their sources, None where inputs are held.
+    `extrapolation` sets the inputs that are extrapolated; None where all are held.
     """
 
     def __init__(
-        self, schedule: Schedule, coupling: Coupling, extrapolated_inputs: LinearExtrapolation | None = None
+        self, schedule: Schedule, coupling: Coupling, extrapolation: LinearExtrapolation | None = None
     ) -> None:
-        self._extrapolated_inputs = extrapolated_inputs
+        self._extrapolation = extrapolation
         self.time = 0.0
         self._schedule = schedule
         self._coupling = coupling
@@ -98,7 +104,7 @@ class GridStepper:
 
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks, the coupling's state and that of extrapolated inputs; see `Stepper`."""
-        inputs = self._extrapolated_inputs
+        inputs = self._extrapolation
         extrapolation = {} if inputs is None else {"lines": inputs.get_state()}
         ticks = {"tick": self._tick, "due": dict(self._due), "acted": dict(self._acted)}
         return {**ticks, "coupling": self._coupling.get_state(), **extrapolation}
@@ -108,6 +114,6 @@ class GridStepper:
         self._tick = state["tick"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self._coupling.set_state(state["coupling"])
-        if self._extrapolated_inputs is not None:
-            self._extrapolated_inputs.set_state(state["lines"])
+        if self._extrapolation is not None:
+            self._extrapolation.set_state(state["lines"])
         self.time = self._schedule.time(self._tick)

@@ -147,7 +147,7 @@ class Feeding(NamedTuple):
 
 def feedings(system: System, instances: Mapping[str, Instance]) -> dict[str, Feeding]:
     """Return how each unit is fed; conversions of units of measure are logged."""
-    changes = {c.target: change for c in system.connections if (change := system.change_by(c))}
+    changes = {c.target: change for c in system.connections if (change := system.transformation_of(c))}
     return {name: _feeding(system, instances, name, changes) for name in instances}
 
 

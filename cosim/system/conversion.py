@@ -45,19 +45,19 @@ def conversion(source: Unit, target: Unit) -> LinearTransformation:
     """Return the transformation that converts a value from a unit into another, each of its two numbers rounded once.
 
     From SI = f_s v + o_s = f_t w + o_t follows w = (f_s / f_t) v + (o_s - o_t) / f_t. Factors and offsets stand for the
-    exact numbers that tools rounded, see `meant_by`: the factor from degrees to radians is the double nearest to
+    exact numbers that tools rounded, see `exact_number`: the factor from degrees to radians is the double nearest to
     pi/180, that from radians to degrees the one nearest to 180/pi.
     """
-    f_s, o_s, f_t, o_t = (meant_by(x) for x in (source.factor, source.offset, target.factor, target.offset))
+    f_s, o_s, f_t, o_t = (exact_number(x) for x in (source.factor, source.offset, target.factor, target.offset))
     return LinearTransformation(float(f_s / f_t), float((o_s - o_t) / f_t))
 
 
-def pass_as_they_are(a: Unit, b: Unit) -> bool:
+def needs_no_conversion(a: Unit, b: Unit) -> bool:
     """Return whether values pass unconverted: a unit is unknown, or both have one name and one is not defined."""
     return UNKNOWN in (a, b) or (a.symbol == b.symbol and not (a.defined and b.defined))
 
 
-def meant_by(number: float) -> Fraction:
+def exact_number(number: float) -> Fraction:
     """Return the exact number behind a rounded one, to 60 digits where it is a multiple of pi.
 
     A number of few digits is taken as that decimal fraction (0.001). One of many digits that is within rounding of p/q

@@ -18,7 +18,7 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu.clocks import FmuClock
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
-from handover.cosim.system.conversion import LinearTransformation, conversion, pass_as_they_are
+from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class System:
         unit = self.units.get(end.unit)
         return unit.description.clocks.get(end.port) if unit else None
 
-    def change_by(self, c: Connection) -> LinearTransformation | None:
+    def transformation_of(self, c: Connection) -> LinearTransformation | None:
         """Return how a valid connection transforms values; None where it copies them, or connects clocks."""
         transformation = c.transformation
         if self._clock(c.target):
@@ -297,7 +297,7 @@ def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:
     """Compare units by their definitions, not by their names; a variable without a unit fits any."""
-    if pass_as_they_are(a, b):
+    if needs_no_conversion(a, b):
         return None
     if not (a.defined and b.defined):
         undefined = b.symbol if a.defined else a.symbol

@@ -83,7 +83,6 @@ class TendonArm:
     period: ClassVar[Fraction | None] = None
     variable_step: ClassVar[bool] = False
     deferred: ClassVar[tuple[str, ...]] = ("handover.plants.helix.tendon_chain",)
-    """What the constructor imports: an FMU does so when it is instantiated, as Exudyn does not load in every thread."""
 
     def __init__(self, params: Params) -> None:
         # imported here, since Exudyn takes long to load, and ports are read without it

@@ -27,7 +27,7 @@ from handover.cosim.blocks.units import (
 from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
 
-SEES_NOTHING = 0.2
+OUT_OF_RANGE = 0.2
 """Value of the output `range` where a sensor's ray meets no object, in m."""
 
 _MIN_MASS = 1e-3

@@ -13,7 +13,7 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.ir_grasp.hand import FINGERS
-from handover.plants.ir_grasp.parameters import SEES_NOTHING, InvalidSceneParameters, Params
+from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, InvalidSceneParameters, Params
 from handover.plants.ir_grasp.world import DT, Command, GraspWorld, initial_snapshot
 
 _SLOT = 5  # internal steps for which a sensor is active
@@ -179,8 +179,8 @@ class GraspScene:
         return self._sensor.reading(x + p.noise * float(self._rng.standard_normal()))
 
     def _range(self, finger: int) -> float:
-        met = self._world.cast_rays(finger, _MIDDLE, SEES_NOTHING)
-        return max(met[0][0], 0.0) if met else SEES_NOTHING  # contacts overlap a little
+        met = self._world.cast_rays(finger, _MIDDLE, OUT_OF_RANGE)
+        return max(met[0][0], 0.0) if met else OUT_OF_RANGE  # contacts overlap a little
 
 
 def _command(u: Inputs) -> Command:

@@ -16,7 +16,7 @@ from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
 from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
 from handover.plants.vsl.parameters import (
-    HIGHEST_PRESSURE,
+    MAX_PRESSURE,
     TURN,
     InvalidVslArmParameters,
     Link,
@@ -48,7 +48,7 @@ class Inputs:
         np.zeros(3), "speeds at which the joints go there, whatever their sign; 0: as fast as they can"
     )
     p_cmd: Vector2[Pascal] = port(
-        np.array([1.0e5, 1.0e5]), "commanded pressures of links 2 and 3", minimum=0.0, maximum=HIGHEST_PRESSURE
+        np.array([1.0e5, 1.0e5]), "commanded pressures of links 2 and 3", minimum=0.0, maximum=MAX_PRESSURE
     )
     load: Kilogram = port(0.0, "mass that hangs on the gripper", minimum=0.0, maximum=MAX_LOAD)
 
@@ -229,8 +229,8 @@ def _check_inputs(u: Inputs) -> None:
     faults: list[str] = []
     if not np.isfinite((*u.q_cmd, *u.qd_cmd, *u.p_cmd)).all():
         faults.append(f"q_cmd {u.q_cmd}, qd_cmd {u.qd_cmd} and p_cmd {u.p_cmd} must be finite")
-    elif not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= HIGHEST_PRESSURE:
-        faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {HIGHEST_PRESSURE:g} Pa")
+    elif not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= MAX_PRESSURE:
+        faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {MAX_PRESSURE:g} Pa")
     if not 0.0 <= u.load <= MAX_LOAD:
         faults.append(f"load {u.load:g} kg must be from 0 to {MAX_LOAD:g} kg")
     if faults:

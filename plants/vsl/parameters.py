@@ -28,7 +28,7 @@ from handover.cosim.blocks.units import (
 )
 
 TURN = 2.0 * math.pi
-HIGHEST_PRESSURE = 3.0e5
+MAX_PRESSURE = 3.0e5
 """Pa; the published experiments go to 2 bar."""
 
 
@@ -108,7 +108,7 @@ class Params:
         np.array([0.0, 0.8411, -1.6821]), "where the joints start, in rest", minimum=-TURN, maximum=TURN
     )
     p_0: Vector2[Pascal] = parameter(
-        np.array([1.0e5, 1.0e5]), "pressures of links 2 and 3 at the start", minimum=0.0, maximum=HIGHEST_PRESSURE
+        np.array([1.0e5, 1.0e5]), "pressures of links 2 and 3 at the start", minimum=0.0, maximum=MAX_PRESSURE
     )
     hinges: int = parameter(6, "hinges of a flexible link, quasi-statically", minimum=1, maximum=100)
     hinges_dynamic: int = parameter(2, "hinges of a flexible link that swings", minimum=1, maximum=12)

@@ -25,8 +25,8 @@ def run_campaign(
 ) -> CampaignTable:
     """Run those runs of a campaign that are not done yet, and return the table of all.
 
-    However it ends, runs that are done are kept, and the next call resumes the campaign. A run is done when its folder
-    is complete, also if a unit failed in it. Lost runs are tried again by the next call. The table is completed in a
+    However it ends, runs that are done are kept, and running the same command again resumes the campaign. A run is done
+    when its folder is complete, also if a unit failed in it; lost runs are tried again. The table is completed in a
     block of `signals_deferred`, which can defer signals meanwhile.
 
     Raises:

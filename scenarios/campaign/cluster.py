@@ -27,14 +27,14 @@ from handover.scenarios.results.run_folder import disk_errors_reported, versions
 _T = TypeVar("_T")
 
 
-def call_with_timeout(ask: Callable[[], _T], bound: float) -> _T:
+def call_with_timeout(function: Callable[[], _T], timeout: float) -> _T:
     """Return what a function returns that is called in a thread of its own.
 
     So it may run an event loop where the caller's thread has one already, as in a notebook.
 
     Args:
-        ask: the function.
-        bound: how long it gets, s; after that its thread is abandoned.
+        function: what is called.
+        timeout: how long it gets, s; after that its thread is abandoned.
 
     Raises:
         TimeoutError: it has not returned in time. Besides, what it raises itself.
@@ -43,15 +43,15 @@ def call_with_timeout(ask: Callable[[], _T], bound: float) -> _T:
 
     def wait() -> None:
         try:
-            answers.put((ask(),))
+            answers.put((function(),))
         except Exception as e:  # raised where it is waited for
             answers.put(e)
 
     threading.Thread(target=wait, daemon=True).start()
     try:
-        answer = answers.get(timeout=bound)
+        answer = answers.get(timeout=timeout)
     except queue.Empty:
-        raise TimeoutError(f"no answer within {bound:g} s") from None
+        raise TimeoutError(f"no answer within {timeout:g} s") from None
     if isinstance(answer, Exception):
         raise answer
     return answer[0]

@@ -65,7 +65,7 @@ def _of_points(stored: Any, requested: Sequence[Mapping[str, str]]) -> list[str]
     names = [*asked, *(name for name in before if name not in asked)]
     differ = [_both(name, before.get(name), asked.get(name)) for name in names if before.get(name) != asked.get(name)]
     return differ or [
-        f"the values are combined to {len(stored)} points there, to others, {len(requested)}, in this call"
+        f"the values are combined to {len(stored)} points there, to others, {len(requested)}, in this command"
     ]
 
 
@@ -79,7 +79,7 @@ def _values(points: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
 
 
 def _both(what: str, stored: Any, requested: Any) -> str:
-    return f"{what} is {_text(stored)} there, {_text(requested)} in this call"
+    return f"{what} is {_text(stored)} there, {_text(requested)} in this command"
 
 
 def _text(value: Any) -> str:

@@ -77,8 +77,8 @@ class RunServer:
         self._loaded.add(scenario)
         for unit in SCENARIOS[scenario].units.values():
             with contextlib.suppress(Exception):  # a run that needs it will report it
-                import_block(UNITS[unit].block)
-                for module in UNITS[unit].deferred:
+                block = import_block(UNITS[unit].block)
+                for module in getattr(block, "deferred", ()):
                     importlib.import_module(module)
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
@@ -131,7 +131,7 @@ class RunServer:
                 os.dup2(log.fileno(), number)
             result = work()
             if result.lost:
-                heartbeat.tell(loss={"lost": result.lost, "no_room": result.no_room})
+                heartbeat.record_facts(loss={"lost": result.lost, "no_room": result.no_room})
             supervisor.leave(1 if result.lost else 0)
 
         child = ForkedChild(begin, heartbeat)

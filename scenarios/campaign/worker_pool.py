@@ -86,10 +86,10 @@ class RunCounts:
 
     Attributes:
         total: all that are planned.
-        kept: those that were done before this call.
+        kept: those that were done before this command.
         ended: those whose folder is complete, with those kept.
         failed: those of `ended` in which a unit failed.
-        lost: those that no worker came back with in this call.
+        lost: those that no worker came back with in this command.
     """
 
     total: int
@@ -100,7 +100,7 @@ class RunCounts:
 
     @property
     def left(self) -> int:
-        """Runs that are yet to come in this call."""
+        """Runs that are yet to come in this command."""
         return self.total - self.ended - self.lost
 
 

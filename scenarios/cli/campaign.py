@@ -116,7 +116,7 @@ def format_progress(counts: RunCounts) -> str:
 
 
 def format_time_left(counts: RunCounts, elapsed: float) -> str:
-    """Return a text such as "3 min left", estimated from the runs of this call; "" where nothing can be said."""
+    """Return a text such as "3 min left", estimated from the runs of this command; "" where nothing can be said."""
     ended_here = counts.ended + counts.lost - counts.kept
     if ended_here == 0 or counts.left == 0:
         return ""
@@ -195,7 +195,7 @@ Finish = Callable[[CampaignFolder, CampaignTable], None]
 
 
 @dataclass(frozen=True)
-class CampaignCall:
+class CampaignOutcome:
     """A complete campaign: the plan as it was checked, its folder, its runs, and their counts."""
 
     plan: CampaignPlan
@@ -220,7 +220,7 @@ def pool_config(workers: int | None, scheduler: str | None) -> PoolConfig:
     return PoolConfig(workers, scheduler)
 
 
-def call_campaign(plan: CampaignPlan, out: Path | None, workers: PoolConfig, finish: Finish) -> CampaignCall:
+def run_campaign_command(plan: CampaignPlan, out: Path | None, workers: PoolConfig, finish: Finish) -> CampaignOutcome:
     """Run a campaign in a folder, or in one of its own in `campaigns/`, and finish it.
 
     If it is interrupted, the command exits here with the status for that.
@@ -244,7 +244,7 @@ def call_campaign(plan: CampaignPlan, out: Path | None, workers: PoolConfig, fin
     assert counts is not None
     if counts.kept == counts.total:
         click.echo(f"{folder.path} has all of its runs; nothing was run", err=True)
-    return CampaignCall(ready.plan, folder, table, counts)
+    return CampaignOutcome(ready.plan, folder, table, counts)
 
 
 def _check_without_units(

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.exceptions import nearest
-from handover.scenarios.cli.campaign import call_campaign, pool_config
+from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.options import HeadedCommand, campaign_options
 from handover.scenarios.execution.errors import UsageError
@@ -71,12 +71,12 @@ def paper(
     plan = published.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
     finish = _Finish(published, report=not no_report)
-    call = call_campaign(replace(plan, experiment=experiment), out, pool_config(workers, scheduler), finish)
+    outcome = run_campaign_command(replace(plan, experiment=experiment), out, pool_config(workers, scheduler), finish)
 
     from handover.scenarios.cli.claims_summary import print_results
 
-    print_results(published, finish.results, call.folder)
-    sys.exit(call.status)
+    print_results(published, finish.results, outcome.folder)
+    sys.exit(outcome.status)
 
 
 class _Finish:

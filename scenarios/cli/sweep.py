@@ -12,7 +12,7 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.cli.campaign import call_campaign, pool_config
+from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
@@ -36,7 +36,7 @@ The folder of a campaign has a folder for each run in runs/, and runs.parquet wi
 success, metrics. The table is written as results come.
 
 However a campaign was ended, run the same command again to resume; nothing that is done is repeated. A run in which a
-unit fails is a row with its reason; a run that was lost, as with its machine, is tried again by the next call. A larger
+unit fails is a row with its reason; a run that was lost, as with its machine, is then tried again. A larger
 --repeat adds runs. Without --out, the command resumes its newest campaign in campaigns/ if that is not complete, else
 it begins a new one.
 
@@ -98,13 +98,13 @@ def sweep(
             units={name: str(file) for name, file in replacement_fmus(experiment, replaced).items()},
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
-    call = call_campaign(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
+    outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
 
     from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
     from handover.scenarios.cli.campaign_summary import print_campaign
 
-    print_campaign(CampaignResults(call.folder.read(), call.table), call.counts, call.folder)
-    sys.exit(call.status)
+    print_campaign(CampaignResults(outcome.folder.read(), outcome.table), outcome.counts, outcome.folder)
+    sys.exit(outcome.status)
 
 
 def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:

@@ -83,7 +83,7 @@ class ForkedChild:
                 return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, hung)
             if ready:
                 return None
-            if self._heartbeat.limit and stall_timer.elapsed() >= self._heartbeat.limit + _GRACE:
+            if self._heartbeat.limit and stall_timer.poll() >= self._heartbeat.limit + _GRACE:
                 hung = True
                 os.kill(self.pid, signal.SIGKILL)
 

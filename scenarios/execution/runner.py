@@ -85,7 +85,7 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     task.folder.write_run(begun_run(task, master))
     if not task.presented:
         task.folder.figures.rmdir()
-    master.heartbeat.tell(folder=str(task.folder.path), **crash_facts(task, master))
+    master.heartbeat.record_facts(folder=str(task.folder.path), **crash_facts(task, master))
 
 
 def _run(

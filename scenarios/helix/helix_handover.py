@@ -1,6 +1,6 @@
 """A hand offers a ball; the Helix finds it with two cameras and takes it. [Vervloet2025] sec. 3.5.1.
 
-The thesis's own results for such a handover are those of table 1 and sec. 5.2 (`published_of`).
+The thesis's own results for such a handover are those of table 1 and sec. 5.2 (`published_values`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
 _PAPER = "helix"
 
 
-def published_of(p: Parameters) -> Sequence[PublishedValue]:
+def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return the times and steps of table 1 for its step sizes, and for the smallest of them the model's error.
 
     Nothing for other step sizes, another place of the ball, or a covered lens.
@@ -140,7 +140,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
 
     def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
         """Return the values of table 1 and fig. 9."""
-        return published_of(parameters)
+        return published_values(parameters)
 
     def draw(self, parameters: Parameters, evaluator: HandoverEvaluator, record: Record, folder: Path) -> list[Figure]:  # noqa: ARG002
         """Draw the camera pictures of some moments."""

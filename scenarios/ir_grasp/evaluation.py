@@ -8,7 +8,7 @@ from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.plants.ir_grasp.objects import SOLIDS
-from handover.plants.ir_grasp.parameters import SEES_NOTHING
+from handover.plants.ir_grasp.parameters import OUT_OF_RANGE
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.ir_grasp.parameters import Parameters, pregrasp_position
 
@@ -118,7 +118,7 @@ class GraspEvaluator(Evaluator):
         for i, finger in enumerate(("thumb", "index", "ring")):
             what = f"{finger} to object as the hand began to close"
             unseen = " (sees nothing)" if seen[i] >= ReflexParams().distance_max else ""
-            unmet = " (meets nothing)" if true[i] >= SEES_NOTHING else ""
+            unmet = " (meets nothing)" if true[i] >= OUT_OF_RANGE else ""
             metrics[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{what}, by [Luberto] eq. (11){unseen}")
             metrics[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{what}, true along the beam{unmet}")
         self._at_closing = metrics

@@ -1,6 +1,6 @@
 """A soft hand corrects its grasp by infrared reflexes, closes, pulls and shakes. [Luberto] sec. V.
 
-The paper's table II gives the fingers' distances from the object for such a grasp (`published_of`).
+The paper's table II gives the fingers' distances from the object for such a grasp (`published_values`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ FINGERS = ("thumb", "index", "ring")
 """Columns of table II, in the order in which `paper.toml` has them."""
 
 
-def published_of(p: Parameters) -> Sequence[PublishedValue]:
+def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return table II's distances for the object and the pose; nothing for other strategies than the reflex."""
     if p.strategy is not Strategy.REFLEX or p.literal:
         return ()
@@ -128,7 +128,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
 
     def published(self, parameters: Parameters) -> Sequence[PublishedValue]:
         """Return the distances of table II."""
-        return published_of(parameters)
+        return published_values(parameters)
 
     def draw(self, parameters: Parameters, evaluator: GraspEvaluator, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at three moments."""

@@ -53,7 +53,7 @@ def conversions_of(system: System) -> list[dict[str, Any]]:
     """Return the connections that convert units, as JSON can hold them: both ends with their units, factor, offset."""
     entries: list[dict[str, Any]] = []
     for c in system.connections:
-        conversion = system.change_by(c)
+        conversion = system.transformation_of(c)
         if conversion is not None:
             source = system.units[c.source.unit].description.outputs[c.source.port]
             target = system.units[c.target.unit].description.inputs[c.target.port]

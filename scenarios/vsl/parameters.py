@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.vsl.kinematics import place
+from handover.controllers.vsl.kinematics import format_point
 from handover.controllers.vsl.paths import segments_of
 from handover.controllers.vsl.trajectory_planner import Elbow, Path
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
-from handover.plants.vsl.parameters import HIGHEST_PRESSURE, Link, Motion
+from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class Parameters:
         5e4,
         "pressure inside both links: 5e4 Pa is 0.5 bar; the paper's are 0.5 to 2 bar",
         minimum=0.0,
-        maximum=HIGHEST_PRESSURE,
+        maximum=MAX_PRESSURE,
     )
     links: Link = parameter(Link.VSL, "links of variable stiffness, or the printed rigid ones of the same length")
     motion: Motion = parameter(Motion.QUASI_STATIC, "arm in equilibrium at every instant, or with its oscillations")
@@ -68,7 +68,7 @@ class Parameters:
                 path = self.path.name.lower()
                 faults.append(f"{name}: the path {path} has ends of its own; {name} is for path=custom only")
             elif self.path is Path.CUSTOM and p_WG[2] < 0.0:
-                faults.append(f"{name}: {place(p_WG)} is below the ground, z = 0 in W; its z must be at least 0")
+                faults.append(f"{name}: {format_point(p_WG)} is below the ground, z = 0 in W; its z must be at least 0")
         return faults
 
     @property

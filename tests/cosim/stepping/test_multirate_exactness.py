@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
+from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.stepper import GridStepper
 from handover.cosim.system.schedule import Schedule, Slot
 from handover.cosim.system.system import System
@@ -20,6 +21,7 @@ class Counting:
     def __init__(self) -> None:
         self.steps: dict[str, int] = {}
         self.begins: dict[str, float] = {}
+        self.count = IterationCount()
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None: ...
 

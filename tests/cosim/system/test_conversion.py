@@ -5,7 +5,7 @@ import math
 import pytest
 
 from handover.cosim.blocks.units import BaseExponents, Unit
-from handover.cosim.system.conversion import LinearTransformation, conversion, meant_by
+from handover.cosim.system.conversion import LinearTransformation, conversion, exact_number
 
 ANGLE, LENGTH, TEMPERATURE = BaseExponents(rad=1), BaseExponents(m=1), BaseExponents(K=1)
 RAD, METRE, KELVIN = Unit("rad", ANGLE), Unit("m", LENGTH), Unit("K", TEMPERATURE)
@@ -38,8 +38,8 @@ def test_a_conversion_is_rounded_once(source: Unit, target: Unit, expected: Line
 
 def test_a_number_that_is_near_nothing_is_taken_as_it_stands():
     yard = 0.9143987654321234
-    assert float(meant_by(yard)) == yard
-    assert meant_by(-0.25) == -1 / 4
+    assert float(exact_number(yard)) == yard
+    assert exact_number(-0.25) == -1 / 4
 
 
 @pytest.mark.parametrize(

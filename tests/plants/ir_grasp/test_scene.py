@@ -10,7 +10,7 @@ from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.hand import FINGERS, JOINTS, finger_points, sensor_rays
 from handover.plants.ir_grasp.objects import SOLIDS, Thing
-from handover.plants.ir_grasp.parameters import SEES_NOTHING, InvalidSceneParameters, Params
+from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, InvalidSceneParameters, Params
 from handover.plants.ir_grasp.scene import GraspScene, Inputs, InvalidCommand, Outputs, StepSizeError
 from handover.plants.ir_grasp.world import DT, PULLEYS, STIFFNESS, GraspWorld, initial_snapshot, resting_posture
 
@@ -76,7 +76,7 @@ def test_range_is_where_the_sensors_ray_meets_the_object(thing: Thing, aside: fl
         x_O, y_O = np.array([[c, s], [-s, c]]) @ (o - y.p_WO)
         d_x, d_y = np.array([[c, s], [-s, c]]) @ d
         met = SOLIDS[thing].intersect(x_O, y_O, d_x, d_y)
-        assert value == pytest.approx(met[0] if met else SEES_NOTHING, abs=1e-9)
+        assert value == pytest.approx(met[0] if met else OUT_OF_RANGE, abs=1e-9)
 
 
 def test_noise_free_readings_of_a_narrow_beam_follow_range_and_incidence():

@@ -78,23 +78,23 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"scenario": "flyer_impedance"}, "scenario is ir_grasp there, flyer_impedance in this call"),
-        ({"points": [{"forward": "0.03"}]}, "forward is 0.03,0.1 there, 0.03 in this call"),
-        ({"points": [{"standoff": "0.1"}] * 2}, "standoff is not given there, 0.1 in this call"),
-        ({"fixed": {"thing": "paper_box_a"}}, "thing is cylinder there, paper_box_a in this call"),
-        ({"fixed": {}}, "thing is cylinder there, not given in this call"),
-        ({"seed": 5}, "seed is 0 there, 5 in this call"),
-        ({"paired": True}, "paired is False there, True in this call"),
+        ({"scenario": "flyer_impedance"}, "scenario is ir_grasp there, flyer_impedance in this command"),
+        ({"points": [{"forward": "0.03"}]}, "forward is 0.03,0.1 there, 0.03 in this command"),
+        ({"points": [{"standoff": "0.1"}] * 2}, "standoff is not given there, 0.1 in this command"),
+        ({"fixed": {"thing": "paper_box_a"}}, "thing is cylinder there, paper_box_a in this command"),
+        ({"fixed": {}}, "thing is cylinder there, not given in this command"),
+        ({"seed": 5}, "seed is 0 there, 5 in this command"),
+        ({"paired": True}, "paired is False there, True in this command"),
         (
             {"repetitions": 1},
-            "repetitions is 2 there, 1 in this call (a larger number adds runs, a smaller one takes none away)",
+            "repetitions is 2 there, 1 in this command (a larger number adds runs, a smaller one takes none away)",
         ),
-        ({"experiment": "ir-table"}, "experiment is not given there, ir-table in this call"),
+        ({"experiment": "ir-table"}, "experiment is not given there, ir-table in this command"),
         (
             {"options": MasterOptions(algorithm=Algorithm.JACOBI)},
-            "master's algorithm is gauss-seidel there, jacobi in this call",
+            "master's algorithm is gauss-seidel there, jacobi in this command",
         ),
-        ({"options": MasterOptions(pace=1)}, "master's pace is not given there, 1 in this call"),
+        ({"options": MasterOptions(pace=1)}, "master's pace is not given there, 1 in this command"),
     ],
 )
 def test_another_campaign_is_refused(folder: CampaignFolder, fmus: dict[str, Path], change: dict[str, Any], text: str):

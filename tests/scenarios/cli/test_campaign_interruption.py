@@ -16,7 +16,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
-from handover.scenarios.cli.campaign import CampaignInterruption, call_campaign
+from handover.scenarios.cli.campaign import CampaignInterruption, run_campaign_command
 
 PLAN = CampaignPlan(
     scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}
@@ -72,7 +72,7 @@ def test_as_the_table_is_completed(tmp_path: Path):
 def test_as_the_workers_are_ended(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     workers: Any = InterruptedEnd()
     with pytest.raises(SystemExit) as caught:
-        call_campaign(PLAN, tmp_path / "c", workers, lambda _folder, _table: None)
+        run_campaign_command(PLAN, tmp_path / "c", workers, lambda _folder, _table: None)
     assert caught.value.code == 1
     assert workers.ended
     assert (
