@@ -132,7 +132,7 @@ def test_a_unit_runs_in_ecos(folder: Path):
     column = header.split(", ").index("instance::p_WG[3][REAL]")
     assert len(rows) >= 50
     assert {row.split(", ")[column] for row in rows} == {"-0.700000"}
-    (scalar,) = re.findall(r"`(handover build [^`]*--scalar[^`]*)`", README)
+    (scalar,) = re.findall(r"`\.venv/bin/(handover build [^`]*--scalar[^`]*)`", README)
     assert handover(scalar, folder).returncode == 0
     assert (folder / "units" / "TendonArm.fmi3-scalar.fmu").is_file()
 
@@ -178,7 +178,7 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
     (tmp_path / "spring.py").write_text(OWN_BLOCK)
     printed = program(OWN_BUILD, tmp_path)
     assert (tmp_path / printed.strip()).is_file()
-    (command,) = re.findall(r"`(handover build spring:Spring [^`]*)`", README)
+    (command,) = re.findall(r"`\.venv/bin/(handover build spring:Spring [^`]*)`", README)
     done = handover(command, tmp_path)
     assert done.returncode == 0, done.stderr
     assert printed.strip() in done.stdout

@@ -91,6 +91,7 @@ def test_the_controller_sees_the_ball_and_the_arm_well(handover: tuple[Path, int
     assert np.median(errors) < 0.005
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_signals_bit_for_bit(handover: tuple[Path, int, dict[str, Any]], tmp_path: Path):
     run(tmp_path / "again", "--seed", "3")
     first, second = (
@@ -99,6 +100,7 @@ def test_the_same_seed_gives_the_same_signals_bit_for_bit(handover: tuple[Path, 
     assert first == second
 
 
+@pytest.mark.slow
 def test_covering_a_camera_for_two_seconds_does_not_lose_the_handover(tmp_path: Path):
     status, summary = run(tmp_path / "r", "-p", "cover=left", "-p", "cover_from=3", "-p", "cover_for=2")
     assert status == 0, summary["reason"]
