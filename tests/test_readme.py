@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from handover.cosim.stepping.options import Algorithm
 from handover.fmus import interpreter
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
@@ -75,6 +76,11 @@ def test_the_table_of_robots_names_their_units_and_scenarios():
 
 def is_plant(unit: str) -> bool:
     return UNITS[unit].block.startswith("handover.plants.")
+
+
+def test_the_table_of_options_names_every_algorithm():
+    (row,) = re.findall(r"^\| `--algorithm` \|(.*)$", README, re.MULTILINE)
+    assert {a.value for a in Algorithm} <= {*re.findall(r"`([^`]+)`", row)}
 
 
 def test_the_table_of_units_has_their_steps_and_standards():

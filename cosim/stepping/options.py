@@ -92,6 +92,19 @@ class Algorithm(enum.Enum):
         """Whether all units that are connected in a cycle repeat steps after a rollback."""
         return self in (Algorithm.FIXED_POINT, Algorithm.NEWTON)
 
+    @property
+    def summary(self) -> str:
+        """Which values units step from, for the command's help."""
+        match self:
+            case Algorithm.JACOBI:
+                return "all from those of one time"
+            case Algorithm.GAUSS_SEIDEL:
+                return "one unit after another, each from the newest"
+            case Algorithm.FIXED_POINT:
+                return "in a cycle from those at the end of the step, by fixed-point iteration with rollback"
+            case Algorithm.NEWTON:
+                return "the same by Newton's method"
+
 
 @dataclass(frozen=True, kw_only=True)
 class MasterOptions:

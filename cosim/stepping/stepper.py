@@ -41,7 +41,9 @@ class Coupling(Protocol):
     """Takes units from one communication point to the next.
 
     At a communication point t, `arrive` is called, then observers see the signals, then `depart`. Both get the units
-    that are due there, in the schedule's order. A slot's `period` is the step to take, in seconds.
+    that are due there, in the schedule's order. A slot's `period` is the step to take, in seconds. Sampled units act
+    once at an instant: those that have acted are not in a later `arrive` at it, but in `depart`. With events, both can
+    be called several times at one instant.
 
     Attributes:
         count: iterated steps, their iterations and rollbacks; all zero where nothing is iterated.

@@ -43,8 +43,7 @@ _OPTIONS = (
         "--algorithm",
         type=_choice(Algorithm),
         default=_PLAIN.algorithm.value,
-        help="Which values units step from: all from those of one time, each from the newest, or, with rollback, from"
-        " those at the end of the step, iterated to a fixed point or by Newton's method.",
+        help=f"Which values units step from. {'; '.join(f'{a.value}: {a.summary}' for a in Algorithm)}.",
     ),
     _coupling_option(
         "--tolerance",

@@ -74,8 +74,11 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     """A scenario. Subclasses name it, declare its parameters, wire its system and evaluate its runs."""
 
     name: ClassVar[str]
+    """Its name on the command line: lower case, with underscores."""
     title: ClassVar[str]
+    """One line that says what happens in it, for lists and reports."""
     parameters_type: ClassVar[type[Any]]
+    """A dataclass of declared parameters, which `build`, `stop_time` and `evaluator` get as an instance."""
     units: ClassVar[Mapping[str, str]]
     """The catalogued unit behind each of the system's units, by name in the system."""
     headline: ClassVar[tuple[str, ...]]
