@@ -14,8 +14,6 @@ from pathlib import Path, PurePosixPath
 
 from handover.cosim.check.described_variable import variables_of
 from handover.cosim.check.description_checks import (
-    default_start,
-    default_step,
     interface_findings,
     says,
     structure_findings,
@@ -25,6 +23,7 @@ from handover.cosim.check.finding import CheckReport, Finding, Level, Section, f
 from handover.cosim.check.isolated_process import run_isolated
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.default_experiment import default_experiment, proposed_step
 from handover.cosim.fmu.fmpy_edge import (
     checked_xml,
     library_path,
@@ -237,8 +236,8 @@ class _Check:
         self.can_continue = interface is not None
         self.interface = interface or self.root
         self.identifier = self.interface.get("modelIdentifier")
-        step = default_step(self.root)
-        text = f"co-simulation, {'steps of ' + f'{step:g} s' if step else 'no step size given'}"
+        step = proposed_step(default_experiment(self.root).step)
+        text = f"co-simulation, {f'steps of {float(step):g} s' if step else 'no step size given: a run needs --step'}"
         return text if interface else "no co-simulation", findings
 
     def _binaries(self) -> tuple[str, list[Finding]]:
@@ -262,12 +261,13 @@ class _Check:
             if not self.is_described:
                 raise _Skipped("not tried: its description is invalid, see there") from e
             return "", [fault(e.fault)]
-        step = default_step(self.root) or _STEP
+        experiment = default_experiment(self.root)
+        step = float(proposed_step(experiment.step) or _STEP)
         capabilities = dict(_state_capabilities(self.interface, self.fmi))
         task = {
             "fmu": str(self.path.absolute()),
             "folder": str(self.folder),
-            "start": default_start(self.root),
+            "start": experiment.start or 0.0,
             "step": step,
             **capabilities,
         }

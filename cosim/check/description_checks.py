@@ -12,6 +12,7 @@ from itertools import pairwise
 
 from handover.cosim.check.described_variable import REALS, DescribedVariable
 from handover.cosim.check.finding import Finding, fault, note, warning
+from handover.cosim.fmu.default_experiment import default_experiment
 from handover.cosim.fmu.xml import XmlElement
 
 _KINDS = {
@@ -41,24 +42,7 @@ def interface_findings(root: XmlElement, fmi: int) -> Iterator[Finding]:
     if not _IDENTIFIER.fullmatch(identifier):
         yield fault(f"modelIdentifier {identifier!r} is not an identifier of C", where=where, cure="letters, digits, _")
     yield from _capability_findings(co_simulation, fmi)
-    for experiment in root.named("DefaultExperiment"):
-        yield from _experiment_findings(experiment)
-
-
-def default_step(root: XmlElement) -> float | None:
-    """Return the step size that an FMU asks for, or None."""
-    for experiment in root.named("DefaultExperiment"):
-        step = _number(experiment.get("stepSize"))
-        if 0 < step < math.inf:
-            return step
-    internal = [_number(c.get("fixedInternalStepSize")) for c in root.named("CoSimulation")]
-    return next((step for step in internal if 0 < step < math.inf), None)
-
-
-def default_start(root: XmlElement) -> float:
-    """Return the time at which an FMU asks to start, or 0."""
-    starts = [_number(e.get("startTime")) for e in root.named("DefaultExperiment")]
-    return next((t for t in starts if math.isfinite(t)), 0.0)
+    yield from _experiment_findings(root)
 
 
 def says(element: XmlElement, flag: str) -> bool:
@@ -77,20 +61,13 @@ def _capability_findings(co_simulation: XmlElement, fmi: int) -> Iterator[Findin
         yield note("cannot be rolled back: its state can be neither kept nor restored")
 
 
-def _experiment_findings(experiment: XmlElement) -> Iterator[Finding]:
-    where = f"DefaultExperiment (line {experiment.line})"
-    step = experiment.attributes.get("stepSize")
-    if step is not None and not 0 < _number(step) < math.inf:
-        yield fault(f"stepSize {step!r}", where=where, cure="a positive number of seconds is right")
-    if _number(experiment.get("stopTime")) < _number(experiment.get("startTime", "0")):
-        yield fault("stopTime is before startTime", where=where)
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+def _experiment_findings(root: XmlElement) -> Iterator[Finding]:
+    proposed = default_experiment(root)
+    if proposed.step_fault:
+        yield fault(proposed.step_fault)
+    for experiment in root.named("DefaultExperiment"):
+        if proposed.stop is not None and proposed.stop < (proposed.start or 0.0):
+            yield fault("stopTime is before startTime", where=f"DefaultExperiment (line {experiment.line})")
 
 
 _FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")

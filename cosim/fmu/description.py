@@ -18,6 +18,7 @@ from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.clocks import FmuClock, clocks_of, without_clocks
+from handover.cosim.fmu.default_experiment import DefaultExperiment, default_experiment
 from handover.cosim.fmu.xml import XmlElement
 
 if TYPE_CHECKING:
@@ -137,6 +138,9 @@ class FmuDescription:
     without event mode, where it samples by itself, even if it declares a clock for hosts with event mode: so its
     results are the same in all hosts. That needs ports that can be accessed without a clock, so a unit with clocked
     ports, or with clocks that are not constant, is not sampled in this sense.
+
+    `step` is the communication step that it proposes, in seconds. `untouched_fault` says how its model description
+    breaks the standard in parts that co-simulation does not touch; a run warns of it.
     """
 
     path: Path
@@ -152,6 +156,8 @@ class FmuDescription:
     presumed_feedthrough: Mapping[str, tuple[str, ...]]
     sampled: bool
     capabilities: Capabilities = Capabilities()
+    experiment: DefaultExperiment = DefaultExperiment()
+    untouched_fault: str = ""
     clocks: Mapping[str, FmuClock] = field(default_factory=dict[str, FmuClock])
 
 
@@ -159,12 +165,13 @@ def describe_fmu(path: Path) -> FmuDescription:
     """Read an FMU's model description (FMI 2.0 or 3.0, co-simulation).
 
     Raises:
-        InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, or a clock
-            with an invalid interval.
+        InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, a fault in
+            what co-simulation reads of its description, or a clock with an invalid interval.
     """
     from handover.cosim.fmu.fmpy_edge import mime_types, read_description  # FMPy takes long to import
 
-    md, root = read_description(path)
+    md, root, untouched_fault = read_description(path)
+    experiment = default_experiment(root)
     is_fmi2 = md.fmiVersion == "2.0"
     units = {u.name: _unit(u) for u in md.unitDefinitions}
     mimes = {} if is_fmi2 else mime_types(root)
@@ -187,7 +194,9 @@ def describe_fmu(path: Path) -> FmuDescription:
         name=md.modelName or md.coSimulation.modelIdentifier,
         identifier=md.coSimulation.modelIdentifier,
         token=md.guid or "",
-        step=float(md.defaultExperiment.stepSize) if md.defaultExperiment and md.defaultExperiment.stepSize else None,
+        step=experiment.step,
+        experiment=experiment,
+        untouched_fault=untouched_fault,
         parameters=by_causality[Causality.PARAMETER],
         inputs=by_causality[Causality.INPUT],
         outputs=by_causality[Causality.OUTPUT],

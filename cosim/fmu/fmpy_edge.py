@@ -16,9 +16,11 @@ from fmpy.validation import validate_model_description
 from handover.cosim.exceptions import InvalidFmu, one_line
 from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
 from handover.cosim.fmu.library_format import HEAD, shortage
+from handover.cosim.fmu.reduced_description import reduced_fmu
 from handover.cosim.fmu.xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
+_MAX_PROBLEMS = 3
 
 
 class ModelVariable(Protocol):
@@ -54,8 +56,12 @@ class ModelDescription(Protocol):
     outputs: list[Any]
 
 
-def read_description(path: Path) -> tuple[ModelDescription, XmlElement]:
-    """Read and validate a co-simulation FMU's model description; return it with its XML, for what FMPy does not read.
+def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:
+    """Read and validate a co-simulation FMU's model description.
+
+    Returns:
+        The description, its XML, for what FMPy does not read, and how it breaks the standard in parts that
+        co-simulation does not touch, in one line; empty where it does not.
 
     Raises:
         InvalidFmu: it is not a valid co-simulation FMU; the message says why.
@@ -63,13 +69,29 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement]:
     archive = FmuArchive(path)
     root = checked_xml(archive)
     version_of(path, root)
+    fault = ""
     try:
         md: Any = fmpy.read_model_description(str(path))
     except Exception as e:  # FMPy raises plain Exception for unknown elements, lxml its own for malformed XML
-        raise InvalidFmu(path, f"its modelDescription.xml is not valid: {one_line(e)}") from e
+        fault = _fault_of(e)
+        try:
+            md = fmpy.read_model_description(reduced_fmu(archive.description()))
+        except Exception:  # as above: the fault is in what co-simulation reads
+            raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}") from e
     if md.coSimulation is None:
         raise InvalidFmu(path, "it has no co-simulation interface")
-    return cast(ModelDescription, md), root
+    return cast(ModelDescription, md), root, fault
+
+
+def _fault_of(e: Exception) -> str:
+    """Return why FMPy rejects a description, in one line."""
+    if isinstance(e, LookupError):  # its text alone is a name or a number
+        return f"{type(e).__name__}: {one_line(e)}"
+    if not isinstance(e, ValidationError):
+        return one_line(e)
+    problems = [" ".join(str(p).split()).rstrip(".") for p in cast(list[Any], e.problems)]
+    more = f"; and {len(problems) - _MAX_PROBLEMS} more" if len(problems) > _MAX_PROBLEMS else ""
+    return "; ".join(problems[:_MAX_PROBLEMS]) + more
 
 
 def checked_xml(archive: FmuArchive) -> XmlElement:

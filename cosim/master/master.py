@@ -1,12 +1,14 @@
 """The master algorithm: checks a system of FMUs, loads it, and runs it from one communication point to the next."""
 
 import array
+import logging
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from types import TracebackType
 from typing import TypeVar
 
-from handover.cosim.exceptions import InitializationError, UnitFailure
+from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
+from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.master.pacing import Pacer
@@ -24,6 +26,8 @@ from handover.cosim.system.system import System
 
 T = TypeVar("T")
 
+_log = logging.getLogger(__name__)
+
 _PLAIN = MasterOptions()
 
 
@@ -32,18 +36,32 @@ def never() -> bool:
     return False
 
 
+def _tell_of_faults(system: System, *, strict: bool) -> None:
+    """Warn of model descriptions that break the standard where it does not matter here.
+
+    Raises:
+        InvalidFmu: `strict` does not let them pass.
+    """
+    for path, fault in system.untouched_faults.items():
+        if strict:
+            raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}")
+        _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
+
+
 class Master:
     """Co-simulates a system of FMUs, each unit at its own rate. Use as a context manager.
 
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
 
     Raises:
-        WiringError: the system has faults. InvalidFmu: an FMU is invalid. ScheduleError: see `StepperFactory`.
+        WiringError: the system has faults. InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
+        ScheduleError: see `StepperFactory`.
         InitializationError: a unit did not accept its parameters or did not initialise.
     """
 
     def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
         system.check()
+        _tell_of_faults(system, strict=options.strict)
         self.system = system
         self.options = options
         self._factory = StepperFactory(system, options)

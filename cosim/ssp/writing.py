@@ -12,11 +12,12 @@ from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
 from handover.cosim.fmu.archive import write_archive
+from handover.cosim.fmu.default_experiment import proposed_step
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names, ports_of
 from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, document, root_element
 from handover.cosim.system.conversion import LinearTransformation
-from handover.cosim.system.system import Connection, PlacedUnit, System, proposed_step
+from handover.cosim.system.system import Connection, PlacedUnit, System
 
 Items = tuple[tuple[str, int], ...]
 

@@ -122,6 +122,8 @@ class MasterOptions:
             states at every step; else a discarded step ends the run. Systems with events do so anyway.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
+        strict: whether a model description that breaks the standard is refused even where only parts are at fault that
+            co-simulation does not touch, such as local variables; else the master warns of it.
 
     Raises:
         InvalidOptions: with all invalid values.
@@ -137,6 +139,7 @@ class MasterOptions:
     repeat_discarded: bool = False
     call_limit: float | None = None
     pace: float | None = None
+    strict: bool = False
 
     def __post_init__(self) -> None:
         given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}

@@ -17,6 +17,7 @@ from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu.clocks import FmuClock
+from handover.cosim.fmu.default_experiment import GIVE_STEP, NO_STEP, DefaultExperiment, proposed_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
 
@@ -117,7 +118,7 @@ class System:
         description = self._descriptions[path]
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
-        period = self._period(name, proposed_step(description.step) if period is None else period)
+        period = self._period(name, description.experiment, period)
         unit = PlacedUnit(name, description, start, period, description.sampled if sampled is None else sampled)
         self.units[name] = unit
         return unit
@@ -158,6 +159,16 @@ class System:
             raise WiringError(faults)
 
     @property
+    def untouched_faults(self) -> dict[Path, str]:
+        """How model descriptions break the standard in what co-simulation does not touch, or need not here, by FMU."""
+        faults: dict[Path, str] = {}
+        for d in (u.description for u in self.units.values()):
+            lines = [f for f in (d.untouched_fault, d.experiment.step_fault) if f]
+            if lines:
+                faults[d.path] = "; ".join(lines)
+        return faults
+
+    @property
     def has_events(self) -> bool:
         """Whether a unit runs in event mode: then steps may end at any time, not only on the schedule's grid."""
         return any(u.uses_events for u in self.units.values())
@@ -189,14 +200,17 @@ class System:
             transformation = conversion(a.unit, b.unit)
         return None if transformation.is_identity else transformation
 
-    def _period(self, name: str, period: Fraction | None) -> Fraction:
+    def _period(self, name: str, proposed: DefaultExperiment, period: Fraction | None) -> Fraction:
         if period is not None and not isinstance(period, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
             exact = Fraction(str(period)) if isinstance(period, float) else "1/100"
             raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
         if period is not None and period > 0:
             return Fraction(period)
-        reason = "its FMU proposes no communication step" if period is None else f"its communication step is {period} s"
-        self._faults.append(f"{name}: {reason}; give one that is above 0 s")
+        step = proposed_step(proposed.step) if period is None else None
+        if step is not None:
+            return step
+        reason = proposed.step_fault or NO_STEP if period is None else f"its communication step is {period} s"
+        self._faults.append(f"{name}: {reason}; {GIVE_STEP}")
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
 
     def _connection_faults(self, c: Connection) -> list[str]:
@@ -308,13 +322,3 @@ def _unit_mismatch(a: Unit, b: Unit) -> str | None:
     if unusable is not None and a != b:
         return f"the unit {unusable.symbol!r} has the factor {unusable.factor!r} and the offset {unusable.offset!r}"
     return None
-
-
-def proposed_step(step: float | None) -> Fraction | None:
-    """Return a step as an exact number; one with few digits, as 0.0333333, is taken as the fraction 1/30."""
-    if not step or step < 0:
-        return None
-    whole = round(1 / step)
-    if whole and abs(1 / whole - step) <= 2e-6 * step:
-        return Fraction(1, whole)
-    return Fraction(repr(step))

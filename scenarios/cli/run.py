@@ -72,6 +72,12 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
 )
 @click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
+@click.option(
+    "--strict",
+    is_flag=True,
+    help="Refuse an FMU that breaks the standard even where co-simulation does not touch the fault; see"
+    " `handover check`.  [default: warn]",
+)
 @click.help_option("-h", "--help")
 @ssp_options
 @_record_option(
@@ -101,6 +107,7 @@ def run(
     formats: Sequence[str],
     every: Fraction | None,
     no_report: bool,
+    strict: bool,
     call_limit: float,
     pace: float | None,
     **coupling: Any,
@@ -111,7 +118,7 @@ def run(
     elif stop is not None or step is not None:
         raise UsageError("--stop and --step are for an SSP; a scenario has its own")
     with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
-        options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace))
+        options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace), strict=strict)
         source: Mapping[str, Any] = {}
         if is_ssp(scenario):
             experiment, values, source = _of_file(Path(scenario), stop, step, opened)

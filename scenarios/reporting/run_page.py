@@ -144,7 +144,7 @@ def parameters_section(facts: RunFacts) -> Section | None:
 
 
 def master_section(facts: RunFacts) -> Section | None:
-    """Return how the units were coupled, and which units of measure were converted.
+    """Return how the units were coupled, which units of measure were converted, and what was warned of.
 
     Raises:
         InvalidRunFolder: the folder's description of it is damaged.
@@ -152,12 +152,13 @@ def master_section(facts: RunFacts) -> Section | None:
     try:
         rows = master_rows(facts.summary) if "master" in facts.summary else []
         conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
+        warnings = [str(line) for line in facts.run.get("warnings", [])]
     except (KeyError, TypeError, ValueError) as e:
         fault = f"its description of the master is damaged: {type(e).__name__} {e}"
         raise InvalidRunFolder(facts.folder.path, fault) from e
-    if not rows and not conversions:
+    if not (rows or conversions or warnings):
         return None
-    html = template("run_master.html").render(rows=rows, conversions=conversions)
+    html = template("run_master.html").render(rows=rows, conversions=conversions, warnings=warnings)
     return Section(anchor="master", title="Master", html=Markup(html))
 
 

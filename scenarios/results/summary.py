@@ -160,14 +160,15 @@ class RunResult:
 class _OfSomeRuns(TypedDict, total=False):
     system: dict[str, Any]
     conversions: list[dict[str, Any]]
+    warnings: list[str]
     failure: dict[str, Any] | None
 
 
 class RunData(Configuration, _OfSomeRuns):
     """What another process needs to resume a run, or to present it: see `Task` and `Experiment`.
 
-    A run that started has `system` and `conversions`, one that could not start has `failure`; `units` are the FMUs'
-    names and hashes.
+    A run that started has `system` and `conversions`, and `warnings` of its FMUs if there are any; one that
+    could not start has `failure`; `units` are the FMUs' names and hashes.
     """
 
     source: dict[str, Any]
@@ -287,7 +288,10 @@ def begun_run(task: Task, master: Master) -> RunData:
     """Return the content of `run.json` for a run that starts."""
     system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
-    return _run_data(task, fmus, {"system": system, "conversions": conversions_of(master.system)})
+    of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
+    if faults := master.system.untouched_faults:
+        of_this_run["warnings"] = [f"{path.name}: {fault}" for path, fault in faults.items()]
+    return _run_data(task, fmus, of_this_run)
 
 
 def unstarted_run(task: Task, refusal: CosimError) -> RunData:

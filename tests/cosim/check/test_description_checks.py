@@ -54,7 +54,7 @@ def test_a_sound_description_has_no_findings(tmp_path: Path):
         ),
         ('dependencies=""/></Outputs>', 'dependencies="0"/></Outputs>', r"dependencies 0 leads to no variable"),
         ('modelIdentifier="Decay"', 'modelIdentifier="3-decay"', r"'3-decay' is not an identifier of C"),
-        ('stepSize="0.1"', 'stepSize="-1"', r"stepSize '-1'; a positive number"),
+        ('stepSize="0.1"', 'stepSize="-1"', r"stepSize='-1' of its DefaultExperiment \(line 8\) is no"),
         ('startTime="0" stopTime="1"', 'startTime="2" stopTime="1"', r"stopTime is before startTime"),
         (' guid="decay"', "", r"attribute 'guid' is required but missing"),
         ('fmiVersion="2.0"', 'fmiVersion="1.0"', r"an FMU of FMI 1\.0; supported versions: 2\.0 and 3\.0"),

@@ -9,8 +9,9 @@ from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import InvalidFmu, WiringError
+from handover.cosim.fmu.default_experiment import proposed_step
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.system.system import System, mismatch, proposed_step
+from handover.cosim.system.system import System, mismatch
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 

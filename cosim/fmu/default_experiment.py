@@ -1,0 +1,81 @@
+"""The default experiment of an FMU: where it starts and stops, and the communication step that it proposes.
+
+Runs and checks both take the step from here, so that they propose the same one.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from handover.cosim.fmu.xml import XmlElement
+
+_SHORTEST = 1e-12
+"""Seconds; a shorter step would be lost in the rounding of times, which doubles hold to some 1e-16 of their size."""
+
+NO_STEP = "its FMU proposes no communication step"
+GIVE_STEP = "give one that is above 0 s"
+"""What is wrong with a unit that has no communication step, and the remedy."""
+
+
+@dataclass(frozen=True)
+class DefaultExperiment:
+    """What an FMU proposes for a run. What is not given, or is not finite, is None.
+
+    Attributes:
+        start, stop: times in seconds.
+        step: communication step in seconds.
+        step_fault: what is wrong with its stepSize, in one line with the place; empty where nothing is.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    step: float | None = None
+    step_fault: str = ""
+
+
+def default_experiment(root: XmlElement) -> DefaultExperiment:
+    """Read the default experiment off a model description.
+
+    The step is its `stepSize` or, where there is none, the `fixedInternalStepSize` of FMI 3's co-simulation interface.
+    """
+    experiment = next(root.named("DefaultExperiment"), None)
+    given: Mapping[str, str] = {} if experiment is None else experiment.attributes
+    start, stop = (_finite(given.get(name)) for name in ("startTime", "stopTime"))
+    text = given.get("stepSize")
+    if text is None or experiment is None:
+        internal = (_step(c.attributes.get("fixedInternalStepSize")) for c in root.named("CoSimulation"))
+        return DefaultExperiment(start, stop, next(internal, None))
+    step = _step(text)
+    if step is not None:
+        return DefaultExperiment(start, stop, step)
+    where = f"stepSize={text[:80]!r} of its DefaultExperiment (line {experiment.line})"
+    return DefaultExperiment(start, stop, None, f"{where} is no communication step; a number from 1e-12 s on is right")
+
+
+def proposed_step(step: float | None) -> Fraction | None:
+    """Return a step as an exact number; one with few digits, as 0.0333333, is taken as the fraction 1/30."""
+    if not step or step < 0:
+        return None
+    whole = round(1 / step)
+    if whole and abs(1 / whole - step) <= 2e-6 * step:
+        return Fraction(1, whole)
+    return Fraction(repr(step))
+
+
+def _step(text: str | None) -> float | None:
+    number = _finite(text)
+    return number if number is not None and number >= _SHORTEST else None
+
+
+def is_finite(text: str) -> bool:
+    """Return whether an attribute's text is a finite number."""
+    return _finite(text) is not None
+
+
+def _finite(text: str | None) -> float | None:
+    try:
+        number = math.nan if text is None or "_" in text else float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None

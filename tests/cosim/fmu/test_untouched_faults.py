@@ -1,0 +1,151 @@
+"""Faults of a model description: where co-simulation does not touch them they are told, elsewhere they are refused."""
+
+import logging
+import re
+import zipfile
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import decay
+import pytest
+from native_units import native_fmu
+
+from handover.cosim.exceptions import InvalidFmu, WiringError
+from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.system import System
+
+Edited = Callable[..., Path]
+
+STATE2 = '<ScalarVariable name="s" valueReference="90" causality="local" variability="continuous"><Real {}/>'
+STATE3 = '<Float64 name="s" valueReference="90" causality="local" variability="continuous" {}/>'
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Edited:
+    """Return a native unit's FMU with texts of its description replaced, each of which must be there."""
+
+    def edit(unit: str, fmi: int, *edits: tuple[str, str]) -> Path:
+        file = tmp_path / f"{unit}-{fmi}.fmu"
+        with zipfile.ZipFile(native_fmu(unit, fmi)) as sound, zipfile.ZipFile(file, "w") as faulty:
+            for name in sound.namelist():
+                content = sound.read(name)
+                for old, new in edits if name.endswith(".xml") else ():
+                    assert old.encode() in content, old
+                    content = content.replace(old.encode(), new.encode())
+                faulty.writestr(name, content)
+        return file
+
+    return edit
+
+
+def local(fmi: int, attributes: str) -> tuple[str, str]:
+    """Return the edit that adds a local variable, the last one, so that FMI 2's indices stay."""
+    row = STATE2.format(attributes) + "</ScalarVariable>" if fmi == 2 else STATE3.format(attributes)
+    return "</ModelVariables>", row + "</ModelVariables>"
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("attributes", "wanted"),
+    [
+        ('derivative="999"', "derivative attribute of model variable s .* which does not exist"),
+        ('declaredType="Speed"', 'declaredType="Speed" which has not been defined'),
+        ('unit="parsec"', 'unit "parsec" of variable "s"'),
+        ('displayUnit="km"', "KeyError: None"),
+        ('start="3"', 'provides a start value'),
+        ('min="low"', "'low' is not a valid value of the atomic type"),
+    ],
+)  # fmt: skip
+def test_a_fault_of_a_local_variable_is_told_and_the_unit_runs(
+    edited: Edited, caplog: pytest.LogCaptureFixture, fmi: int, attributes: str, wanted: str
+):
+    system = System()
+    system.add("mass", edited("mass", fmi, local(fmi, attributes)), f=2.0)
+    fault = system.units["mass"].description.untouched_fault
+    assert re.search(wanted, fault), fault
+    with caplog.at_level(logging.WARNING), Master(system) as master:
+        master.run(Fraction(1))
+        assert master.signals["mass.x"] == pytest.approx(1.0)
+    (line,) = [r.getMessage() for r in caplog.records if "is not valid" in r.getMessage()]
+    assert fault in line
+    assert "does not matter here" in line
+    with pytest.raises(InvalidFmu, match=r"its modelDescription.xml is not valid: "):
+        Master(system, MasterOptions(strict=True))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_what_is_read_is_the_same_with_and_without_the_fault(edited: Edited, fmi: int):
+    for unit in ("gain", "mass", "sum", "spring"):
+        sound = describe_fmu(native_fmu(unit, fmi))
+        faulty = describe_fmu(edited(unit, fmi, local(fmi, 'derivative="999"')))
+        assert faulty.untouched_fault
+        for name in (
+            "parameters",
+            "inputs",
+            "outputs",
+            "feedthrough",
+            "presumed_feedthrough",
+            "sampled",
+            "step",
+            "token",
+        ):
+            assert getattr(faulty, name) == getattr(sound, name), name
+
+
+def test_an_enumeration_that_is_said_to_be_continuous_changes_at_events(tmp_path: Path):
+    types = '<TypeDefinitions><SimpleType name="T"><Enumeration><Item name="A" value="1"/></Enumeration></SimpleType>'
+    row = '<ScalarVariable name="e" valueReference="7" causality="output"><Enumeration declaredType="T"/>'
+    description = decay.edited(
+        ("<DefaultExperiment", types + "</TypeDefinitions><DefaultExperiment"),
+        ("</ModelVariables>", row + "</ScalarVariable></ModelVariables>"),
+        (
+            '<Outputs><Unknown index="3" dependencies=""/>',
+            '<Outputs><Unknown index="3" dependencies=""/><Unknown index="5"/>',
+        ),
+    )
+    d = describe_fmu(decay.pack(tmp_path / "e.fmu", b"", description))
+    assert 'variable "e"' in d.untouched_fault
+    assert 'must have variability != "continuous"' in d.untouched_fault
+    assert d.outputs["e"].discrete
+    assert d.outputs["e"].items == (("A", 1),)
+    assert list(d.outputs) == ["y", "e"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ('causality="input"', 'causality="imput"', "'imput' is not an element of the set"),
+        ('<Real start="0"', "<Real", '"u" .* has no start value'),
+        ('<Real start="0" unit="m"/>', '<Real start="0" unit="parsec"/>', 'unit "parsec" of variable "u"'),
+        (' guid="decay"', "", "attribute 'guid' is required but missing"),
+        ('modelIdentifier="Decay"', "", "attribute 'modelIdentifier' is required but missing"),
+        ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "list index out of range"),
+        ('<Outputs><Unknown index="3" dependencies=""', '<Outputs><Unknown index="3" dependencies="9"', "out of range"),
+        ('causality="parameter" variability="fixed"', 'causality="parameter"', "illegal combination"),
+    ],
+)  # fmt: skip
+def test_a_fault_in_what_co_simulation_reads_is_refused(tmp_path: Path, old: str, new: str, wanted: str):
+    file = decay.pack(tmp_path / "a.fmu", b"", decay.edited((old, new)))
+    with pytest.raises(InvalidFmu, match=f"its modelDescription.xml is not valid: .*{wanted}"):
+        describe_fmu(file)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("step", ["NaN", "INF", "1e-300", "-1", "0", "soon"])
+def test_a_step_that_is_none_is_refused_by_name_or_told_where_another_is_given(edited: Edited, fmi: int, step: str):
+    file = edited("mass", fmi, ('stepSize="0.01"', f'stepSize="{step}"'))
+    system = System()
+    system.add("mass", file)
+    where = f"stepSize='{step}' of its DefaultExperiment (line "
+    with pytest.raises(WiringError) as refused:
+        Master(system)
+    assert [where in f and f.startswith("mass: ") for f in refused.value.faults] == [True]
+    system = System()
+    system.add("mass", file, period=Fraction(1, 100), f=2.0)
+    assert where in system.untouched_faults[file]
+    with Master(system) as master:
+        master.run(Fraction(1))
+        assert master.signals["mass.x"] == pytest.approx(1.0)
