@@ -82,7 +82,8 @@ def test_what_cannot_be_tried_says_where_the_reason_is(tmp_path: Path):
     file = tmp_path / "x.fmu"
     with zipfile.ZipFile(cached("Push", 3)) as source, zipfile.ZipFile(file, "w") as target:
         for name in source.namelist():
-            target.writestr(name, source.read(name).replace(b'needsExecutionTool="true"', b'needsExecutionTool="maybe"'))
+            content = source.read(name).replace(b'needsExecutionTool="true"', b'needsExecutionTool="maybe"')
+            target.writestr(name, content)
     result = check(file)
     assert result.exit_code == 1
     assert "  -        run          not tried: its description is invalid, see there" in result.output.splitlines()
