@@ -41,7 +41,7 @@ def program(text: str, folder: Path) -> str:
 
 
 def test_the_readme_has_what_is_tested_here():
-    assert len([c for c in COMMANDS if " run " in c]) == 12
+    assert len([c for c in COMMANDS if " run " in c]) == 13
     assert len([c for c in COMMANDS if " export " in c]) == 1
     assert len([c for c in COMMANDS if " build " in c]) == 2
     assert len([c for c in COMMANDS if " check " in c]) == 1
@@ -197,6 +197,8 @@ def test_the_runs_succeed(command: str, tmp_path: Path):
     needed += [" export "] if ".ssp" in command else []
     for before in (c for c in COMMANDS if any(word in c for word in needed)):
         assert handover(before, tmp_path).returncode == 0
+    if "--input" in command:
+        shell("".join(line + "\n" for line in block_with(command).splitlines() if line.startswith("printf ")), tmp_path)
     done = handover(command, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "succeeded" in done.stdout

@@ -13,6 +13,9 @@ from handover.cosim.fmu.xml import XmlElement
 _SHORTEST = 1e-12
 """Seconds; a shorter step would be lost in the rounding of times, which doubles hold to some 1e-16 of their size."""
 
+_MAX_DENOMINATOR = 10**6
+"""Of times that are taken for rounded fractions."""
+
 NO_STEP = "its FMU proposes no communication step"
 GIVE_STEP = "give one that is above 0 s"
 """What is wrong with a unit that has no communication step, and the remedy."""
@@ -61,6 +64,12 @@ def proposed_step(step: float | None) -> Fraction | None:
     if whole and abs(1 / whole - step) <= 2e-6 * step:
         return Fraction(1, whole)
     return Fraction(repr(step))
+
+
+def exact_seconds(seconds: float) -> Fraction:
+    """Return a time as the fraction meant, such as 1/3 for 0.3333333333333333."""
+    near = Fraction(seconds).limit_denominator(_MAX_DENOMINATOR)
+    return near if float(near) == seconds else Fraction(repr(seconds))
 
 
 def _step(text: str | None) -> float | None:

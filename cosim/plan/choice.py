@@ -26,7 +26,7 @@ def plan_stepper(
 
     `coupling` does the same on the general path; `iterates` says whether units repeat steps after a rollback.
     """
-    reason = _obstacle(schedule, options, iterates)
+    reason = _obstacle(schedule, ensemble, options, iterates)
     library = loop() if reason is None else None
     if library is None:
         log_fallback(reason or "its library is not compiled for this machine")
@@ -40,7 +40,7 @@ def log_fallback(reason: str) -> None:
     _log.info("no compiled plan: %s", reason)
 
 
-def _obstacle(schedule: Schedule, options: MasterOptions, iterates: bool) -> str | None:
+def _obstacle(schedule: Schedule, ensemble: Ensemble, options: MasterOptions, iterates: bool) -> str | None:
     if not options.compiled:
         return "the options ask for none"
     if options.algorithm not in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL):
@@ -49,6 +49,8 @@ def _obstacle(schedule: Schedule, options: MasterOptions, iterates: bool) -> str
         return "units make a loop"
     if options.extrapolation is not Extrapolation.HOLD:
         return "inputs are extrapolated"
+    if ensemble.system.followed:
+        return "inputs follow values over time"
     if max(schedule.tick.numerator, schedule.tick.denominator) >= _MAX_TICKS:
         return f"a tick of {schedule.tick} s is too long a fraction"
     return None

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
+from handover.cosim.fmu.default_experiment import exact_seconds
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.connected_ports import entry_names, find_entry, split_arrays
@@ -20,9 +21,6 @@ from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.start_values import start_values
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
-
-_MAX_DENOMINATOR = 10**6
-"""Of stop times that are taken for rounded fractions."""
 
 Wire = tuple[PortName, PortName, LinearTransformation | None]
 
@@ -162,7 +160,7 @@ class SspFile:
         archive = SspArchive(path)
         structure = read_structure(archive)
         self.path, self.name = path, structure.name
-        self.stop = None if structure.stop is None else _exact(structure.stop)
+        self.stop = None if structure.stop is None else exact_seconds(structure.stop)
         self._folder = tempfile.TemporaryDirectory(prefix="handover-ssp-", ignore_cleanup_errors=True)
         try:
             archive.unpack(Path(self._folder.name))
@@ -225,9 +223,3 @@ class SspFile:
         except WiringError as e:
             raise InvalidSsp(self.path, e.faults) from e
         return system
-
-
-def _exact(seconds: float) -> Fraction:
-    """Return a time as the fraction meant, such as 1/3 for 0.3333333333333333."""
-    near = Fraction(seconds).limit_denominator(_MAX_DENOMINATOR)
-    return near if float(near) == seconds else Fraction(repr(seconds))

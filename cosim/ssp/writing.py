@@ -140,11 +140,13 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
 
     Raises:
         WiringError: the system has faults.
-        NotExportable: an array that is one variable is connected to one whose entries are variables, or clocks are
-            connected.
+        NotExportable: an array that is one variable is connected to one whose entries are variables, clocks are
+            connected, or an input follows values over time.
         OSError: the file cannot be written.
     """
     system.check()
+    if faults := [f"{u}.{port} follows values over time" for u, ports in system.followed.items() for port in ports]:
+        raise NotExportable(faults)
     files = _file_names(system)
     version = "1.0" if all(u.description.fmi == 2 for u in system.units.values()) else "2.0"
     contents = {f"resources/{file}": fmu.read_bytes() for fmu, file in files.items()}

@@ -156,10 +156,13 @@ class Ensemble:
             UnitFailure: the unit does not accept them.
         """
         sources = self.system.sources_of(unit)
-        self.instances[unit].set_some_inputs([port for port, s in sources.items() if s.unit in known])
+        ports = [port for port, s in sources.items() if s.unit in known]
+        self.instances[unit].set_some_inputs([*ports, *self.system.followed.get(unit, ())])
 
     def gather(self, unit: str, t: float) -> None:
-        """Copy to a unit's buffers what its sources give; `set_inputs` then passes it to the unit.
+        """Copy to a unit's buffers what its sources give, and what inputs follow over time at t.
+
+        `set_inputs` then passes it to the unit.
 
         Raises:
             UnitFailure: a number does not fit its input.
@@ -278,7 +281,7 @@ class Ensemble:
 
     def _make(self, name: str, folder: Path) -> Instance:
         d = self.system.units[name].description
-        return Instance(name, d, folder, self.system.sources_of(name), self.heartbeat)
+        return Instance(name, d, folder, self.system.fed_inputs(name), self.heartbeat)
 
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:

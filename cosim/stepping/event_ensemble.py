@@ -144,7 +144,7 @@ class EventEnsemble(Ensemble):
     def _make(self, name: str, folder: Path) -> Instance:
         unit = self.system.units[name]
         make = EventInstance if unit.uses_events else Instance
-        return make(name, unit.description, folder, self.system.sources_of(name), self.heartbeat)
+        return make(name, unit.description, folder, self.system.fed_inputs(name), self.heartbeat)
 
 
 def can_roll_back(unit: PlacedUnit) -> bool:

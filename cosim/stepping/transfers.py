@@ -21,6 +21,7 @@ from handover.cosim.fmu.failures import NotFinite
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
+from handover.cosim.system.time_series import TimeSeries
 
 _log = logging.getLogger(__name__)
 
@@ -124,12 +125,20 @@ class FiniteCheck:
         return None
 
 
+class Following(NamedTuple):
+    """An input that follows values over time."""
+
+    target: NDArray[Any]
+    series: TimeSeries
+
+
 class Feeding(NamedTuple):
-    """What happens before a unit's inputs are set: checks, then copies, then scaled copies."""
+    """What happens before a unit's inputs are set: checks, then copies, then scaled copies, then values over time."""
 
     narrowings: Sequence[Narrowing]
     copies: Sequence[Copy]
     scaled: Sequence[ScaledCopy]
+    followings: Sequence[Following] = ()
 
     def transfer(self, t: float) -> None:
         """Fill a unit's buffers at t.
@@ -143,6 +152,8 @@ class Feeding(NamedTuple):
             target[...] = source
         for scaled in self.scaled:
             scaled()
+        for target, series in self.followings:
+            target[...] = series.at(t)
 
 
 def feedings(system: System, instances: Mapping[str, Instance]) -> dict[str, Feeding]:
@@ -178,4 +189,5 @@ def _feeding(
             copies += zip(instance.u[port], other.y[source.port], strict=True)
         if target.width and narrows(output, target):
             narrowings.append(Narrowing(str(source), name, port, target.width, other.y[source.port][0]))
-    return Feeding(narrowings, joined(copies), scaled)
+    followings = [Following(instance.u[port][0], series) for port, series in system.followed.get(name, {}).items()]
+    return Feeding(narrowings, joined(copies), scaled, followings)

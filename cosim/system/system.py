@@ -20,6 +20,7 @@ from handover.cosim.fmu.clocks import FmuClock
 from handover.cosim.fmu.default_experiment import GIVE_STEP, NO_STEP, DefaultExperiment, proposed_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
+from handover.cosim.system.time_series import TimeSeries
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,8 @@ class System:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
+        self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
+        """By unit and input, the values over time that inputs follow."""
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
@@ -138,6 +141,16 @@ class System:
         self.connections.append(Connection(source, target, transformation))
         self._sources[target.unit][target.port] = source
 
+    def follow(self, target: PortName, series: TimeSeries) -> None:
+        """Let an input that no output feeds follow values over time, which are in its unit.
+
+        Raises:
+            TypeError: the target is not a port.
+        """
+        if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
+        self.followed[target.unit][target.port] = series
+
     def check(self) -> None:
         """Check all names, values and connections.
 
@@ -155,6 +168,8 @@ class System:
             if c.target in fed:
                 faults.append(f"{c.target} is fed twice: by {fed[c.target]} and by {c.source}")
             fed[c.target] = c.source
+        for unit, inputs in self.followed.items():
+            faults += [f for port, series in inputs.items() if (f := self._series_fault(PortName(unit, port), series))]
         if faults:
             raise WiringError(faults)
 
@@ -178,6 +193,10 @@ class System:
         sources = self._sources.get(unit, {})
         clocks = self.units[unit].description.clocks if unit in self.units else ()
         return {port: source for port, source in sources.items() if port not in clocks}
+
+    def fed_inputs(self, unit: str) -> list[str]:
+        """Return the names of the inputs of a unit that are set during a run."""
+        return [*self.sources_of(unit), *self.followed.get(unit, ())]
 
     def clock_connections(self) -> list[Connection]:
         """Return the connections between clocks."""
@@ -226,6 +245,13 @@ class System:
         if reason is None:
             return []
         return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
+
+    def _series_fault(self, target: PortName, series: TimeSeries) -> str | None:
+        port, fault = self._find(target, "input")
+        if port is not None and target.port in self._sources.get(target.unit, {}):
+            fault = f"fed by {self._sources[target.unit][target.port]}, so it cannot follow values over time"
+        fault = fault or (series.fault(port) if port is not None else None)
+        return f"{target}: {fault}" if fault else None
 
     def _find(self, end: PortName, role: str) -> tuple[FmuPort | None, str | None]:
         unit = self.units.get(end.unit)

@@ -18,6 +18,7 @@ Look
 Run
   handover run helix_handover            one run; leaves a folder with a report
   handover run x.ssp --stop 5            a system from another tool, for 5 s
+  handover run x.fmu --input u.csv       one unit from any tool, with inputs from a table
   handover resume runs/long              resumes a run with checkpoints
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
                                          a campaign: many runs, one table

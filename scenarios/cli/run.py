@@ -1,4 +1,4 @@
-"""The command `handover run`: one run of a scenario or of an SSP."""
+"""The command `handover run`: one run of a scenario, of an SSP or of an FMU."""
 
 import contextlib
 import sys
@@ -19,6 +19,7 @@ from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
 from handover.scenarios.cli.run_summary import exit_with
 from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
@@ -28,17 +29,34 @@ from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.task import Task
 
-_option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp", type=Seconds(), metavar="SECONDS")
+_option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp and FILE.fmu")
 _STOP = _option(
     "--stop",
+    "--stop-time",
+    "stop",
+    type=Seconds(),
+    metavar="SECONDS",
     help="When the run ends: at the first communication point at or after it.  [default: the file's own stop time]",
 )
-_STEP = _option("--step", help="Communication step of all units.  [default: what each FMU proposes]")
+_STEP = _option(
+    "--step",
+    type=Seconds(),
+    metavar="SECONDS",
+    help="Communication step of all units.  [default: what each FMU proposes]",
+)
+_INPUT = _option(
+    "--input",
+    "inputs",
+    type=click.Path(path_type=Path),
+    metavar="FILE.csv",
+    help="Of an FMU: inputs over time, a column `time` and columns by input's name, in the inputs' units; continuous"
+    " reals lie on lines between two times, all else is held.  [default: constant at their start values]",
+)
 
 
 def ssp_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--stop` and `--step`, which are for SSPs."""
-    return _STOP(_STEP(command))
+    """Add `--stop`, `--step` and `--input`, which are for SSPs and FMUs."""
+    return _STOP(_STEP(_INPUT(command)))
 
 
 def reject_for_ssp(**given: Any) -> None:
@@ -52,9 +70,30 @@ def reject_for_ssp(**given: Any) -> None:
         raise UsageError(f"{', '.join(used)}: for scenarios; an SSP has its parameters and units inside")
 
 
+def reject_other_options(scenario: str, given: Mapping[str, Any]) -> None:
+    """Reject options that are for another kind of run than that of `scenario`, by how they are typed.
+
+    Raises:
+        UsageError: one of them is given.
+    """
+    used = [name for name, value in given.items() if value]
+    if is_ssp(scenario):
+        reject_for_ssp(**{name: given[name] for name in ("-p", "--seed", "--unit")})
+        if "--input" in used:
+            raise UsageError("--input: for an FMU that runs by itself; an SSP's inputs are wired in it")
+    elif is_fmu(scenario):
+        if wrong := [name for name in ("--seed", "--unit") if name in used]:
+            raise UsageError(f"{', '.join(wrong)}: for scenarios; of an FMU, -p sets parameters")
+    elif "--input" in used:
+        raise UsageError("--input is for an FMU that runs by itself; a scenario's inputs are wired in it")
+    elif {"--stop", "--step"} & set(used):
+        raise UsageError("--stop and --step are for an SSP; a scenario has its own")
+
+
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
 
 FILE.ssp is a system from another tool (SSP 1.0 or 2.0), or from `handover export`: it runs until its stop time.
+FILE.fmu is one unit, from any tool: it runs by itself, with its parameters set by -p and its inputs by --input.
 
 Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
 
@@ -66,7 +105,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 
 
 @click.command("run", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
-@click.argument("scenario", metavar="SCENARIO|FILE.ssp")
+@click.argument("scenario", metavar="SCENARIO|FILE.ssp|FILE.fmu")
 @scenario_options
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
@@ -104,6 +143,7 @@ def run(
     out: Path | None,
     stop: Fraction | None,
     step: Fraction | None,
+    inputs: Path | None,
     formats: Sequence[str],
     every: Fraction | None,
     no_report: bool,
@@ -112,16 +152,19 @@ def run(
     pace: float | None,
     **coupling: Any,
 ) -> None:
-    """Run a SCENARIO or an SSP once."""
-    if is_ssp(scenario):
-        reject_for_ssp(**{"-p": parameters, "--seed": seed, "--unit": replaced})
-    elif stop is not None or step is not None:
-        raise UsageError("--stop and --step are for an SSP; a scenario has its own")
+    """Run a SCENARIO, an SSP or an FMU once."""
+    for_scenarios = {"-p": parameters, "--seed": seed, "--unit": replaced}
+    reject_other_options(scenario, {**for_scenarios, "--stop": stop, "--step": step, "--input": inputs})
     with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
         options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace), strict=strict)
         source: Mapping[str, Any] = {}
         if is_ssp(scenario):
             experiment, values, source = _of_file(Path(scenario), stop, step, opened)
+        elif is_fmu(scenario):
+            values = NoParameters()
+            alone = FmuRun(path=Path(scenario), parameters=parameters, inputs=inputs, stop=stop, step=step)
+            experiment = alone.open()
+            source = alone.as_source(experiment.stop_time(values))
         else:
             experiment = find_scenario(scenario)()
             values = parse_parameters(type(experiment), parameters)

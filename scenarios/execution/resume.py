@@ -12,6 +12,7 @@ from handover.cosim.record.file_lock import FileLocked
 from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.execution.fmu_run import reopened
 from handover.scenarios.execution.resumption import Resumption, unpack
 from handover.scenarios.execution.ssp_run import open_experiment
 from handover.scenarios.experiment.experiment import Experiment
@@ -114,10 +115,19 @@ class InterruptedRun:
                     self.folder.path, f"its scenario {name!r} is not here; {nearest(name, SCENARIOS)}"
                 )
             return SCENARIOS[name]()
+        if "fmu" in source:
+            return self._fmu_experiment(source)
         file, step = Path(source["ssp"]), source["step"]
         if not file.is_file() or sha256_of(file) != source["sha256"]:
             raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
         return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
+
+    def _fmu_experiment(self, source: Mapping[str, Any]) -> Experiment[Any]:
+        run, files = reopened(source)
+        for file, sha256 in files.items():
+            if not file.is_file() or sha256_of(file) != sha256:
+                raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
+        return run.open()
 
     def _fmu(self, name: str, unit: str) -> Path:
         """Return a unit's file, or the same unit built again where the folder of built units was cleared."""

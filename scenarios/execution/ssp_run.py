@@ -1,12 +1,14 @@
 """An SSP as an experiment: it runs until its stop time, and its outputs are drawn."""
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
+from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.fmu.default_experiment import GIVE_STEP
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals
@@ -49,21 +51,21 @@ def is_ssp(name: str) -> bool:
     return Path(name).suffix.lower() == ".ssp"
 
 
-def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
-    """Return an SSP as an experiment that ends at a time, s."""
+def system_experiment(file_name: str, heading: str, system: System, stop: Fraction) -> Experiment[UntilStop]:
+    """Return a system from a file as an experiment that ends at a time, s."""
 
-    class SspExperiment(Experiment[UntilStop]):
+    class SystemExperiment(Experiment[UntilStop]):
         """Runs the system as it is."""
 
-        name: ClassVar[str] = ssp.path.name
-        title: ClassVar[str] = f"{ssp.name}, a system from {ssp.path.name}"
+        name: ClassVar[str] = file_name
+        title: ClassVar[str] = heading
         parameters_type: ClassVar[type[Any]] = NoParameters
         units: ClassVar[Mapping[str, str]] = {}
         headline: ClassVar[tuple[str, ...]] = ()
         is_seeded: ClassVar[bool] = False
 
         def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:  # noqa: ARG002
-            return ssp.system
+            return system
 
         def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
             return stop
@@ -77,9 +79,9 @@ def experiment_of(ssp: SspFile, stop: Fraction) -> Experiment[UntilStop]:
         def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
             from handover.scenarios.reporting.run_figures import figures_of_outputs  # what draws takes long to load
 
-            return figures_of_outputs(ssp.system.units, record)
+            return figures_of_outputs(system.units, record)
 
-    return SspExperiment()
+    return SystemExperiment()
 
 
 def open_experiment(
@@ -88,14 +90,23 @@ def open_experiment(
     """Open an SSP as an experiment; `opened` closes it.
 
     Raises:
-        InvalidSsp: see `SspFile`. UsageError: neither the file nor the command gives a stop time.
+        InvalidSsp: see `SspFile`; where a unit has no step, it names `--step`.
+        UsageError: neither the file nor the command gives a stop time.
     """
-    ssp = opened.enter_context(SspFile(path, step))
+    try:
+        ssp = opened.enter_context(SspFile(path, step))
+    except InvalidSsp as e:
+        raise InvalidSsp(e.path, naming_step(e.faults)) from e
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))
     until = stop or ssp.stop
     if until is None:
         raise UsageError(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
-    return experiment_of(ssp, until)
+    return system_experiment(path.name, f"{ssp.name}, a system from {path.name}", ssp.system, until)
+
+
+def naming_step(faults: Sequence[str]) -> list[str]:
+    """Return faults of a system, with the option that gives units a step where one has none."""
+    return [f"{f}, such as by --step 0.01" if f.endswith(GIVE_STEP) else f for f in faults]
 
 
 def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:

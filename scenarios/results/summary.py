@@ -320,12 +320,13 @@ def metric_of(data: Mapping[str, Any]) -> Metric:
 
 
 def parameter_rows(task: Task) -> list[list[str]]:
-    """Return name, value with unit, and description of each parameter."""
+    """Return name, value with unit, and description of each parameter, also of those that `Task.source` keeps."""
     rows: list[list[str]] = []
     for v in task.experiment.parameters():
         value = format_value(_plain(getattr(task.parameters, v.name)))
         rows.append([v.name, f"{value} {unit_symbol(v.unit.symbol)}".rstrip(), v.description])
-    return rows
+    given: Sequence[str] = task.source.get("parameters", ())
+    return rows + [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
 
 
 def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:

@@ -1,0 +1,63 @@
+"""Values that an input follows over time, given beforehand: between two instants on a line, or held."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.fmu.description import FmuPort
+
+_FOLLOWING = (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION)
+
+
+class TimeSeries:
+    """A value u(t), from u_k at times t_k.
+
+    Linear: u(t) = u_k + (t - t_k) (u_{k+1} - u_k) / (t_{k+1} - t_k) between two times; else u(t) = u_k from t_k until
+    t_{k+1}. Before the first time it is the first value, from the last on the last. Where a time is given more than
+    once u jumps: the last value given counts from there on.
+
+    Args:
+        times: in seconds, shape [n], none below the one before it.
+        values: shape [n, size], entries of an array in row-major order; in the unit of the input.
+        linear: whether values between two times lie on a line.
+
+    Raises:
+        ValueError: there are no times, they descend, numbers are not finite, or there is not one row a time.
+    """
+
+    def __init__(self, times: Sequence[float] | Floats, values: Any, *, linear: bool) -> None:
+        self.times: Floats = np.asarray(times, dtype=np.float64)
+        self.values: NDArray[Any] = np.asarray(values)
+        self.linear = linear
+        if self.times.ndim != 1 or not len(self.times):
+            raise ValueError("a series needs one time at least")
+        if self.values.ndim != 2 or len(self.values) != len(self.times):
+            raise ValueError(f"values of shape {self.values.shape} for {len(self.times)} times: a row a time is right")
+        if not (np.isfinite(self.times).all() and np.isfinite(np.asarray(self.values, dtype=np.float64)).all()):
+            raise ValueError("times and values must be finite")
+        if (np.diff(self.times) < 0).any():
+            raise ValueError("times must not descend")
+
+    def at(self, t: float) -> NDArray[Any]:
+        """Return the entries at t, s."""
+        k = int(np.searchsorted(self.times, t, side="right")) - 1
+        if k < 0:
+            return self.values[0]
+        if not self.linear or k == len(self.times) - 1:
+            return self.values[k]
+        t_k, t_next = self.times[k], self.times[k + 1]
+        return self.values[k] + (t - t_k) / (t_next - t_k) * (self.values[k + 1] - self.values[k])
+
+    def fault(self, port: FmuPort) -> str | None:
+        """Return why an input cannot follow this, or None."""
+        if port.kind not in _FOLLOWING:
+            return f"a {port.kind.value} cannot follow values over time"
+        if port.clocks:
+            return f"it can be set only while its clock {port.clocks[0]} ticks, so it cannot follow values over time"
+        if self.values.shape[1] != port.size:
+            return f"{self.values.shape[1]} values a time where {port.size} {'is' if port.size == 1 else 'are'} right"
+        return None if not self.linear or port.is_continuous else "its values are held: it does not vary continuously"

@@ -1,0 +1,142 @@
+"""One FMU as an experiment: it runs alone until its stop time, its inputs constant at their start or from a file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import WiringError, nearest
+from handover.cosim.fmu.default_experiment import exact_seconds
+from handover.cosim.fmu.description import FmuPort
+from handover.cosim.system.system import PortName, System
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.input_file import columns_of, entries_of, read_inputs, value_of
+from handover.scenarios.execution.ssp_run import UntilStop, naming_step, system_experiment
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.results.run_folder import sha256_of
+
+
+def is_fmu(name: str) -> bool:
+    """Return whether a name is an FMU's file and not a scenario."""
+    return Path(name).suffix.lower() == ".fmu"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FmuRun:
+    """What a run of one FMU is made of.
+
+    Attributes:
+        path: the FMU; its unit is named like its library.
+        parameters: texts `NAME=VALUE`, of parameters and of inputs at the start, in their own units; an array's values
+            stand with commas between them, or `NAME[1]=VALUE` gives one.
+        inputs: a file of inputs over time, see `read_inputs`; the others stay at their start values.
+        stop, step: in seconds; without them those of its default experiment.
+    """
+
+    path: Path
+    parameters: Sequence[str] = ()
+    inputs: Path | None = None
+    stop: Fraction | None = None
+    step: Fraction | None = None
+
+    def open(self) -> Experiment[UntilStop]:
+        """Return the experiment, after checking all that it is made of.
+
+        Raises:
+            InvalidFmu: it is not a valid co-simulation FMU.
+            UsageError: neither it nor the call gives a stop time and a step, or a value or the file is invalid.
+        """
+        system = System()
+        unit = system.add("unit", self.path, period=self.step)
+        d = system.units.pop(unit.name).description
+        start = self._start({**d.parameters, **d.inputs})
+        system.units[d.identifier] = replace(unit, name=d.identifier, start=start)
+        if self.inputs is not None:
+            for port, series in read_inputs(self.inputs, d.inputs, start).items():
+                system.follow(PortName(d.identifier, port), series)
+        try:
+            system.check()
+        except WiringError as e:
+            raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
+        return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, self._until(d.experiment.stop))
+
+    def as_source(self, stop: Fraction) -> dict[str, Any]:
+        """Return what a run's folder keeps, so that it can be resumed; `reopened` reads it."""
+        files = {"fmu": str(self.path.absolute()), "sha256": sha256_of(self.path)}
+        if self.inputs is not None:
+            files |= {"input": str(self.inputs.absolute()), "input_sha256": sha256_of(self.inputs)}
+        times = {"stop": str(stop), "step": None if self.step is None else str(self.step)}
+        return {**files, **times, "parameters": list(self.parameters)}
+
+    def _until(self, proposed: float | None) -> Fraction:
+        if self.stop is not None:
+            return self.stop
+        if proposed is None or proposed <= 0:
+            reason = "it proposes no stop time" if proposed is None else f"it proposes to stop at {proposed:g} s"
+            raise UsageError(f"{self.path}: {reason}; --stop 10 lets it run from 0 to 10 s")
+        return exact_seconds(proposed)
+
+    def _start(self, ports: Mapping[str, FmuPort]) -> dict[str, Any]:
+        entries, faults = columns_of(ports), list[str]()
+        start: dict[str, Any] = {}
+        seen: set[str] = set()
+        for text in self.parameters:
+            name, equals, value = (part.strip() for part in text.partition("="))
+            if not equals:
+                faults.append(f"{text!r} is not of the form NAME=VALUE")
+            elif name in seen:
+                faults.append(f"{name} is given twice")
+            elif name not in ports and name not in entries:
+                faults.append(f"no parameter or input {name!r}; {nearest(name, ports)}")
+            else:
+                try:
+                    _set(start, ports, entries.get(name), name, value)
+                except ValueError as e:
+                    faults.append(f"{name} = {value[:40]!r}: {e}")
+            seen.add(name)
+        if faults:
+            raise UsageError(f"{self.path}: {'; '.join(faults)}")
+        return start
+
+
+def reopened(source: Mapping[str, Any]) -> tuple[FmuRun, dict[Path, str]]:
+    """Return the run that `as_source` was of, with its files and the SHA-256 that each had."""
+    inputs = Path(source["input"]) if "input" in source else None
+    step = None if source["step"] is None else Fraction(source["step"])
+    run = FmuRun(
+        path=Path(source["fmu"]),
+        parameters=source["parameters"],
+        inputs=inputs,
+        stop=Fraction(source["stop"]),
+        step=step,
+    )
+    files = {run.path: source["sha256"]}
+    return run, files if inputs is None else {**files, inputs: source["input_sha256"]}
+
+
+def _set(
+    start: dict[str, Any], ports: Mapping[str, FmuPort], entry: tuple[FmuPort, int] | None, name: str, text: str
+) -> None:
+    """Set a start value from its text.
+
+    Raises:
+        ValueError: it is no value of the port.
+    """
+    port = ports[name] if name in ports else entry[0] if entry else ports[name]
+    if port.kind in (Kind.STRING, Kind.BINARY):
+        start[name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
+        return
+    if name in ports:
+        values = [value_of(port, part) for part in text.split(",")]
+        if len(values) != port.size:
+            raise ValueError(f"{len(values)} values where {port.size} {'is' if port.size == 1 else 'are'} right")
+    else:
+        values = entries_of(port, start)
+        values[entry[1] if entry else 0] = value_of(port, text)
+    if port.kind is Kind.BOOLEAN:
+        values = [bool(value) for value in values]
+    start[port.name] = np.array(values).reshape(port.shape) if port.shape else values[0]

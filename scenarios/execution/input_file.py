@@ -1,0 +1,185 @@
+"""Inputs of one unit over time, from a CSV file: a column `time`, and a column for each input or entry of one.
+
+Lines are separated into cells by commas. Times are in seconds and do not descend; of one that is given twice the last
+line counts from there on. Numbers are in the units of the inputs. Continuous reals lie on lines between two times, all
+else is held until the next one.
+"""
+
+import csv
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.start_values import numbers_of, range_of
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import nearest
+from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.system.time_series import TimeSeries
+from handover.scenarios.execution.errors import UsageError
+
+TIME = "time"
+_BOOLEANS = {"true": 1, "1": 1, "false": 0, "0": 0}
+_MAX_FAULTS = 5
+
+Column = tuple[FmuPort, int]
+"""An input and which of its entries, counted from 0 in row-major order."""
+
+
+def columns_of(ports: Mapping[str, FmuPort]) -> dict[str, Column]:
+    """Return the names of all scalars among some ports: a port's own, or of an array `p[1]`, `p[2]`, ..."""
+    return {
+        f"{p.name}[{','.join(map(str, index))}]" if p.shape else p.name: (p, k)
+        for p in ports.values()
+        for k, index in enumerate(indices_of(p.shape))
+    }
+
+
+def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, Any]) -> dict[str, TimeSeries]:
+    """Read what inputs follow over time; entries of an array without a column keep their start values.
+
+    Args:
+        path: the file.
+        inputs: the unit's inputs, by name.
+        start: start values that are not those of the FMU.
+
+    Raises:
+        UsageError: the file cannot be read or is not of this form; the message has all faults of one kind.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [(i, row) for i, row in _numbered(csv.reader(file, strict=True)) if row]
+    except OSError as e:
+        raise UsageError(f"{path}: {(e.strerror or str(e)).lower()}") from e
+    except (csv.Error, UnicodeDecodeError) as e:
+        raise UsageError(f"{path}: not a CSV file in UTF-8: {e}") from e
+    if not rows:
+        raise UsageError(f"{path}: it is empty; a line of names is wanted, {TIME} and inputs, then lines of numbers")
+    (_, header), *lines = rows
+    names = [name.strip() for name in header]
+    columns = _columns(path, names, inputs)
+    if not lines:
+        raise UsageError(f"{path}: there is no line of numbers after the names")
+    _refuse(path, [f"line {i}: {len(row)} cells for {len(names)} names" for i, row in lines if len(row) != len(names)])
+    faults: list[str] = []
+    k = names.index(TIME)
+    times = _numbers([(i, row[k]) for i, row in lines], TIME, float, faults)
+    pairs = zip(lines[1:], times, times[1:], strict=False)
+    faults += [f"line {i}: time {b:g} s comes after {a:g} s: times must not descend" for (i, _), a, b in pairs if b < a]
+    values: dict[str, list[Any]] = {}
+    for name, (port, _) in columns.items():
+        column = names.index(name)
+        cells = [(i, row[column]) for i, row in lines]
+        values[name] = _numbers(cells, name, partial(_value, port), faults)
+    _refuse(path, faults)
+    return {port.name: _series(port, times, columns, values, start) for port, _ in columns.values()}
+
+
+def value_of(port: FmuPort, text: str) -> int | float:
+    """Return one entry of a port that is a number, a boolean or an enumeration, from its text.
+
+    Raises:
+        ValueError: it is none, or out of range; the message says what is right.
+    """
+    return _value(port, text.strip())
+
+
+def entries_of(port: FmuPort, start: Mapping[str, Any]) -> list[Any]:
+    """Return the entries of a port's start value, the given one or its FMU's; 0 where there is none."""
+    if port.name in start:
+        return numbers_of(port, start[port.name]).tolist()
+    texts = (port.start or "0").split() or ["0"]
+    entries = [_parsed(port, text) for text in texts]
+    return entries * port.size if len(entries) == 1 else entries
+
+
+def _numbered(reader: Any) -> Iterator[tuple[int, Sequence[str]]]:
+    """Yield each row with the number of the line on which it ends."""
+    for row in reader:
+        yield reader.line_num, row
+
+
+def _columns(path: Path, names: Sequence[str], inputs: Mapping[str, FmuPort]) -> dict[str, Column]:
+    valid = columns_of({n: p for n, p in inputs.items() if p.kind not in (Kind.STRING, Kind.BINARY)})
+    faults = [f"there is no column {TIME!r}, in seconds"] if TIME not in names else []
+    for n in dict.fromkeys(names):
+        if names.count(n) > 1:
+            faults.append(f"there are {names.count(n)} columns {n!r}")
+        if n in valid or n == TIME:
+            continue
+        if n in inputs and inputs[n].kind in (Kind.STRING, Kind.BINARY):
+            faults.append(f"the input {n!r} is a {inputs[n].kind.value}, which cannot follow values over time")
+        elif n in inputs:
+            entries = [name for name, (port, _) in valid.items() if port.name == n]
+            faults.append(f"the input {n!r} is an array: columns {entries[0]} to {entries[-1]} are right")
+        else:
+            faults.append(f"no input {n!r}; {nearest(n, valid)}")
+    _refuse(path, faults)
+    return {n: valid[n] for n in names if n != TIME}
+
+
+def _numbers(
+    cells: Sequence[tuple[int, str]], column: str, convert: Callable[[str], int | float], faults: list[str]
+) -> list[Any]:
+    """Return the values of a column; what is wrong is added to the faults, with its line."""
+    values: list[Any] = []
+    for line, cell in cells:
+        try:
+            value = convert(cell.strip())
+            if not math.isfinite(value):
+                raise ValueError("it is not finite")
+        except ValueError as e:
+            reason = f"; {e}" if convert is not float else "; a finite number is right"
+            faults.append(f"line {line}, column {column!r}: {cell[:40]!r}{reason}")
+            value = 0
+        values.append(value)
+    return values
+
+
+def _value(port: FmuPort, text: str) -> int | float:
+    value = _parsed(port, text)
+    low, high = port.minimum, port.maximum
+    if (low is not None and value < low) or (high is not None and value > high):
+        raise ValueError(f"it is out of range: {range_of(port)}")
+    if port.kind is Kind.INTEGER and port.width is not None and not port.width.holds(value):
+        raise ValueError(f"it does not fit {port.width.range_text}")
+    return value
+
+
+def _parsed(port: FmuPort, text: str) -> int | float:
+    if port.kind is Kind.BOOLEAN:
+        if text.lower() not in _BOOLEANS:
+            raise ValueError("true, false, 1 or 0 is right")
+        return _BOOLEANS[text.lower()]
+    if port.kind is Kind.ENUMERATION:
+        items = {name.upper(): value for name, value in port.items} | {str(value): value for _, value in port.items}
+        if text.upper() not in items:
+            raise ValueError(f"one of {', '.join(name.lower() for name, _ in port.items)} is right")
+        return items[text.upper()]
+    try:
+        return int(text) if port.kind is Kind.INTEGER else float(text)
+    except ValueError:
+        raise ValueError(f"a {'whole ' if port.kind is Kind.INTEGER else ''}number is right") from None
+
+
+def _series(
+    port: FmuPort,
+    times: Sequence[float],
+    columns: Mapping[str, Column],
+    values: Mapping[str, Sequence[Any]],
+    start: Mapping[str, Any],
+) -> TimeSeries:
+    rows = np.array([entries_of(port, start)] * len(times))
+    for name, (other, k) in columns.items():
+        if other.name == port.name:
+            rows[:, k] = values[name]
+    return TimeSeries(times, rows, linear=port.is_continuous)
+
+
+def _refuse(path: Path, faults: Sequence[str]) -> None:
+    if faults:
+        more = f"; and {len(faults) - _MAX_FAULTS} more" if len(faults) > _MAX_FAULTS else ""
+        raise UsageError(f"{path}: {'; '.join(faults[:_MAX_FAULTS])}{more}")

@@ -1,0 +1,227 @@
+"""`handover run FILE.fmu`: one unit by itself, with its inputs constant or from a table, as `fmpy simulate` runs it."""
+
+import json
+import signal
+import subprocess
+import sys
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from native_units import native_fmu
+
+from handover.cosim.record.reader import Record
+from handover.cosim.system.signals import Signals
+from handover.scenarios.cli.command import main
+from handover.scenarios.execution.ssp_run import UntilStop
+
+PULL = "time,f\n0,0\n0.5,2\n0.5,-1\n0.8,1\n"
+
+
+def run(file: Path | str, *arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["run", str(file), *(str(a) for a in arguments)])
+
+
+def table(folder: Path, text: str) -> Path:
+    file = folder / "inputs.csv"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def simulated(file: Path, stop: float, step: float, signals: Any = None, **start: float) -> Any:
+    """Return what FMPy makes of the same."""
+    return fmpy.simulate_fmu(
+        str(file), stop_time=stop, output_interval=step, input=signals, start_values=start, fmi_type="CoSimulation"
+    )
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_it_gives_what_fmpy_gives(tmp_path: Path, fmi: int):
+    file, out = native_fmu("mass", fmi), tmp_path / "out"
+    result = run(file, "--input", table(tmp_path, PULL), "-p", "m=2", "-p", "k=10", "--no-report", "--out", out)
+    assert result.exit_code == 0, result.output
+    record = Record(out / "signals.parquet")
+    rows = [(0.0, 0.0), (0.5, 2.0), (0.5, -1.0), (0.8, 1.0)]
+    signals = np.array(rows, dtype=[("time", "f8"), ("f", "f8")])
+    expected = simulated(file, 1.0, 0.01, signals, m=2.0, k=10.0)
+    assert len(record.time) == len(expected) == 101
+    for name in ("x", "v"):
+        np.testing.assert_allclose(record[f"mass.{name}"], expected[name], rtol=0, atol=1e-12)
+    assert np.ptp(expected["x"]) > 0.01
+
+
+def test_it_leaves_the_folder_of_a_run(tmp_path: Path):
+    out, inputs = tmp_path / "out", table(tmp_path, PULL)
+    result = run(native_fmu("mass", 2), "--input", inputs, "-p", "m=2", "--format", "csv", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert f"{native_fmu('mass', 2).name} succeeded: ran to 1 s" in result.output
+    names = {p.name for p in out.iterdir()}
+    assert names >= {"summary.json", "run.json", "signals.parquet", "signals.csv", "report.html", "figures"}
+    assert {p.suffix for p in (out / "figures").iterdir()} == {".png", ".svg"}
+    source = json.loads((out / "run.json").read_text())["source"]
+    assert (source["stop"], source["step"], source["parameters"]) == ("1", None, ["m=2"])
+    assert source["input"] == str(inputs)
+    page = (out / "report.html").read_text()
+    assert "mass, an FMU by itself" in page
+    assert "given start value" in page
+
+
+def test_inputs_stay_at_their_start_values(tmp_path: Path):
+    result = run(native_fmu("mass", 3), "-p", "f=2", "--stop-time", "1/2", "--step", "1/4", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    record = Record(tmp_path / "out" / "signals.parquet")
+    assert record.time.tolist() == [0.0, 0.25, 0.5]
+    assert record["mass.x"].tolist() == pytest.approx([0.0, 0.0625, 0.25])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_what_is_not_continuous_is_held(tmp_path: Path, fmi: int):
+    inputs = table(tmp_path, "time,truth_in,count_in\n0,true,1\n0.3,0,5\n0.7,TRUE,-2\n")
+    result = run(native_fmu("discrete_passer", fmi), "--input", inputs, "--no-report", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    record = Record(tmp_path / "out" / "signals.parquet")
+    at_begin = np.maximum(np.arange(11) - 1, 0)  # outputs at the end of a step are of the inputs at its beginning
+    assert record["discrete_passer.count"].tolist() == [1 if k < 3 else 5 if k < 7 else -2 for k in at_begin]
+    assert record["discrete_passer.truth"].tolist() == [not 3 <= k < 7 for k in at_begin]
+
+
+def test_entries_of_an_array_are_columns(tmp_path: Path):
+    inputs = table(tmp_path, "time,u[3],u[1]\n0,0,1\n1,10,1\n")
+    result = run(native_fmu("array_passer"), "--input", inputs, "-p", "u=7,8,9", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    last = Record(tmp_path / "out" / "signals.parquet")["array_passer.y"][-1]
+    assert last.tolist() == pytest.approx([1.0, 8.0, 9.0])
+    result = run(native_fmu("array_passer"), "-p", "u[2]=4", "--out", tmp_path / "other")
+    assert Record(tmp_path / "other" / "signals.parquet")["array_passer.y"][-1].tolist() == [0.0, 4.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("", ["it is empty"]),
+        ("time,f\n", ["no line of numbers"]),
+        ("f\n0\n", ["there is no column 'time'"]),
+        ("time,force\n0,1\n", ["no input 'force'; valid: f"]),
+        ("time,f,f\n0,1,1\n", ["there are 2 columns 'f'"]),
+        ("time,f\n0,1\n0.2,1\n0.1,1\n", ["line 4: time 0.1 s comes after 0.2 s: times must not descend"]),
+        ("time,f\n0,1\nsoon,one\n", ["line 3, column 'time': 'soon'", "line 3, column 'f': 'one'; a number is right"]),
+        ("time,f\n0,1\n1,nan\n", ["line 3, column 'f': 'nan'; it is not finite"]),
+        ("time,f\n0,1\n1\n", ["line 3: 1 cells for 2 names"]),
+        ('time,f\n0,"1\n', ["not a CSV file in UTF-8"]),
+    ],
+)  # fmt: skip
+def test_a_table_of_another_form_is_refused_by_line_and_column(tmp_path: Path, text: str, wanted: Sequence[str]):
+    result = run(native_fmu("mass", 2), "--input", table(tmp_path, text), "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    (line,) = result.output.splitlines()
+    assert line.startswith(f"Error: {tmp_path / 'inputs.csv'}: ")
+    for part in wanted:
+        assert part in line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (("-p", "mas=1"), "no parameter or input 'mas'; did you mean m"),
+        (("-p", "m"), "'m' is not of the form NAME=VALUE"),
+        (("-p", "m=heavy"), "m = 'heavy': a number is right"),
+        (("-p", "m=1", "-p", "m=2"), "m is given twice"),
+        (("-p", "m=1,2"), "m = '1,2': 2 values where 1 is right"),
+        (("-p", "m=inf"), "mass.m: inf is not finite"),
+        (("--input", "missing.csv"), "missing.csv: no such file or directory"),
+        (("--seed", "1"), "--seed: for scenarios"),
+        (("--unit", "a=b.fmu"), "--unit: for scenarios"),
+    ],
+)  # fmt: skip
+def test_a_wrong_call_is_refused_in_one_line(tmp_path: Path, arguments: Sequence[str], wanted: str):
+    result = run(native_fmu("mass", 2), *arguments, "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert wanted in result.output
+    assert len(result.output.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_inputs_are_for_an_fmu_alone(tmp_path: Path):
+    for name in ("ir_grasp", "x.ssp"):
+        result = run(name, "--input", table(tmp_path, PULL))
+        assert result.exit_code == 2
+        assert "--input" in result.output
+        assert "for an FMU that runs by itself" in result.output
+
+
+def test_a_run_with_a_table_resumes_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    arguments = [native_fmu("mass", 2), "--input", table(tmp_path, PULL), "-p", "k=30", "--checkpoint", "0.25"]
+    arguments += ["--call-limit", "0"]  # observers are called in the main thread, where Ctrl-C is heard at once
+    whole, parted = tmp_path / "whole", tmp_path / "parted"
+    assert run(*arguments, "--no-report", "--out", whole).exit_code == 0
+    note = UntilStop.__call__
+
+    def interrupt(evaluator: UntilStop, t: float, signals: Signals) -> None:
+        note(evaluator, t, signals)
+        if t == 0.6:
+            signal.raise_signal(signal.SIGINT)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(UntilStop, "__call__", interrupt)
+        assert run(*arguments, "--no-report", "--out", parted).exit_code == 1
+    assert Record(parted / "signals.parquet").time[-1] == 0.6
+    result = CliRunner().invoke(main, ["resume", str(parted), "--no-report"])
+    assert result.exit_code == 0, result.output
+    for name in ("mass.x", "mass.v"):
+        a, b = (Record(folder / "signals.parquet")[name] for folder in (whole, parted))
+        assert a.tobytes() == b.tobytes()
+
+
+def test_a_step_is_named_where_the_fmu_gives_none(tmp_path: Path):
+    file = without_step(tmp_path)
+    result = run(file, "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "its FMU proposes no communication step; give one that is above 0 s, such as by --step 0.01" in result.output
+    told = CliRunner().invoke(main, ["check", str(file)]).output
+    assert "no step size given: a run needs --step" in told
+    assert "10 steps of 0.01 s" in told
+    assert run(file, "--step", "0.01", "--no-report", "--out", tmp_path / "out").exit_code == 0
+
+
+def test_a_fault_that_co_simulation_does_not_touch_is_warned_of_once(tmp_path: Path):
+    file, out = edited(tmp_path, b'name="x"', b'name="x" description="" annotation="odd"'), tmp_path / "out"
+    refused = run(file, "--out", out)
+    assert refused.exit_code == 2, refused.output  # of an output: it touches co-simulation
+    local = b'<Float64 name="s" valueReference="90" causality="local" derivative="999"/></ModelVariables>'
+    file = edited(tmp_path, b"</ModelVariables>", local)
+    call = [sys.executable, "-c", "from handover.scenarios.cli.command import main; main()", "run", str(file)]
+    done = subprocess.run([*call, "--out", str(out)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("references value reference 999 which does not exist") == 1
+    (line,) = json.loads((out / "run.json").read_text())["warnings"]
+    assert line.startswith("edited.fmu: The derivative attribute of model variable s (line ")
+    page = (out / "report.html").read_text()
+    assert "<h3>Warnings</h3>" in page
+    assert "value reference 999" in page
+    strict = run(file, "--strict", "--out", tmp_path / "strict")
+    assert strict.exit_code == 2, strict.output
+    assert "its modelDescription.xml is not valid: The derivative attribute" in strict.output
+    assert not (tmp_path / "strict").exists()
+    checked = CliRunner().invoke(main, ["check", str(file)])
+    assert checked.exit_code == 1
+    assert "it is the derivative of 999, which leads to no variable" in checked.output
+
+
+def without_step(folder: Path) -> Path:
+    return edited(folder, b' stepSize="0.01"', b"")
+
+
+def edited(folder: Path, old: bytes, new: bytes) -> Path:
+    file = folder / "edited.fmu"
+    with zipfile.ZipFile(native_fmu("mass", 3)) as source, zipfile.ZipFile(file, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            assert old in content or name != "modelDescription.xml"
+            target.writestr(name, content.replace(old, new, 1) if name == "modelDescription.xml" else content)
+    return file
