@@ -26,8 +26,11 @@ from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
 from handover.cosim.fmu.default_experiment import default_experiment, proposed_step
 from handover.cosim.fmu.fmpy_edge import (
     checked_xml,
+    libraries_in,
     library_path,
+    missing_library,
     platform_folder,
+    platforms_in,
     problems_of,
     read_description,
     required_functions,
@@ -103,49 +106,19 @@ _FMI2_FOLDERS = {
     "win64": ("x86_64-windows",),
     "darwin64": ("x86_64-darwin", "aarch64-darwin"),
 }
-_SUFFIXES = (".so", ".dll", ".dylib")
-
-
-def platforms_in(archive: FmuArchive) -> list[str]:
-    """Return the folders of `binaries/` that hold a shared library."""
-    return sorted({p.parts[1] for p in _libraries(archive)})
 
 
 def binary_findings(archive: FmuArchive, fmi: int, identifier: str) -> Iterator[Finding]:
     """Yield what is wrong with the libraries' names, folders, formats and lengths."""
     wanted = library_path(fmi, identifier)
-    if wanted not in archive.names:
-        yield _missing(archive, fmi, identifier)
-    for library in _libraries(archive):
+    if lack := missing_library(archive, fmi, identifier):
+        yield fault(lack.what, where=lack.where, cure=lack.cure)
+    for library in libraries_in(archive):
         if library.stem == identifier:
             yield from _format_findings(archive, library, fmi, here=str(library) == wanted)
         if short := shortage(archive.head(str(library), HEAD), archive.size(str(library))):
             level = fault if library.parts[1] == platform_folder(fmi) else warning
             yield level(short, where=str(library))
-
-
-def _libraries(archive: FmuArchive) -> list[PurePosixPath]:
-    paths = [PurePosixPath(n) for n in archive.names if n.startswith("binaries/") and n.endswith(_SUFFIXES)]
-    return [p for p in paths if len(p.parts) == 3]
-
-
-def _missing(archive: FmuArchive, fmi: int, identifier: str) -> Finding:
-    """Return why there is no library for this machine: another name, another standard's folder, or none at all."""
-    folder, has = platform_folder(fmi), platforms_in(archive)
-    wanted = library_path(fmi, identifier)
-    here = [p.name for p in _libraries(archive) if p.parts[1] == folder]
-    other = platform_folder(5 - fmi)
-    if here:
-        what = f"no library is named like the modelIdentifier {identifier!r}; there is {', '.join(here)}"
-        return fault(what, where=f"binaries/{folder}", cure=f"{wanted} is wanted")
-    if other in has:
-        what = f"the library for this machine is in the folder of FMI {5 - fmi}.0, {other}"
-        return fault(what, where="binaries", cure=f"{wanted} is wanted")
-    sources = any(n.startswith("sources/") and not n.endswith("/") for n in archive.names)
-    what = f"no library for this machine ({folder}); there are libraries for {', '.join(has) or 'none'}"
-    if sources:
-        return fault(what, where="binaries", cure="it carries C sources: compile it, for instance with `fmpy compile`")
-    return fault(what, where="binaries", cure=f"export it for this platform too: {wanted}")
 
 
 def _format_findings(archive: FmuArchive, library: PurePosixPath, fmi: int, *, here: bool) -> Iterator[Finding]:

@@ -1,7 +1,7 @@
 """An instance that notes each call before it is made, and that can be reset and rolled back."""
 
 import ctypes
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,8 +61,13 @@ class ProbedInstance(Instance):
         return {name: _bytes_of(self.description.outputs[name], views) for name, views in self.y.items()}
 
     def reset(self) -> None:
-        """Reset the unit to what it was after instantiation."""
+        """Reset the unit to what it was after instantiation, also after a failed call."""
+        self._failed = None
         self._call("Reset")
+
+    def read(self, ports: Sequence[FmuPort]) -> None:
+        """Read variables of one type, whatever their causality."""
+        self._set_or_get(self._buffers("Get", list(ports)))
 
     def keep_state(self) -> Any:
         """Return the unit's state."""

@@ -3,6 +3,8 @@
 The run covers instantiation, steps, state, a second instance, reset and termination; `main` is the process's entry.
 """
 
+import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,16 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Causality, Kind
+from handover.cosim.check.described_variable import variables_of
 from handover.cosim.check.finding import Finding, fault, warning
 from handover.cosim.check.isolated_process import Journal
 from handover.cosim.check.probed_instance import ProbedInstance
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
-from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.archive import DESCRIPTION
+from handover.cosim.fmu.description import KINDS, FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.xml import parse_xml
 
 STEPS = 10
 _MAX_LINES = 24  # of a unit's log
 _REPEATED = 5  # steps that are done again from a state
+_TOO_MUCH = 1e-3  # of a signal's largest value: what outputs from a restored state may be off by, with a warning
+_MAX_RESTARTS = 60  # to find the variables that cannot be read
 
 
 @dataclass
@@ -35,6 +42,7 @@ class SmokeRun:
         keeps_state: whether it says that its state can be kept and restored.
         serialises: whether it says that its state can be made bytes.
         allows_two: whether it allows two instances in a process.
+        internal: its local variables and calculated parameters, which any host may read.
     """
 
     description: FmuDescription
@@ -45,6 +53,7 @@ class SmokeRun:
     keeps_state: bool
     serialises: bool
     allows_two: bool
+    internal: Sequence[FmuPort] = ()
     _reported: set[str] = field(default_factory=set[str])
 
     def run_all(self) -> None:
@@ -86,6 +95,7 @@ class SmokeRun:
         unit.advance(self.step)
         unit.end()
         self.journal.record(ended=True)
+        self._check_internal(unit)
 
     def _instance(self, name: str) -> ProbedInstance:
         return ProbedInstance(name, self.description, self.folder, self.journal)
@@ -114,14 +124,23 @@ class SmokeRun:
         return seen
 
     def _again(self, unit: ProbedInstance, state: Any, t: float, expected: list[dict[str, bytes]], call: str) -> bool:
-        """Roll back, repeat the steps, and return whether the outputs are the same."""
+        """Roll back, repeat the steps, and return whether the outputs are the same; report by how much they differ."""
         unit.restore(state, t)
-        after = unit.seen()
-        for first, second in zip(expected, [after, *self._steps(unit)], strict=True):
-            what = f"steps from a restored state (t = {t:.6g} s) give other outputs than the first time"
-            if self._compare(first, second, call, what, level=fault, cure="the state must hold all that changes"):
-                return False
-        return True
+        repeated = [unit.seen(), *self._steps(unit)]
+        shares = {
+            name: share
+            for name, port in self.description.outputs.items()
+            if name in expected[0]
+            and (share := _difference(port, [e[name] for e in expected], [r[name] for r in repeated]))
+        }
+        if not shares:
+            return True
+        level = fault if max(shares.values()) >= _TOO_MUCH else warning
+        what = f"steps from a restored state (t = {t:.6g} s) give other outputs than the first time"
+        sizes = {n: "" if math.isinf(share) else f" by {share:.2g} of its largest value" for n, share in shares.items()}
+        told = [name + size for name, size in sizes.items()]
+        self.journal.found(level(f"{what}: {_first_of(told)}", where=call, cure="the state must hold all that changes"))
+        return False
 
     def _beside(self, unit: ProbedInstance, at_start: dict[str, bytes], steps: list[dict[str, bytes]]) -> None:
         """Run a second instance beside the first: it does the same, and the first does not notice."""
@@ -140,6 +159,31 @@ class SmokeRun:
         finally:
             second.free()
 
+    def _check_internal(self, unit: ProbedInstance) -> None:
+        """Report the variables inside of the unit, such as states and their derivatives, that it does not give."""
+        by_type: dict[str, list[FmuPort]] = defaultdict(list)
+        for port in self.internal:
+            by_type[port.fmi_type].append(port)
+        left = _MAX_RESTARTS
+        pending = list(by_type.values())
+        while pending and left:
+            left -= 1
+            ports = pending.pop()
+            unit.reset()
+            unit.start(self.start)
+            try:
+                unit.read(ports)
+            except UnitFailure as e:
+                if e.status == "Discard":  # a value that cannot be computed at this time
+                    continue
+                if len(ports) == 1:
+                    what = f"its value cannot be read: {e.call} answered {e.status}"
+                    cure = f"value reference {ports[0].references[0]} must be one of its library"
+                    where = f"variable {ports[0].name!r}"
+                    self.journal.found(fault(what, where=where, cure=cure, log=_log_tail(list(e.log)[-1:])))
+                else:
+                    pending += [ports[len(ports) // 2 :], ports[: len(ports) // 2]]
+
     def _compare(
         self,
         a: Mapping[str, bytes],
@@ -148,13 +192,11 @@ class SmokeRun:
         what: str,
         *,
         level: Any = warning,
-        cure: str = "",
     ) -> bool:
         """Return whether outputs differ, and report those that do."""
         different = [name for name, content in a.items() if b[name] != content]
         if different:
-            names = ", ".join(different[:5]) + (f" and {len(different) - 5} more" if len(different) > 5 else "")
-            self.journal.found(level(f"{what}: {names}", where=where, cure=cure))
+            self.journal.found(level(f"{what}: {_first_of(different)}", where=where))
         return bool(different)
 
     def _check_values(self, unit: ProbedInstance) -> None:
@@ -165,6 +207,26 @@ class SmokeRun:
             ):
                 self._reported.add(name)
                 self.journal.found(finding)
+
+
+def _difference(port: FmuPort, first: Sequence[bytes], second: Sequence[bytes]) -> float:
+    """Return by how much an output's values differ, relative to their largest magnitude; infinity where not by numbers.
+
+    The values are those of some instants, as bytes.
+    """
+    if first == second:
+        return 0.0
+    if port.kind is not Kind.REAL:
+        return math.inf
+    dtype = np.float32 if port.fmi_type == "Float32" else np.float64
+    a, b = (np.frombuffer(b"".join(values), dtype).astype(np.float64) for values in (first, second))
+    largest = float(np.max(np.abs(a)))
+    share = float(np.max(np.abs(a - b))) / largest if largest > 0 else math.inf
+    return math.inf if math.isnan(share) else share
+
+
+def _first_of(names: Sequence[str]) -> str:
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
 def failure(e: UnitFailure) -> Finding:
@@ -192,18 +254,35 @@ def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
         yield warning(f"{wrong[0]} is no item of its type", where=where)
 
 
+def _internal(folder: Path, fmi: int) -> Iterator[FmuPort]:
+    """Yield the local variables and calculated parameters of an unpacked FMU that can be read at any time."""
+    root = parse_xml((folder / DESCRIPTION).read_bytes())
+    variables = variables_of(root, fmi)
+    starts_of = {v.reference: v.values.get("start") for v in variables}
+    for v in variables:
+        shape, kind = v.shape(starts_of), KINDS.get(v.type)
+        is_internal = v.causality in ("local", "calculatedParameter") and "clocks" not in v.element.attributes
+        if is_internal and kind is not None and shape is not None and 0 not in shape and v.reference.isdecimal():
+            references = (int(v.reference),)
+            yield FmuPort(
+                name=v.name, kind=kind, causality=Causality.OUTPUT, fmi_type=v.type, references=references, shape=shape
+            )
+
+
 def main(task: Mapping[str, Any]) -> None:
     """Run the FMU `task["fmu"]`, unpacked in `task["folder"]`."""
     journal = Journal(Path(task["journal"]))
+    description, folder = describe_fmu(Path(task["fmu"])), Path(task["folder"])
     run = SmokeRun(
-        describe_fmu(Path(task["fmu"])),
-        Path(task["folder"]),
+        description,
+        folder,
         journal,
         start=task["start"],
         step=task["step"],
         keeps_state=task["keeps_state"],
         serialises=task["serialises"],
         allows_two=task["allows_two"],
+        internal=tuple(_internal(folder, description.fmi)),
     )
     run.run_all()
     journal.begins("unloading the library")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from handover.cosim.fmu.fmpy_edge import ModelDescription, ModelVariable
 
 
-_KINDS = {
+KINDS = {
     "Real": Kind.REAL,
     "Float32": Kind.REAL,
     "Float64": Kind.REAL,
@@ -36,6 +36,7 @@ _KINDS = {
     "String": Kind.STRING,
     "Binary": Kind.BINARY,
 }
+"""Kinds by the standards' types; clocks, and types of later standards, have none."""
 _WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
 _ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 
@@ -224,7 +225,7 @@ def _unit(u: Any) -> Unit:
 
 
 def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
-    kind = _KINDS.get(v.type)
+    kind = KINDS.get(v.type)
     if kind is None:  # clocks, see `handover.cosim.fmu.clocks`, and types of later standards
         return None
     declared = v.declaredType

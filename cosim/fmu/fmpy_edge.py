@@ -4,8 +4,8 @@ FMPy has no types, so units are read only here and loaded only in `handover.cosi
 Every file that FMPy opens is checked before: its parser would follow entities, and its unpacking paths out of a folder.
 """
 
-from pathlib import Path
-from typing import Any, Protocol, cast
+from pathlib import Path, PurePosixPath
+from typing import Any, NamedTuple, Protocol, cast
 
 import fmpy
 import fmpy.fmi2
@@ -21,6 +21,7 @@ from handover.cosim.fmu.xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
 _MAX_PROBLEMS = 3
+_SUFFIXES = (".so", ".dll", ".dylib")
 
 
 class ModelVariable(Protocol):
@@ -161,6 +162,19 @@ def mime_types(root: XmlElement) -> dict[str, str]:
     return {e.get("name"): e.get("mimeType", "application/octet-stream") for e in variables}
 
 
+class MissingLibrary(NamedTuple):
+    """Why an FMU has no library for this machine: the place, what is there, and what would be right."""
+
+    where: str
+    what: str
+    cure: str
+
+    @property
+    def line(self) -> str:
+        """All of it in one line."""
+        return f"{self.where}: {self.what}; {self.cure}"
+
+
 def platform_folder(fmi: int) -> str:
     """Return the folder of `binaries/` that holds this machine's library, by the standard's name."""
     return cast(str, fmpy.platform if fmi == 2 else fmpy.platform_tuple)
@@ -171,6 +185,37 @@ def library_path(fmi: int, identifier: str) -> str:
     return f"binaries/{platform_folder(fmi)}/{identifier}{fmpy.sharedLibraryExtension}"
 
 
+def libraries_in(archive: FmuArchive) -> list[PurePosixPath]:
+    """Return the paths of all shared libraries in an FMU that are for a platform."""
+    paths = [PurePosixPath(n) for n in archive.names if n.startswith("binaries/") and n.endswith(_SUFFIXES)]
+    return [p for p in paths if len(p.parts) == 3]
+
+
+def platforms_in(archive: FmuArchive) -> list[str]:
+    """Return the folders of `binaries/` that hold a shared library."""
+    return sorted({p.parts[1] for p in libraries_in(archive)})
+
+
+def missing_library(archive: FmuArchive, fmi: int, identifier: str) -> MissingLibrary | None:
+    """Return why there is no library for this machine: another name, another standard's folder, or none at all."""
+    wanted = library_path(fmi, identifier)
+    if wanted in archive.names:
+        return None
+    folder, has = platform_folder(fmi), platforms_in(archive)
+    here = [p.name for p in libraries_in(archive) if p.parts[1] == folder]
+    other = platform_folder(5 - fmi)
+    if here:
+        what = f"no library is named like the modelIdentifier {identifier!r}; there is {', '.join(here)}"
+        return MissingLibrary(f"binaries/{folder}", what, f"{wanted} is wanted")
+    if other in has:
+        what = f"the library for this machine is in the folder of FMI {5 - fmi}.0, {other}"
+        return MissingLibrary("binaries", what, f"{wanted} is wanted")
+    what = f"no library for this machine ({folder}); there are libraries for {', '.join(has) or 'none'}"
+    if any(n.startswith("sources/") and not n.endswith("/") for n in archive.names):
+        return MissingLibrary("binaries", what, "it carries C sources: compile it, for instance with `fmpy compile`")
+    return MissingLibrary("binaries", what, f"export it for this platform too: {wanted}")
+
+
 def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
     """Unpack an FMU into a folder, after checking that it has a complete binary for this machine.
 
@@ -179,10 +224,8 @@ def unpack(path: Path, folder: Path, fmi: int, identifier: str) -> None:
             one: loading that would end this process by a signal.
     """
     archive = FmuArchive(path)
-    if library_path(fmi, identifier) not in archive.names:
-        paths = [n.split("/") for n in archive.names if n.startswith("binaries/")]
-        platforms = ", ".join(sorted({parts[1] for parts in paths if len(parts) > 2}))
-        raise InvalidFmu(path, f"no binary for this machine ({platform_folder(fmi)}); it has {platforms or 'none'}")
+    if lack := missing_library(archive, fmi, identifier):
+        raise InvalidFmu(path, lack.line)
     for name in archive.names:
         is_ours = name.startswith(f"binaries/{platform_folder(fmi)}/") and name.endswith(fmpy.sharedLibraryExtension)
         fault = shortage(archive.head(name, HEAD), archive.size(name)) if is_ours else ""

@@ -1,4 +1,6 @@
-"""Native test units: FMUs of both standards from the small C sources in `native/`, see `native/frame/unit.h`.
+"""Native test units: FMUs of both standards from small C sources, see `native/frame/unit.h`.
+
+Those that do as they should are in `native/`, those with faults of other people's units in `tests/faults/units/`.
 
 All sources are compiled into one library, which knows by the instantiation token what unit it is to be; each FMU holds
 a copy of it. What is compiled and packed is kept in the cache folder, by the contents of the sources.
@@ -20,6 +22,7 @@ from handover.cosim.fmu.fmpy_edge import library_path
 from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 
 SOURCES = Path(__file__).with_name("native")
+FAULTS = Path(__file__).parents[1] / "faults" / "units"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
@@ -49,7 +52,11 @@ def declarations() -> dict[str, Declaration]:
 @functools.cache
 def _folder() -> Path:
     digest = hashlib.sha256(fmpy.__version__.encode())
-    for source in [*sorted(SOURCES.rglob("*.[ch]")), *sorted(SOURCES.parent.glob("native_*.py"))]:
+    for source in [
+        *sorted(SOURCES.rglob("*.[ch]")),
+        *sorted(FAULTS.glob("*.c")),
+        *sorted(SOURCES.parent.glob("native_*.py")),
+    ]:
         digest.update(source.name.encode() + source.read_bytes())
     folder = cache_folder() / "native-units" / digest.hexdigest()[:16]
     folder.mkdir(parents=True, exist_ok=True)
@@ -64,11 +71,11 @@ def _library() -> Path:
 
 
 def _compile(made: Path) -> None:
-    sources = sorted(map(str, SOURCES.rglob("*.c")))
+    sources = sorted(map(str, (*SOURCES.rglob("*.c"), *FAULTS.glob("*.c"))))
     target = TARGETS[host_platform()][0]
     flags = ["-target", target, "-shared", "-fPIC", "-O2", "-std=c11", "-Wall", "-Wextra", "-Werror"]
     lenient = ["-Wno-unused-parameter", "-Wno-missing-field-initializers"]
-    done = zig_cc([*flags, *lenient, "-I", str(HEADERS), *sources, "-lm", "-o", str(made)])
+    done = zig_cc([*flags, *lenient, "-I", str(HEADERS), "-I", str(SOURCES), *sources, "-lm", "-o", str(made)])
     assert done.returncode == 0, done.stdout
 
 

@@ -180,6 +180,9 @@ def test_a_library_that_is_not_where_it_should_be_is_reported(
     assert found is Level.FAULT
     assert wanted in lines
     assert not report.sections[-1].reached
+    with pytest.raises(InvalidFmu) as refused:  # as a run does
+        unpack(report.path, tmp_path / "unpacked", 2, "Decay")
+    assert refused.value.fault in lines.splitlines()
 
 
 def test_nothing_is_left_behind(decay_library: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -1,0 +1,68 @@
+"""A check tells by how much a restored state is off, and which variables a unit's library does not know."""
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from native_units import native_fmu
+
+from handover.cosim.check.check_fmu import check_fmu
+from handover.cosim.check.finding import Finding, Level
+
+
+def found_in_run(file: Path) -> list[Finding]:
+    report = check_fmu(file, timeout=60.0)
+    assert report.sections[-1].reached, [f.line for s in report.sections for f in s.findings]
+    return list(report.sections[-1].findings)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    ("unit", "level", "share"),
+    [
+        ("state_off_by_1e6", Level.WARNING, 1e-6),
+        ("state_off_by_1e4", Level.WARNING, 1e-4),
+        ("state_off_by_1e2", Level.FAULT, 1e-2),
+    ],
+)
+def test_what_a_restored_state_is_off_by_is_told_with_its_size(fmi: int, unit: str, level: Level, share: float):
+    (finding,) = found_in_run(native_fmu(unit, fmi))
+    assert finding.level is level
+    assert finding.where == ("fmi2SetFMUstate" if fmi == 2 else "fmi3SetFMUState")
+    size = f"y by {share / (1 + 2 * share):.2g} of its largest value"  # five steps of ten too many, at t = 1 s
+    assert finding.what == f"steps from a restored state (t = 0.5 s) give other outputs than the first time: {size}"
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("count", [1, 6])
+def test_a_derivative_that_the_library_does_not_know_is_found(tmp_path: Path, fmi: int, count: int):
+    known, unknown = [f"known_{i}" for i in range(count - 1)], "der(x)"
+    file = with_locals(tmp_path, fmi, {**dict.fromkeys(known, 3), unknown: 77})
+    (finding,) = found_in_run(file)
+    assert finding.level is Level.FAULT
+    assert finding.where == f"variable {unknown!r}"
+    call = "fmi2GetReal" if fmi == 2 else "fmi3GetFloat64"
+    assert finding.what == f"its value cannot be read: {call} answered Error"
+    assert "no such variable with value reference 77" in finding.log[-1]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_locals_that_the_library_knows_are_no_finding(tmp_path: Path, fmi: int):
+    assert found_in_run(with_locals(tmp_path, fmi, {"der(x)": 3})) == []
+
+
+def with_locals(folder: Path, fmi: int, references: dict[str, int]) -> Path:
+    """Return the native mass with further variables, derivatives of its position, under value references."""
+    derivative = 'derivative="2"'  # x is the second variable, and has value reference 2
+    rows = [
+        f'<ScalarVariable name="{name}" valueReference="{r}" causality="local"><Real {derivative}/></ScalarVariable>'
+        if fmi == 2
+        else f'<Float64 name="{name}" valueReference="{r}" causality="local" {derivative}/>'
+        for name, r in references.items()
+    ]
+    file = folder / "mass.fmu"
+    with zipfile.ZipFile(native_fmu("mass", fmi)) as source, zipfile.ZipFile(file, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            target.writestr(name, content.replace(b"</ModelVariables>", "".join(rows).encode() + b"</ModelVariables>"))
+    return file
