@@ -6,6 +6,7 @@ missing or out of date in a checkout.
 
 import hashlib
 import importlib.util
+import logging
 import os
 import platform
 import subprocess
@@ -41,6 +42,10 @@ FLAGS = (
 )
 STAMP = "sources.sha256"
 """The name of the file beside compiled libraries that holds the fingerprint of the sources they were made from."""
+DIGESTS = "libraries.sha256"
+"""The name of the file beside them that holds the libraries' own digests, by which a damaged one is found."""
+
+_log = logging.getLogger(__name__)
 
 Compiler = Callable[["list[str]"], "subprocess.CompletedProcess[str]"]
 """Takes a C compiler's arguments; its messages are in the returned `stdout`."""
@@ -92,6 +97,8 @@ class NativeLibraries:
             return
         fingerprint = self._fingerprint()
         folder = self._writable_folder(target, fingerprint)
+        if self._is_made(folder, target, fingerprint):
+            _log.warning("a library of the %s in %s is damaged; it is compiled again", self.what, folder)
         names = {name: f"{name}{TARGETS[target][1]}" for name in self.sources}
         with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as scratch:
             for name, sources in self.sources.items():
@@ -99,17 +106,27 @@ class NativeLibraries:
                 done = self.compiler([*_arguments(target, Path(scratch) / names[name]), *files])
                 if done.returncode:
                     raise CompilationError(self.what, target, done.stdout)
+            (Path(scratch) / DIGESTS).write_text(_digests([Path(scratch) / name for name in names.values()]))
             (Path(scratch) / STAMP).write_text(fingerprint)
-            for file in (*names.values(), STAMP):
+            for file in (*names.values(), DIGESTS, STAMP):
+                _write_through(Path(scratch) / file)
                 os.replace(Path(scratch) / file, folder / file)
 
     def _current(self, target: str) -> "Path | None":
         fingerprint = self._fingerprint()
         for folder in self._folders(target, fingerprint):
-            is_complete = all((folder / f"{name}{TARGETS[target][1]}").is_file() for name in self.sources)
-            if is_complete and (folder / STAMP).is_file() and (folder / STAMP).read_text() == fingerprint:
+            if self._is_made(folder, target, fingerprint) and not self._is_damaged(folder, target):
                 return folder
         return None
+
+    def _is_made(self, folder: Path, target: str, fingerprint: str) -> bool:
+        is_complete = all((folder / f"{name}{TARGETS[target][1]}").is_file() for name in self.sources)
+        return is_complete and (folder / STAMP).is_file() and (folder / STAMP).read_text() == fingerprint
+
+    def _is_damaged(self, folder: Path, target: str) -> bool:
+        digests = folder / DIGESTS  # there is none beside libraries of earlier versions
+        libraries = [folder / f"{name}{TARGETS[target][1]}" for name in self.sources]
+        return digests.is_file() and digests.read_text() != _digests(libraries)
 
     def _folders(self, target: str, fingerprint: str) -> "tuple[Path, Path]":
         """Return a platform's folder beside the sources, and in the cache, where versions of sources are kept apart."""
@@ -131,6 +148,16 @@ class NativeLibraries:
         for source in sorted(self.folder.glob("*.[ch]")):
             digest.update(source.name.encode() + b"\0" + source.read_bytes())
         return digest.hexdigest()
+
+
+def _digests(libraries: Sequence[Path]) -> str:
+    return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in libraries)
+
+
+def _write_through(file: Path) -> None:
+    """Wait until the disk has a file, so that it is whole under its later name, also after the machine went down."""
+    with file.open("rb+") as written:
+        os.fsync(written.fileno())
 
 
 def host_platform() -> str:

@@ -7,6 +7,7 @@ Its token and the prefix of its modules are hashes of its content, so that the s
 import hashlib
 import importlib.util
 import json
+import logging
 import os
 import sys
 import uuid
@@ -17,7 +18,8 @@ from numbers import Rational
 from pathlib import Path
 
 from handover.cosim.blocks.description import describe
-from handover.cosim.fmu.archive import write_archive
+from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmu.archive import FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_block
@@ -28,6 +30,8 @@ from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import Form, Layout
 from handover.fmus.model_description import Model
 from handover.fmus.sources import Carried, closure
+
+_log = logging.getLogger(__name__)
 
 
 class UnknownVersion(ValueError):
@@ -59,7 +63,8 @@ class InvalidStep(ValueError):
 def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
     """Return a catalog unit's FMU; it is built if the cache has none of the present sources, see `build`.
 
-    The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit concurrently.
+    The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit concurrently. A file
+    in it that is damaged is built again, with a line in the log.
 
     Raises:
         UnknownUnit: no unit has this name.
@@ -69,7 +74,14 @@ def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
     carried = closure(entry.block)
     folder = cache_folder() / "fmus" / _content_key(entry, _form(fmi, scalar=scalar), carried)
     wanted = folder / file_name(name, _form(fmi, scalar=scalar))
-    return wanted if wanted.is_file() else build(entry, fmi, folder, scalar=scalar)
+    if wanted.is_file():
+        try:
+            FmuArchive(wanted).verify()
+        except InvalidFmu as e:
+            _log.warning("%s is built again: %s", wanted, e.fault)
+        else:
+            return wanted
+    return build(entry, fmi, folder, scalar=scalar)
 
 
 def build_block(

@@ -245,13 +245,17 @@ UNIX = 3
 def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
     """Write a zip file whose bytes depend on the files' names and contents alone.
 
-    It appears complete or not at all, so two processes may write the same file at the same time.
+    It appears complete or not at all, also where the machine goes down, so two processes may write the same file at the
+    same time.
     """
     content = _packed(files)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}-{uuid.uuid4().hex}")
     try:
-        part.write_bytes(content)
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
         part.chmod(0o644)
         os.replace(part, path)
     except BaseException:

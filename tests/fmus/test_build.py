@@ -110,6 +110,27 @@ def test_the_cache_builds_once_and_again_when_a_source_changes(tmp_path: Path, m
     assert cached("Kept", 3) != first
 
 
+@pytest.mark.parametrize("damage", ["cut off", "empty", "a bit", "zeros at the end"])
+def test_a_damaged_file_in_the_cache_is_built_again_once_with_a_note(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, damage: str
+):
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    unit = cached("Push", 3)
+    sound = unit.read_bytes()
+    half = len(sound) // 2
+    spoilt = {
+        "cut off": sound[:half],
+        "empty": b"",
+        "a bit": sound[:half] + bytes([sound[half] ^ 1]) + sound[half + 1 :],
+        "zeros at the end": sound[:-4096] + bytes(4096),
+    }
+    unit.write_bytes(spoilt[damage])
+    for _ in range(2):
+        assert cached("Push", 3).read_bytes() == sound
+    (line,) = [r.getMessage() for r in caplog.records]
+    assert line.startswith(f"{unit} is built again: ")
+
+
 def test_a_universal_binary_holds_both_files_at_page_boundaries():
     intel = bytes.fromhex("cffaedfe0700000103000000") + b"intel"
     arm = bytes.fromhex("cffaedfe0c00000100000000") + b"arm"

@@ -11,6 +11,7 @@ import decay
 import pytest
 from native_units import native_fmu
 
+from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.master.master import Master
@@ -149,3 +150,26 @@ def test_a_step_that_is_none_is_refused_by_name_or_told_where_another_is_given(e
     with Master(system) as master:
         master.run(Fraction(1))
         assert master.signals["mass.x"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "internal", "step"),
+    [("0.0333333", "0.5", Fraction(1, 30)), (None, "0.05", Fraction(1, 20)), (None, None, None), (None, "NaN", None)],
+)
+def test_a_check_and_a_run_propose_the_same_step(
+    edited: Edited, given: str | None, internal: str | None, step: Fraction | None
+):
+    flag = "" if internal is None else f' fixedInternalStepSize="{internal}"'
+    size = "" if given is None else f' stepSize="{given}"'
+    file = edited("mass", 3, (' stepSize="0.01"', size), ("<CoSimulation ", f"<CoSimulation{flag} "))
+    system = System()
+    system.add("mass", file, f=2.0)
+    told = {s.name: s.summary for s in check_fmu(file, timeout=60.0).sections}
+    if step is None:
+        with pytest.raises(WiringError, match="its FMU proposes no communication step"):
+            system.check()
+        assert told["interface"] == "co-simulation, no step size given: a run needs --step"
+        return
+    assert system.units["mass"].period == step
+    assert told["interface"] == f"co-simulation, steps of {float(step):g} s"
+    assert told["run"].startswith(f"10 steps of {float(step):g} s")

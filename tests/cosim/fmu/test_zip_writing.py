@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import os
 import sys
 import zipfile
 from pathlib import Path
@@ -39,6 +40,18 @@ class Interrupt:
             write_archive(path, FILES)
         sys.settrace(before)
         return self._left < 0
+
+
+def test_the_content_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path, written = tmp_path / "x.fmu", list[int]()
+
+    def sync(descriptor: int) -> None:
+        assert not path.exists()
+        written.append(os.fstat(descriptor).st_size)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    write_archive(path, FILES)
+    assert written == [path.stat().st_size]
 
 
 def test_an_interrupt_leaves_nothing_and_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

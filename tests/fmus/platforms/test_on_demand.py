@@ -114,6 +114,23 @@ def test_what_is_current_is_compiled_once_and_again_after_a_change(sources: Path
     assert len(compiled) == 4
 
 
+def test_a_damaged_library_is_compiled_again_once_with_a_note(
+    sources: Path, compiled: list[list[str]], caplog: pytest.LogCaptureFixture
+):
+    compile_runtime(["aarch64-linux"])
+    damaged = library("aarch64-linux", 3)
+    assert damaged.is_relative_to(sources)
+    damaged.write_bytes(damaged.read_bytes()[:-1])
+    assert not is_current("aarch64-linux")
+    compile_runtime(["aarch64-linux"])
+    assert is_current("aarch64-linux")
+    assert damaged.read_bytes() == b"library"
+    compile_runtime(["aarch64-linux"])
+    assert len(compiled) == 4
+    (line,) = [r.getMessage() for r in caplog.records]
+    assert line == f"a library of the FMI runtime in {damaged.parent} is damaged; it is compiled again"
+
+
 @pytest.mark.usefixtures("compiled")
 def test_a_place_that_cannot_be_written_is_left_for_the_cache(
     sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
