@@ -16,6 +16,7 @@ from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.selection import find_scenario, replacement_fmus
 from handover.scenarios.execution.ssp_run import is_ssp
 
@@ -85,6 +86,8 @@ def sweep(
     pool = pool_config(workers, scheduler)
     if is_ssp(scenario):
         raise UsageError(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
+    if is_fmu(scenario):
+        raise UsageError(f"{scenario}: a scenario can be swept, an FMU can be run by itself")
     experiment = find_scenario(scenario)
     with one_line_errors():
         points = parse_grid(experiment, grid)

@@ -1,5 +1,6 @@
 """One FMU as an experiment: it runs alone until its stop time, its inputs constant at their start or from a file."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -18,6 +19,8 @@ from handover.scenarios.execution.input_file import columns_of, entries_of, read
 from handover.scenarios.execution.ssp_run import UntilStop, naming_step, system_experiment
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import sha256_of
+
+_log = logging.getLogger(__name__)
 
 
 def is_fmu(name: str) -> bool:
@@ -62,6 +65,8 @@ class FmuRun:
             system.check()
         except WiringError as e:
             raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
+        if d.experiment.start:
+            _log.warning("%s proposes to start at %g s; a run starts at 0 s", self.path, d.experiment.start)
         return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, self._until(d.experiment.stop))
 
     def as_source(self, stop: Fraction) -> dict[str, Any]:

@@ -13,5 +13,12 @@ def test_help_of_a_run_has_every_option_once_below_its_heading():
         ["-h", *(p.opts[0] for p in run.params if p.opts[0].startswith("-") and p.opts != ["-h", "--help"])]
     )
     headings = [line for line in output.splitlines() if line.endswith(":") and not line.startswith(" ")]
-    assert headings == ["Options:", "Of FILE.ssp:", "Record:", "Coupling of units:", "Length of steps:", "Wall time:"]
+    assert headings == [
+        "Options:",
+        "Of FILE.ssp and FILE.fmu:",
+        "Record:",
+        "Coupling of units:",
+        "Length of steps:",
+        "Wall time:",
+    ]
     assert output.index("Length of steps:") < output.index("--largest-step") < output.index("Wall time:")
