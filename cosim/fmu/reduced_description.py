@@ -8,7 +8,7 @@ derivatives, display units or model exchange.
 import importlib
 import io
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from handover.cosim.fmu.archive import DESCRIPTION
@@ -102,7 +102,7 @@ def _variables_of_2(element: Any) -> Any:
         kept = _copy(variable, without=("previous", "canHandleMultipleSetPerTimeInstant"))
         values = [_copy(v, without=("derivative", "displayUnit", "reinit")) for v in _elements(variable)]
         kept.extend(v for v in values if v.tag not in ("Annotations", "VendorAnnotations"))
-        _let_vary_at_events(kept, [v.tag for v in values])
+        _without_rules_for_others(kept, values)
         made.append(kept)
     return made
 
@@ -116,7 +116,7 @@ def _variables_of_3(element: Any) -> Any:
         if _is_used(variable) or variable.get("valueReference") in sizes:
             kept = _copy(variable, without=("derivative", "displayUnit", "reinit", "previous"))
             kept.extend(_copy(c, without=("displayUnit",)) for c in _elements(variable) if c.tag != "Annotations")
-            _let_vary_at_events(kept, [variable.tag])
+            _without_rules_for_others(kept, [kept])
             made.append(kept)
     free = next(str(i) for i in range(len(taken) + 1) if str(i) not in taken)
     time = {"name": "unused time", "valueReference": free, "causality": "independent", "variability": "continuous"}
@@ -128,10 +128,21 @@ def _is_used(variable: Any) -> bool:
     return variable.tag == "Clock" or variable.get("causality", "local") not in _UNUSED
 
 
-def _let_vary_at_events(variable: Any, types: list[str]) -> None:
-    """Take a variable that is said to vary continuously, but is no real, as one that changes at events."""
+def _without_rules_for_others(variable: Any, values: Sequence[Any]) -> None:
+    """Leave out what a variable says of when it has which value, where co-simulation goes by its causality alone.
+
+    Parameters are set once, before the start, and outputs are read. A variable that is said to vary continuously, but
+    is no real, changes at events. `values` are the elements that hold the values' attributes.
+    """
+    causality = variable.get("causality")
+    variable.attrib.pop("initial", None)
+    if causality == "parameter" and variable.get("variability") not in ("fixed", "tunable"):
+        variable.set("variability", "fixed")
+    if causality == "output" and variable.get("variability") != "constant":
+        for element in values:
+            element.attrib.pop("start", None)
     varies = variable.get("variability", "continuous" if variable.tag == "ScalarVariable" else "")
-    if varies == "continuous" and variable.get("causality") in _VARIED and not set(types) & set(_REALS):
+    if varies == "continuous" and causality in _VARIED and not {v.tag for v in values} & set(_REALS):
         variable.set("variability", "discrete")
 
 

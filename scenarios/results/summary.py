@@ -320,13 +320,18 @@ def metric_of(data: Mapping[str, Any]) -> Metric:
 
 
 def parameter_rows(task: Task) -> list[list[str]]:
-    """Return name, value with unit, and description of each parameter, also of those that `Task.source` keeps."""
+    """Return name, value with unit, and description of each parameter."""
     rows: list[list[str]] = []
     for v in task.experiment.parameters():
         value = format_value(_plain(getattr(task.parameters, v.name)))
         rows.append([v.name, f"{value} {unit_symbol(v.unit.symbol)}".rstrip(), v.description])
+    return rows
+
+
+def _given_rows(task: Task) -> list[list[str]]:
+    """Return the like of the start values that `Task.source` keeps as texts."""
     given: Sequence[str] = task.source.get("parameters", ())
-    return rows + [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
+    return [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
 
 
 def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
@@ -346,7 +351,7 @@ def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) ->
         checkpoint=None if task.every is None else str(task.every),
         title=task.experiment.title,
         headline=list(task.experiment.headline),
-        told_parameters=parameter_rows(task),
+        told_parameters=[*parameter_rows(task), *_given_rows(task)],
         **of_this_run,
         units={name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
         versions={"platform": platform.platform(), **versions()},

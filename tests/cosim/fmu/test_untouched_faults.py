@@ -106,6 +106,24 @@ def test_parts_that_only_others_read_may_be_at_fault(edited: Edited, fmi: int, o
     assert (d.inputs, d.outputs, d.parameters) == (sound.inputs, sound.outputs, sound.parameters)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "wanted"),
+    [
+        ('"parameter" variability="fixed"', '"parameter"', "illegal combination of causality"),
+        ('"parameter" variability="fixed"', '"parameter" variability="constant"', "illegal combination of causality"),
+        ('"output" variability', '"output" initial="exact" variability', '"y" .* has no start value'),
+        ('<Real unit="m" max="100"/>', '<Real unit="m" max="100" start="1"/>', '"y" .* provides a start value'),
+    ],
+)
+def test_when_parameters_and_outputs_have_their_values_is_said_by_their_causality(
+    tmp_path: Path, old: str, new: str, wanted: str
+):
+    sound = describe_fmu(decay.pack(tmp_path / "a.fmu", b""))
+    d = describe_fmu(decay.pack(tmp_path / "a.fmu", b"", decay.edited((old, new))))
+    assert re.search(wanted, d.untouched_fault)
+    assert replace(d, untouched_fault="") == sound
+
+
 @pytest.mark.parametrize("causality", ["local", "output"])
 def test_time_need_not_be_the_one_independent_variable(edited: Edited, causality: str):
     d = describe_fmu(edited("mass", 3, ('causality="independent"', f'causality="{causality}"')))
@@ -142,7 +160,7 @@ def test_an_enumeration_that_is_said_to_be_continuous_changes_at_events(tmp_path
         ('modelIdentifier="Decay"', "", "attribute 'modelIdentifier' is required but missing"),
         ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "list index out of range"),
         ('<Outputs><Unknown index="3" dependencies=""', '<Outputs><Unknown index="3" dependencies="9"', "out of range"),
-        ('causality="parameter" variability="fixed"', 'causality="parameter"', "illegal combination"),
+        ('"output" variability="continuous"', '"output" variability="fixed"', "illegal combination"),
     ],
 )  # fmt: skip
 def test_a_fault_in_what_co_simulation_reads_is_refused(tmp_path: Path, old: str, new: str, wanted: str):
