@@ -98,8 +98,9 @@ class FmuRun:
             elif name not in ports and name not in entries:
                 faults.append(f"no parameter or input {name!r}; {nearest(name, ports)}")
             else:
+                port, k = (ports[name], None) if name in ports else entries[name]
                 try:
-                    _set(start, ports, entries.get(name), name, value)
+                    _set(start, port, k, value)
                 except ValueError as e:
                     faults.append(f"{name} = {value[:40]!r}: {e}")
             seen.add(name)
@@ -123,25 +124,22 @@ def reopened(source: Mapping[str, Any]) -> tuple[FmuRun, dict[Path, str]]:
     return run, files if inputs is None else {**files, inputs: source["input_sha256"]}
 
 
-def _set(
-    start: dict[str, Any], ports: Mapping[str, FmuPort], entry: tuple[FmuPort, int] | None, name: str, text: str
-) -> None:
-    """Set a start value from its text.
+def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None:
+    """Set a port's start value from its text, or with a number the entry of that place only.
 
     Raises:
         ValueError: it is no value of the port.
     """
-    port = ports[name] if name in ports else entry[0] if entry else ports[name]
     if port.kind in (Kind.STRING, Kind.BINARY):
-        start[name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
+        start[port.name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
         return
-    if name in ports:
+    if k is None:
         values = [value_of(port, part) for part in text.split(",")]
         if len(values) != port.size:
             raise ValueError(f"{len(values)} values where {port.size} {'is' if port.size == 1 else 'are'} right")
     else:
         values = entries_of(port, start)
-        values[entry[1] if entry else 0] = value_of(port, text)
+        values[k] = value_of(port, text)
     if port.kind is Kind.BOOLEAN:
         values = [bool(value) for value in values]
     start[port.name] = np.array(values).reshape(port.shape) if port.shape else values[0]

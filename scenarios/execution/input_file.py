@@ -51,7 +51,7 @@ def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, A
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(i, row) for i, row in _numbered(csv.reader(file, strict=True)) if row]
+            rows = [(i, row) for i, row in _numbered(csv.reader(file, strict=True, skipinitialspace=True)) if row]
     except OSError as e:
         raise UsageError(f"{path}: {(e.strerror or str(e)).lower()}") from e
     except (csv.Error, UnicodeDecodeError) as e:
@@ -172,7 +172,8 @@ def _series(
     values: Mapping[str, Sequence[Any]],
     start: Mapping[str, Any],
 ) -> TimeSeries:
-    rows = np.array([entries_of(port, start)] * len(times))
+    numbers = np.float64 if port.kind is Kind.REAL else np.uint64 if port.fmi_type == "UInt64" else np.int64
+    rows = np.array([entries_of(port, start)] * len(times), dtype=numbers)
     for name, (other, k) in columns.items():
         if other.name == port.name:
             rows[:, k] = values[name]

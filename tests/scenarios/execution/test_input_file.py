@@ -1,0 +1,84 @@
+"""Tables of inputs over time: values, kinds, and that no text raises anything but one error."""
+
+import contextlib
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from native_units import native_fmu
+
+from handover.cosim.blocks.ports import Width
+from handover.cosim.blocks.variable import Causality, Kind
+from handover.cosim.fmu.description import FmuPort, describe_fmu
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.input_file import read_inputs
+
+INPUTS = {
+    p.name: p
+    for p in (
+        FmuPort(name="x", kind=Kind.REAL, causality=Causality.INPUT, fmi_type="Float64", references=(1,), start="2.5"),
+        FmuPort(name="g", kind=Kind.ENUMERATION, causality=Causality.INPUT, fmi_type="Enumeration", references=(2,),
+                items=(("PARK", 1), ("DRIVE", 4)), start="1"),
+        FmuPort(name="n", kind=Kind.INTEGER, causality=Causality.INPUT, fmi_type="Int8", references=(3,),
+                width=Width("Int8"), minimum=-5),
+        FmuPort(name="R", kind=Kind.REAL, causality=Causality.INPUT, fmi_type="Float64", references=(4,), shape=(2, 2),
+                start="1 2 3 4"),
+        FmuPort(name="b", kind=Kind.INTEGER, causality=Causality.INPUT, fmi_type="UInt64", references=(6,),
+                width=Width("UInt64")),
+        FmuPort(name="s", kind=Kind.STRING, causality=Causality.INPUT, fmi_type="String", references=(5,)),
+    )
+}  # fmt: skip
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    return tmp_path / "inputs.csv"
+
+
+def test_each_kind_is_read_and_entries_without_a_column_keep_their_start(table: Path):
+    table.write_text(
+        'time, "g",n,"R[2,1]",b\n\n0,drive,-5,30,1\n1.5,1,7,40,18446744073709551615\n', encoding="utf-8-sig"
+    )
+    series = read_inputs(table, INPUTS, {"R": [[9.0, 8.0], [7.0, 6.0]]})
+    assert set(series) == {"g", "n", "R", "b"}
+    assert series["b"].at(2.0).tolist() == [2**64 - 1]
+    assert [series["g"].at(t).tolist() for t in (0.0, 1.4, 1.5)] == [[4], [4], [1]]
+    assert [series["n"].at(t).tolist() for t in (0.0, 9.0)] == [[-5], [7]]
+    assert series["R"].at(0.75).tolist() == [9.0, 8.0, 35.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("time,R\n0,1\n", r"the input 'R' is an array: columns R\[1,1\] to R\[2,2\] are right"),
+        ("time,s\n0,a\n", "the input 's' is a string, which cannot follow values over time"),
+        ("time,g\n0,reverse\n", "line 2, column 'g': 'reverse'; one of park, drive is right"),
+        ("time,n\n0,1.5\n", "line 2, column 'n': '1.5'; a whole number is right"),
+        ("time,n\n0,-6\n", "line 2, column 'n': '-6'; it is out of range: at least -5"),
+        ("time,n\n0,200\n", "line 2, column 'n': '200'; it does not fit Int8"),
+        ("time,x\n0,1\n0,2\n" + "0,a\n" * 9, "line 8, column 'x': 'a'; a number is right; and 4 more"),
+    ],
+)
+def test_what_does_not_fit_an_input_is_told(table: Path, text: str, wanted: str):
+    table.write_text(text)
+    with pytest.raises(UsageError, match=wanted):
+        read_inputs(table, INPUTS, {})
+
+
+@settings(max_examples=300)
+@given(st.text(alphabet='time,xg01.e-+\n"R[]; \r', max_size=60) | st.binary(max_size=40))
+def test_whatever_is_in_the_file_there_is_one_line_of_error(
+    tmp_path_factory: pytest.TempPathFactory, text: str | bytes
+):
+    table = tmp_path_factory.getbasetemp() / "fuzzed.csv"
+    table.write_bytes(text if isinstance(text, bytes) else ("time,x\n" + text).encode())
+    with contextlib.suppress(UsageError):
+        read_inputs(table, INPUTS, {})
+
+
+def test_the_inputs_of_an_fmu_are_read_by_their_names(table: Path):
+    table.write_text("u[2],time\n4,0\n")
+    series = read_inputs(table, describe_fmu(native_fmu("array_passer")).inputs, {})
+    assert series["u"].at(0.0).tolist() == [0.0, 4.0, 0.0]
+    assert series["u"].linear
