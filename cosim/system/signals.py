@@ -39,25 +39,37 @@ class Signals:
         self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return a copy of a signal's value in its shape; a picture or other binary as an array of bytes.
+        """Return a copy of a signal's value in its shape.
+
+        A picture or other binary is an array of bytes, and an array of binaries one of such arrays. A text is a
+        `numpy.str_`, which is a `str`, and an array of texts an array of these.
 
         Raises:
             KeyError: there is no such output.
         """
-        if name not in self._views:
-            raise KeyError(f"no output {name!r}; {nearest(name, self._views)}")
-        views, port = self._views[name], self._ports[name]
+        views, port = self._of(name)
+        if port.kind is Kind.STRING:
+            texts: Any = np.array([_text(int(a)) for a in views[0]]).reshape(port.shape)
+            return texts[()]  # of an array without dimensions, its text
         if port.kind is Kind.BINARY:
-            data = ctypes.string_at(int(views[0][0]), int(views[1][0]))
-            raw: NDArray[np.uint8] = np.frombuffer(data, dtype=np.uint8)
-            return raw
+            found = [_bytes(int(a), int(size)) for a, size in zip(*views, strict=True)]
+            if not port.shape:
+                return found[0]
+            binaries = np.empty(len(found), dtype=object)
+            for i, binary in enumerate(found):
+                binaries[i] = binary
+            return binaries.reshape(port.shape)
         return np.array(views[0]).reshape(port.shape)
 
     def text(self, name: str) -> str:
-        """Return a string signal's text, or the name of an enumeration signal's item."""
-        views, port = self._views[name], self._ports[name]
+        """Return a string signal's text, or the name of an enumeration signal's item; of an array, the first.
+
+        Raises:
+            KeyError: there is no such output.
+        """
+        views, port = self._of(name)
         if port.kind is Kind.STRING:
-            return ctypes.string_at(int(views[0][0])).decode() if views[0][0] else ""
+            return _text(int(views[0][0]))
         return {v: n for n, v in port.items}.get(int(views[0][0]), str(views[0][0]))
 
     def columns(self) -> list[Column]:
@@ -71,6 +83,20 @@ class Signals:
                 subscript = f"[{','.join(map(str, index))}]" if index else ""
                 columns.append(Column(name + subscript, port, values, i))
         return columns
+
+    def _of(self, name: str) -> tuple[Views, FmuPort]:
+        if name not in self._views:
+            raise KeyError(f"no output {name!r}; {nearest(name, self._views)}")
+        return self._views[name], self._ports[name]
+
+
+def _text(address: int) -> str:
+    """Return a unit's text; bytes that are not UTF-8, which the standards ask for, are shown as replacements."""
+    return ctypes.string_at(address).decode(errors="replace") if address else ""
+
+
+def _bytes(address: int, size: int) -> "NDArray[np.uint8]":
+    return np.frombuffer(ctypes.string_at(address, size) if size else b"", dtype=np.uint8)
 
 
 Observer = Callable[[float, Signals], None]
