@@ -9,10 +9,13 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from handover.cosim.exceptions import UnitFailure
+from handover.cosim.fmu.start_values import LostValue
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 """The standards' names of statuses, by number; Pending exists in FMI 2 only."""
 _DISCARD, _FATAL = 2, 4
+_MAX_VALUES = 12
+"""Lost start values that a message lists."""
 
 
 class UnitError(UnitFailure):
@@ -111,6 +114,39 @@ class NotFinite(UnitFailure):
     def as_data(self) -> dict[str, Any]:
         """Return the failure as a JSON object."""
         return {**super().as_data(), "port": self.port, "element": list(self.index), "value": self.status}
+
+
+class StartValuesLost(UnitFailure):
+    """Units have other values in initialization mode than were set, before it and in it.
+
+    Attributes:
+        values: what was set and what was found, by variable.
+    """
+
+    kind = "start_values_lost"
+
+    def __init__(self, units: Sequence[str], t: float, values: Sequence[LostValue]) -> None:
+        self.values = tuple(values)
+        super().__init__(", ".join(units), "initialization", t, "start values that were set do not hold")
+
+    @property
+    def what(self) -> str:
+        """What happened: all values that do not hold."""
+        return f"did not keep what was set, before and in initialization mode: {self._listed}"
+
+    @property
+    def message(self) -> str:
+        """All values that do not hold."""
+        return f"{self._listed}, though it was set before and in initialization mode"
+
+    @property
+    def _listed(self) -> str:
+        more = len(self.values) - _MAX_VALUES
+        return "; ".join(map(str, self.values[:_MAX_VALUES])) + (f"; and {more} more" if more > 0 else "")
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as a JSON object."""
+        return {**super().as_data(), "values": [value._asdict() for value in self.values]}
 
 
 class UnitTerminated(UnitFailure):

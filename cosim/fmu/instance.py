@@ -73,6 +73,29 @@ class Instance:
         for name, value in values.items():
             self._set_one(ports[name], value)
 
+    def read(self, ports: Sequence[FmuPort]) -> list[SignalBuffer]:
+        """Return buffers with the values of variables, without those that the unit does not give.
+
+        Raises:
+            UnitFatal: it answered Fatal.
+        """
+        given: list[SignalBuffer] = []
+        log = tuple(self.log)
+        for buffer in self._buffers("Get", list(ports)):
+            self._begins(buffer.name)
+            status = buffer()
+            self._returned()
+            if status == _FATAL:
+                self._fail(buffer.name, status)
+            members = [p for p in ports if p.name in buffer.views]
+            if status <= 1:
+                given.append(buffer)
+            elif len(members) > 1:  # one that is not given takes all of a call with it
+                given += [one for p in members for one in self.read([p])]
+        self.log.clear()
+        self.log.extend(log)
+        return given
+
     def enter_initialization(self, t: float, stop: float | None) -> None:
         """Enter initialisation mode at time t."""
         self.time = t

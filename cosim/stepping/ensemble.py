@@ -15,9 +15,11 @@ from pathlib import Path
 
 from handover.cosim.exceptions import CosimError
 from handover.cosim.fmu.calls import State
+from handover.cosim.fmu.failures import StartValuesLost
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance import Instance
+from handover.cosim.fmu.start_values import LostValue, keep_start
 from handover.cosim.stepping.extrapolation import LinearExtrapolation, Memory
 from handover.cosim.stepping.transfers import Feeding, FiniteCheck, feedings, finite_checks
 from handover.cosim.system.schedule import Slot
@@ -110,10 +112,15 @@ class Ensemble:
 
         Raises:
             UnitFailure: a unit does not accept its start values or does not initialise.
+            StartValuesLost: values of units do not hold; see `keep_start`.
         """
+        lost: dict[str, list[LostValue]] = {}
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
+            lost[name] = keep_start(self.instances[name], unit.start, self.system.sources_of(name))
+        if losers := [name for name in lost if lost[name]]:
+            raise StartValuesLost(losers, 0.0, [value for name in losers for value in lost[name]])
         compute_values()
         for slot in slots:
             self.feed(slot.unit, 0.0)

@@ -94,6 +94,10 @@ const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to
     }
     if (to_set && v->causality == PARAMETER && !allowed(unit, INSTANTIATED | INITIALIZATION, call))
         return NULL;
+    if (!to_set && v->causality == PARAMETER && unit->model->abilities & SECRET_PARAMETERS) {
+        say(unit, ERROR, "%s: %s cannot be read", call, v->name);
+        return NULL;
+    }
     if (!reachable(unit, v, to_set, call))
         return NULL;
     if (to_set)

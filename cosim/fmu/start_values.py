@@ -1,0 +1,100 @@
+"""Start values that a unit has lost when it enters initialization mode: set there again, and told where that fails.
+
+Both standards let parameters and start values be set before initialization mode and in it (FMI 2.0.4, sec. 4.2.4; FMI
+3.0, sec. 2.3.2 and 2.3.3). Some units set all of them back as the experiment is set up.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.blocks.declarations import short_repr
+from handover.cosim.blocks.start_values import numbers_of
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
+from handover.cosim.fmu.description import FmuDescription, FmuPort, indices_of
+
+_ROUNDING = {4: 1e-6, 8: 1e-12}
+"""Relative difference of reals by their width in bytes that is rounding, as by a unit that keeps degrees in radians."""
+
+
+class LostValue(NamedTuple):
+    """A value that did not hold: of which variable or element of one, what was set, and what the unit has instead."""
+
+    name: str
+    given: str
+    found: str
+
+    def __str__(self) -> str:
+        return f"{self.name} was set to {self.given} and is {self.found}"
+
+
+class Initializing(Protocol):
+    """A unit in initialization mode, as `Instance` is."""
+
+    @property
+    def name(self) -> str:
+        """Name of the instance."""
+        ...
+
+    @property
+    def description(self) -> FmuDescription:
+        """What its FMU declares."""
+        ...
+
+    def set_start(self, values: Mapping[str, Any]) -> None:
+        """Set parameters or start values of inputs."""
+        ...
+
+    def read(self, ports: Sequence[FmuPort]) -> Sequence[SignalBuffer]:
+        """Return buffers with the values of variables, without those that the unit does not give."""
+        ...
+
+
+def keep_start(unit: Initializing, values: Mapping[str, Any], fed: Collection[str]) -> list[LostValue]:
+    """Set values that did not hold once more, in initialization mode, and return those that do not hold there either.
+
+    Reals are equal up to rounding in their own width. What cannot be read is not judged, nor is an input that is `fed`
+    by another unit, or one that can be reached only while a clock ticks.
+
+    Raises:
+        UnitFailure: the unit answered Fatal.
+    """
+    ports = {**unit.description.parameters, **unit.description.inputs}
+    judged = [ports[name] for name in values if name not in fed and not ports[name].clocks]
+    lost = _lost(unit, judged, values)
+    if not lost:
+        return []
+    unit.set_start({name: values[name] for name in lost})
+    still = _lost(unit, [ports[name] for name in lost], values)
+    return [value for lost_values in still.values() for value in lost_values]
+
+
+def _lost(unit: Initializing, ports: Sequence[FmuPort], values: Mapping[str, Any]) -> dict[str, list[LostValue]]:
+    buffers = unit.read(ports)  # which hold the memory of texts
+    found = {name: views for buffer in buffers for name, views in buffer.views.items()}
+    lost = {p.name: _differences(unit.name, p, values[p.name], found[p.name]) for p in ports if p.name in found}
+    return {name: differences for name, differences in lost.items() if differences}
+
+
+def _differences(unit: str, port: FmuPort, value: Any, views: Views) -> list[LostValue]:
+    name = f"{unit}.{port.name}"
+    if port.kind in (Kind.STRING, Kind.BINARY):
+        is_text = port.kind is Kind.STRING
+        given = str(value).encode() if is_text else bytes(value)
+        found = content_of(port, views)[0 if is_text else 8 :]  # behind a binary's size
+        texts = [data.decode(errors="replace") if is_text else data for data in (given, found)]
+        return [] if given == found else [LostValue(name, *map(short_repr, texts))]
+    numbers: NDArray[Any] = views[0]
+    if port.kind is Kind.BOOLEAN:
+        numbers = numbers != 0
+    wanted = numbers_of(port, value).astype(numbers.dtype)
+    if port.kind is Kind.REAL:
+        differs = ~np.isclose(numbers, wanted, rtol=_ROUNDING[numbers.dtype.itemsize], atol=0.0)
+    else:
+        differs = numbers != wanted
+    indices = indices_of(port.shape)
+    elements = [(i, f"[{','.join(map(str, indices[i]))}]" if port.shape else "") for i in np.flatnonzero(differs)]
+    return [LostValue(name + index, f"{wanted[i].item()!r}", f"{numbers[i].item()!r}") for i, index in elements]

@@ -1,0 +1,84 @@
+"""Parameters and start values of inputs are those that were set, whatever a unit does when it is set up, or refused."""
+
+import json
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from native_units import native_fmu
+
+from handover.cosim.exceptions import InitializationError
+from handover.cosim.fmu.failures import StartValuesLost
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.system import System
+
+STANDARDS = pytest.mark.parametrize("fmi", [2, 3])
+COMPILED = pytest.mark.parametrize("compiled", [True, False])
+START: dict[str, Any] = {"k": 7.0, "n": 11, "on": True, "u": 5.0}
+
+
+def alone(name: str, fmi: int, **start: Any) -> System:
+    s = System()
+    s.add("unit", native_fmu(name, fmi), **start)
+    return s
+
+
+@COMPILED
+@STANDARDS
+def test_values_that_a_unit_resets_as_it_is_set_up_hold(fmi: int, compiled: bool):
+    with Master(alone("resets", fmi, **START), MasterOptions(compiled=compiled)) as master:
+        assert float(master.signals["unit.y"]) == 7.0 * 5.0 + 11
+        master.run(Fraction(1, 2))
+        assert float(master.signals["unit.y"]) == 7.0 * 5.0 + 11
+
+
+@STANDARDS
+def test_all_values_that_do_not_hold_are_told_at_once(fmi: int):
+    s = alone("keeps_constants", fmi, **START)
+    s.add("other", native_fmu("keeps_single_precision", fmi), k=0.1)
+    with pytest.raises(InitializationError) as caught, Master(s):
+        pass
+    failure = caught.value.failure
+    assert isinstance(failure, StartValuesLost)
+    told = (
+        "unit.k was set to 7.0 and is 1.0; unit.n was set to 11 and is 2; other.k was set to 0.1 and is 0.10000000149"
+    )
+    assert str(caught.value).startswith(f"unit, other does not start: {told}")
+    assert "\n" not in str(caught.value)
+    data = json.loads(json.dumps(failure.as_data()))
+    assert (data["kind"], data["instance"], data["time"]) == ("start_values_lost", "unit, other", 0.0)
+    assert data["values"][1] == {"name": "unit.n", "given": "11", "found": "2"}
+
+
+@STANDARDS
+def test_rounding_is_no_loss(fmi: int):
+    numbers = [0.1 * i for i in range(1, 200)]
+    s = System()
+    for i, k in enumerate(numbers):
+        s.add(f"u{i}", native_fmu("keeps_radians", fmi), k=k)
+    with Master(s):
+        pass
+    assert any(k * (3.141592653589793 / 180) / (3.141592653589793 / 180) != k for k in numbers)
+
+
+@STANDARDS
+def test_what_cannot_be_read_is_not_judged_and_the_rest_is(fmi: int):
+    with Master(alone("keeps_in_secret", fmi, **START)) as master:
+        assert float(master.signals["unit.y"]) == 7.0 * 5.0 + 11
+        assert list(master.ensemble.instances["unit"].log) == []
+        master.run(Fraction(1, 2))  # that it refused to be read is no failure
+    with Master(alone("resets_in_secret", fmi, **START)) as master:
+        instance = master.ensemble.instances["unit"]
+        (u,) = instance.read([instance.description.inputs["u"]])
+        assert u.views["u"][0].tolist() == [5.0]
+
+
+@STANDARDS
+def test_an_input_that_another_unit_feeds_has_the_value_of_its_source(fmi: int):
+    s = System()
+    source = s.add("source", native_fmu("gain", fmi), b=4.0)
+    reader = s.add("reader", native_fmu("resets", fmi), **START)
+    s.connect(source.y.y, reader.u.u)
+    with Master(s) as master:
+        assert float(master.signals["reader.y"]) == 7.0 * 4.0 + 11
