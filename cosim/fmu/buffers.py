@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
 
@@ -204,6 +205,20 @@ def content_of(port: FmuPort, views: Views) -> bytes:
         pairs = zip(views[0], views[1], strict=True)  # with sizes before them, since binaries may hold any byte
         return b"".join(int(n).to_bytes(8, "little") + ctypes.string_at(int(a), int(n)) for a, n in pairs)
     return views[0].tobytes()
+
+
+def fill(port: FmuPort, views: Views, value: Any) -> object:
+    """Write a value of a port to its views; return the memory of a text or binary, which the views only point to."""
+    if port.kind is Kind.STRING:
+        content = ctypes.create_string_buffer(str(value).encode())
+        views[0][0] = ctypes.addressof(content)
+        return content
+    if port.kind is Kind.BINARY:
+        content = ctypes.create_string_buffer(bytes(value), len(value))
+        views[0][0], views[1][0] = ctypes.addressof(content), len(value)
+        return content
+    views[0][:] = numbers_of(port, value)
+    return None
 
 
 class InputDerivatives(SignalBuffer):

@@ -118,6 +118,67 @@ def discarded_step(function: Callable[[str], Any], component: Any, t: float, fmi
     return reached.value, status <= 1 and bool(terminated.value)
 
 
+_TOLERATED = 1e-3
+"""Part of a step by which the time that a unit says to have reached may be off: units add up steps of their own."""
+_ROUNDING = 16 * 2.0**-52
+"""Relative error of times that is rounding."""
+
+
+class StepReturns:
+    """What fmi3DoStep returns besides a status. FMI 2 has nothing like it; there a step without Discard is complete.
+
+    Attributes:
+        arguments: what DoStep takes for it.
+        addresses: where it lies, for C code.
+    """
+
+    def __init__(self, fmi: int) -> None:
+        self._event, self._ends, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
+        self._last = ctypes.c_double()
+        of_fmi3 = (self._event, self._ends, self._early, self._last) if fmi == 3 else ()
+        self.arguments: tuple[Any, ...] = tuple(ctypes.byref(c) for c in of_fmi3)
+        self.addresses = tuple(ctypes.addressof(c) for c in of_fmi3)
+
+    def clear(self, end: float) -> None:
+        """Hold what a unit leaves as it is in a step to `end` that is complete."""
+        self._event.value = self._ends.value = self._early.value = False
+        self._last.value = end
+
+    @property
+    def event(self) -> bool:
+        """Whether the unit has an event that is to be handled in event mode."""
+        return self._event.value
+
+    @property
+    def ends(self) -> bool:
+        """Whether the unit asks to end the simulation."""
+        return self._ends.value
+
+    @property
+    def last(self) -> float:
+        """Until which time the unit says to have stepped, s."""
+        return self._last.value
+
+    def time_reached(self, t: float, dt: float, *, early_allowed: bool) -> float | str:
+        """Return which time a step of dt from t has reached, s, or what is wrong if it cannot have reached that.
+
+        A unit that does not return early may give less than the step's end: some advance by whole steps of their own.
+        To end the simulation it may return early in any case. What is asked here, `carry_out.c` asks in C.
+        """
+        end, last = t + dt, self.last
+        if last == end or not self.addresses:
+            return end
+        slack = _TOLERATED * dt + _ROUNDING * abs(end)
+        if not t - slack <= last <= end + slack:
+            step = f"its step went from {t:.9g} s to {end:.9g} s"
+            return f"returned t = {last:.9g} s as its last successful time, but {step}"
+        if self.ends or (self._early.value and early_allowed):
+            return min(max(t, last), end)
+        if self._early.value and last < end - slack:
+            return f"returned early, at t = {last:.9g} s of a step to {end:.9g} s, which was not allowed"
+        return end
+
+
 @dataclass(frozen=True)
 class StepEnd:
     """How a unit's step ended.

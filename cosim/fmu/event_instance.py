@@ -7,7 +7,7 @@ import ctypes
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
@@ -33,6 +33,8 @@ class EventInstance(Instance):
         timers: its time-based clocks.
         next_event: the time of its next event that is known beforehand, s; None if there is none.
     """
+
+    returns_early: ClassVar[bool] = True
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],

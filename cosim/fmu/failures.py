@@ -149,18 +149,63 @@ class StartValuesLost(UnitFailure):
         return {**super().as_data(), "values": [value._asdict() for value in self.values]}
 
 
+class InvalidReturn(UnitFailure):
+    """A step of FMI 3 returned early without being allowed to, or with a time before its begin or beyond its end.
+
+    Attributes:
+        returned: the time in seconds that the unit gave as the last successful one.
+        fault: what is wrong with that, to be read after the call.
+    """
+
+    kind = "invalid_return"
+
+    def __init__(self, unit: str, call: str, t: float, returned: float, fault: str, log: Sequence[str] = ()) -> None:
+        self.returned, self.fault = returned, fault
+        super().__init__(unit, call, t, "a return at a time that was not allowed", log)
+
+    @property
+    def what(self) -> str:
+        """What happened: the time returned, and the step."""
+        return self.fault
+
+    @property
+    def message(self) -> str:
+        """What happened; what the unit logged last need not have to do with it."""
+        return self.fault
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the failure as a JSON object; a time that is not finite is None."""
+        return {**super().as_data(), "last_successful_time": self.returned if math.isfinite(self.returned) else None}
+
+
 class UnitTerminated(UnitFailure):
-    """The unit asked to end the simulation: FMI 3 `terminateSimulation`, FMI 2 `fmi2Terminated`."""
+    """The unit asked to end the simulation: FMI 3 `terminateSimulation`, FMI 2 `fmi2Terminated`.
+
+    That is its right and no failure: `Master.run` catches it and ends the run.
+
+    Attributes:
+        reached: the time in seconds until which it has stepped.
+    """
 
     kind = "ended"
 
-    def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = ()) -> None:
+    def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = (), reached: float | None = None) -> None:
+        self.reached = t if reached is None else reached
         super().__init__(unit, call, t, "a request to end the simulation", log)
 
     @property
     def what(self) -> str:
         """What happened."""
         return "asked to end the simulation"
+
+    @property
+    def told(self) -> str:
+        """What happened, for who reads how a run went."""
+        return f"unit {self.unit} ended the simulation at t = {self.reached:.6g} s"
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the request as a JSON object."""
+        return {**super().as_data(), "reached": self.reached}
 
 
 class UnitHung(UnitFailure):

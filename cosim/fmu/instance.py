@@ -8,16 +8,22 @@ import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.blocks.start_values import numbers_of
-from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import InvalidFmu, UnitFailure, last_line
-from handover.cosim.fmu.buffers import InputDerivatives, OutputBuffer, SignalBuffer, Views
-from handover.cosim.fmu.calls import NativeStep, State, StateCalls, StepEnd, derivatives_along, discarded_step
+from handover.cosim.exceptions import InvalidFmu, last_line
+from handover.cosim.fmu.buffers import InputDerivatives, OutputBuffer, SignalBuffer, Views, fill
+from handover.cosim.fmu.calls import (
+    NativeStep,
+    State,
+    StateCalls,
+    StepEnd,
+    StepReturns,
+    derivatives_along,
+    discarded_step,
+)
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.fmu.failures import STATUS, StepDiscarded, UnitTerminated, failure_of
+from handover.cosim.fmu.failures import STATUS, InvalidReturn, StepDiscarded, UnitTerminated, failure_of
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
@@ -33,6 +39,9 @@ class Instance:
     Raises:
         InvalidFmu: the library does not load or does not instantiate.
     """
+
+    returns_early: ClassVar[bool] = False
+    """Whether it is allowed to end a step before its end."""
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
@@ -64,7 +73,7 @@ class Instance:
         """Time derivatives of the inputs that were given to `interpolate`."""
         self.can_roll_back = False
         """Whether states from before the present communication point may be restored; passed to the unit in DoStep."""
-        self._step_arguments = self._make_step_arguments()
+        self._step_returns = StepReturns(self._fmi)
         self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
 
     def set_start(self, values: Mapping[str, Any]) -> None:
@@ -140,45 +149,39 @@ class Instance:
         Raises:
             UnitFailure: the status is above Warning, or the unit asks to end the simulation.
         """
-        self.time = t
-        self._begins(self._step_call)
-        status = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_arguments)
-        self._returned()
-        self.judge_step(status)
+        self.judge_step(self._call_step(t, dt), dt)
         self.time = t + dt
 
     def try_step(self, t: float, dt: float) -> StepEnd:
         """Advance from t by dt, or as far as the unit gets; raises as `step` does, except for a discarded step."""
-        self.time = t
-        self._begins(self._step_call)
-        status = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_arguments)
-        self._returned()
-        if status == _DISCARD:
-            return StepEnd(self._reached(), early=True, discarded=True)
-        self.judge_step(status)
-        early = self._fmi == 3 and self._early.value and self._last_time.value < t + dt
-        self.time = self._last_time.value if early else t + dt
-        if not self.time >= t:
-            raise UnitFailure(self.name, self._step_call, t, f"a return at t = {self.time:.9g} s", tuple(self.log))
-        return StepEnd(self.time, early, self._fmi == 3 and self._event.value)
+        if (status := self._call_step(t, dt)) == _DISCARD:
+            return StepEnd(self._reached(dt), early=True, discarded=True)
+        self.time = self.judge_step(status, dt)
+        return StepEnd(self.time, self.time < t + dt, self._step_returns.event)
 
     def discarded(self, reached: float, reason: str) -> StepDiscarded:
         """Return the failure of a step that the unit discarded and that is not repeated, for a reason."""
         return StepDiscarded(self.name, self._step_call, self.time, reached, reason, tuple(self.log))
 
-    def judge_step(self, status: int) -> None:
-        """Check the status of a step that began at `time`.
+    def judge_step(self, status: int, dt: float) -> float:
+        """Return the time that a step of dt, which began at `time`, has reached.
 
         Raises:
-            UnitFailure: it is above Warning, or the unit asks to end the simulation.
+            UnitTerminated: the unit asks to end the simulation; `time` is then what it has reached.
+            InvalidReturn: it returned early without being allowed to, or with a time out of the step.
+            UnitFailure: the status is above Warning.
         """
         if status == _DISCARD:
-            raise self.discarded(self._reached(), "steps are repeated shorter only with repeat_discarded")
-        if status == _PENDING:  # an asynchronous step of FMI 2, which is not supported
+            raise self.discarded(self._reached(dt), "steps are repeated shorter only with repeat_discarded")
+        if status == _PENDING:  # FMI 2: an asynchronous step, which is not supported
             self._function("CancelStep")(self._component)
         self.judge(self._step_call, status)
-        if self._fmi == 3 and self._terminate.value:
-            raise UnitTerminated(self.name, self._step_call, self.time, tuple(self.log))
+        reached = self._step_returns.time_reached(self.time, dt, early_allowed=self.returns_early)
+        if isinstance(reached, str):
+            raise InvalidReturn(self.name, self._step_call, self.time, self._step_returns.last, reached, self.log)
+        if self._step_returns.ends:
+            raise self._terminated(reached)
+        return reached
 
     def judge(self, call: str, status: int) -> None:
         """Check the status of a call at `time`.
@@ -203,8 +206,7 @@ class Instance:
     def native_step(self) -> NativeStep:
         """The call that `step` makes, for C code."""
         function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
-        flags = () if self._fmi == 2 else (self._event, self._terminate, self._early, self._last_time)
-        return NativeStep(self._fmi, function, self._component or 0, tuple(ctypes.addressof(f) for f in flags))
+        return NativeStep(self._fmi, function, self._component or 0, self._step_returns.addresses)
 
     def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return the directional derivative dy = (dy/du) du of outputs at this instant, with the unit's state held.
@@ -322,20 +324,25 @@ class Instance:
         load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
         return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
 
-    def _reached(self) -> float:
+    def _call_step(self, t: float, dt: float) -> int:
+        self.time = t
+        self._step_returns.clear(t + dt)
+        self._begins(self._step_call)
+        status: int = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_returns.arguments)
+        self._returned()
+        return status
+
+    def _reached(self, dt: float) -> float:
         """Return how far a discarded step got; raise if the unit discarded it to end the simulation."""
         reached, terminated = discarded_step(self._function, self._component, self.time, self._fmi)
         if terminated:
-            raise UnitTerminated(self.name, self._step_call, self.time, tuple(self.log))
+            raise self._terminated(min(max(self.time, reached), self.time + dt))
         return reached
 
-    def _make_step_arguments(self) -> tuple[Any, ...]:
-        if self._fmi == 2:
-            return ()
-        self._event, self._terminate, self._early = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool()
-        self._last_time = ctypes.c_double()
-        flags = (self._event, self._terminate, self._early)
-        return (*(ctypes.byref(f) for f in flags), ctypes.byref(self._last_time))
+    def _terminated(self, reached: float) -> UnitTerminated:
+        request = UnitTerminated(self.name, self._step_call, self.time, tuple(self.log), reached)
+        self.time = reached
+        return request
 
     def _buffers(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
         by_type: dict[str, list[FmuPort]] = collections.defaultdict(list)
@@ -365,17 +372,10 @@ class Instance:
 
     def _set_one(self, port: FmuPort, value: Any) -> None:
         buffer = self._buffer("Set", [port])
-        views = buffer.views[port.name]
-        if port.kind is Kind.STRING:
-            content = ctypes.create_string_buffer(str(value).encode())
-            views[0][0] = ctypes.addressof(content)
-        elif port.kind is Kind.BINARY:
-            content = ctypes.create_string_buffer(bytes(value), len(value))
-            views[0][0], views[1][0] = ctypes.addressof(content), len(value)
-        else:
-            views[0][:] = numbers_of(port, value)
+        kept = fill(port, buffer.views[port.name], value)
         self._begins(buffer.name)
         status = buffer()
+        del kept
         self._returned()
         if status > 1:
             self._fail(f"setting {port.name}", status)

@@ -196,7 +196,7 @@ class PlanMaker:
         instance = self._ensemble.instances[slot.unit]
 
         def judge(status: int, t: float) -> None:  # noqa: ARG001
-            instance.judge_step(status)
+            instance.judge_step(status, slot.period)
 
         code = self._ensemble.heartbeat.code(slot.unit, f"fmi{instance.description.fmi}DoStep")
         self._note(step(self._units[slot.unit], instance.native_step, slot.period, code), judge)
