@@ -124,6 +124,11 @@ _ROUNDING = 16 * 2.0**-52
 """Relative error of times that is rounding."""
 
 
+def is_rounding(difference: float, t: float) -> bool:
+    """Return whether a difference of two times near t, in seconds, is rounding."""
+    return abs(difference) <= _ROUNDING * abs(t)
+
+
 class StepReturns:
     """What fmi3DoStep returns besides a status. FMI 2 has nothing like it; there a step without Discard is complete.
 

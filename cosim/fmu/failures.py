@@ -185,12 +185,17 @@ class UnitTerminated(UnitFailure):
 
     Attributes:
         reached: the time in seconds until which it has stepped.
+        completed: whether that is the end of its step.
     """
 
     kind = "ended"
 
-    def __init__(self, unit: str, call: str, t: float, log: Sequence[str] = (), reached: float | None = None) -> None:
+    def __init__(
+        self, unit: str, call: str, t: float, log: Sequence[str] = (), *,
+        reached: float | None = None, completed: bool = False,
+    ) -> None:  # fmt: skip
         self.reached = t if reached is None else reached
+        self.completed = completed
         super().__init__(unit, call, t, "a request to end the simulation", log)
 
     @property

@@ -21,6 +21,7 @@ from handover.cosim.fmu.calls import (
     StepReturns,
     derivatives_along,
     discarded_step,
+    is_rounding,
 )
 from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.failures import STATUS, InvalidReturn, StepDiscarded, UnitTerminated, failure_of
@@ -96,11 +97,10 @@ class Instance:
             self._returned()
             if status == _FATAL:
                 self._fail(buffer.name, status)
-            members = [p for p in ports if p.name in buffer.views]
             if status <= 1:
                 given.append(buffer)
-            elif len(members) > 1:  # one that is not given takes all of a call with it
-                given += [one for p in members for one in self.read([p])]
+            elif len(buffer.views) > 1:  # one that is not given takes all of a call with it
+                given += [one for p in ports if p.name in buffer.views for one in self.read([p])]
         self.log.clear()
         self.log.extend(log)
         return given
@@ -109,8 +109,7 @@ class Instance:
         """Enter initialisation mode at time t."""
         self.time = t
         if self._fmi == 2:
-            defined, until = (stop is not None), (stop or 0.0)
-            self._call("SetupExperiment", False, 0.0, t, defined, until)
+            self._call("SetupExperiment", False, 0.0, t, stop is not None, stop or 0.0)
             self._call("EnterInitializationMode")
         else:
             self._call("EnterInitializationMode", False, 0.0, t, stop is not None, stop or 0.0)
@@ -149,8 +148,7 @@ class Instance:
         Raises:
             UnitFailure: the status is above Warning, or the unit asks to end the simulation.
         """
-        self.judge_step(self._call_step(t, dt), dt)
-        self.time = t + dt
+        self.time = self.judge_step(self._call_step(t, dt), dt)
 
     def try_step(self, t: float, dt: float) -> StepEnd:
         """Advance from t by dt, or as far as the unit gets; raises as `step` does, except for a discarded step."""
@@ -180,7 +178,7 @@ class Instance:
         if isinstance(reached, str):
             raise InvalidReturn(self.name, self._step_call, self.time, self._step_returns.last, reached, self.log)
         if self._step_returns.ends:
-            raise self._terminated(reached)
+            raise self._terminated(reached, dt)
         return reached
 
     def judge(self, call: str, status: int) -> None:
@@ -205,8 +203,8 @@ class Instance:
     @property
     def native_step(self) -> NativeStep:
         """The call that `step` makes, for C code."""
-        function = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
-        return NativeStep(self._fmi, function, self._component or 0, self._step_returns.addresses)
+        do_step = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
+        return NativeStep(self._fmi, do_step, self._component or 0, self._step_returns.addresses)
 
     def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return the directional derivative dy = (dy/du) du of outputs at this instant, with the unit's state held.
@@ -336,13 +334,13 @@ class Instance:
         """Return how far a discarded step got; raise if the unit discarded it to end the simulation."""
         reached, terminated = discarded_step(self._function, self._component, self.time, self._fmi)
         if terminated:
-            raise self._terminated(min(max(self.time, reached), self.time + dt))
+            raise self._terminated(min(max(self.time, reached), self.time + dt), dt)
         return reached
 
-    def _terminated(self, reached: float) -> UnitTerminated:
-        request = UnitTerminated(self.name, self._step_call, self.time, tuple(self.log), reached)
-        self.time = reached
-        return request
+    def _terminated(self, reached: float, dt: float) -> UnitTerminated:
+        t, end, self.time = self.time, self.time + dt, reached
+        log, completed = tuple(self.log), is_rounding(reached - end, end)
+        return UnitTerminated(self.name, self._step_call, t, log, reached=reached, completed=completed)
 
     def _buffers(self, verb: str, ports: list[FmuPort]) -> list[SignalBuffer]:
         by_type: dict[str, list[FmuPort]] = collections.defaultdict(list)

@@ -218,12 +218,12 @@ class Checkpointer:
         self._next = self._after(master.time)
 
     def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
-        """Write a checkpoint if one is due.
+        """Write a checkpoint if one is due, unless a unit has ended the run, which cannot be resumed.
 
         Raises:
             UnitFailure: a unit does not give its state. RecordNotWritten: the record cannot be written.
         """
-        if t >= self._next:
+        if t >= self._next and self._master.ended is None:
             self.write()
             self._next = self._after(t)
 

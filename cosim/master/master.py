@@ -9,7 +9,8 @@ from typing import TypeVar
 
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
 from handover.cosim.fmu.archive import DESCRIPTION
-from handover.cosim.fmu.failures import UnitHung
+from handover.cosim.fmu.calls import is_rounding
+from handover.cosim.fmu.failures import UnitHung, UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.stepper_factory import StepperFactory
@@ -71,6 +72,8 @@ class Master:
         """Keeps the run in step with the wall clock; None where it runs as fast as it can."""
         self._watchdog = Watchdog(self.heartbeat, options.call_limit)
         self._cleanups = CleanupStack()
+        self.ended: UnitTerminated | None = None
+        """The request of a unit with which the run has ended, None until then."""
         self._ensemble: Ensemble | None = None
         self._stepper: Stepper | None = None
         self._coupling: Coupling | None = None
@@ -80,6 +83,7 @@ class Master:
         if self._ensemble is not None and not self._is_left:
             raise RuntimeError("the master is entered already: leave it first, or make another one")
         self._is_left = False
+        self.ended = None
         try:
             self._watchdog.run_job(self._start)
         except UnitHung:
@@ -137,6 +141,8 @@ class Master:
     @property
     def time(self) -> float:
         """Simulated time in seconds."""
+        if self.ended is not None:
+            return self.ended.reached
         return 0.0 if self._stepper is None else self._stepper.time
 
     @property
@@ -161,12 +167,20 @@ class Master:
         signals at t, then the other units step from t. Jacobi: a step's results count from the time where it ends, for
         sampled units too. A second call continues where the first one ended.
 
+        A unit may ask to end the simulation: then the run ends regularly, `ended` is its request, and observers see the
+        signals once more, at the time that it has reached. If it has completed its step, so do the others that step at
+        the same time: these are the signals of a communication point, but for units with other periods, which are where
+        their own steps ended. If it ends within a step (FMI 2: a Discard with a time before the step's end), or while
+        units iterate, the signals at that time are its own. Those of others are what they gave last: by Gauss-Seidel,
+        units before it in the order are at the end of the step, all others at its begin. A unit that gives no outputs,
+        or none that are finite, adds nothing to what was seen.
+
         With `MasterOptions.call_limit`, units and observers are called in a thread of the master's own.
 
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
             ValueError: `stop` lies before the time that is reached.
-            RuntimeError: the master is left, or a unit failed before.
+            RuntimeError: the master is left, a unit failed before, or one has ended the simulation.
         """
         self._check_can_run(stop)
         self.call_units(lambda: self._run(stop, observers, until))
@@ -203,6 +217,8 @@ class Master:
     def _check_can_run(self, stop: Fraction) -> None:
         if self._is_left:
             raise RuntimeError("the units are freed: run inside of `with Master(system) as master:`")
+        if self.ended is not None:
+            raise RuntimeError(f"{self.ended.told}: make another master to simulate again")
         for name, instance in self.ensemble.instances.items():
             if instance.failed or instance.lost:
                 raise RuntimeError(f"{name} failed, and the standards forbid further calls of it: make another master")
@@ -213,22 +229,50 @@ class Master:
         signals = self.signals
         if self.pacer is not None:
             self.pacer.start(self.time)
-        last = self.schedule.ticks(stop)
-        if isinstance(self.stepper, PlanStepper):
-            pause = None if self.pacer is None else self._pause(until)
-            self.stepper.run(last, signals, observers, None if until is never else until, pause)
+        last, arriving = self.schedule.ticks(stop), True
+        try:
+            if isinstance(self.stepper, PlanStepper):
+                pause = None if self.pacer is None else self._pause(until)
+                self.stepper.run(last, signals, observers, None if until is never else until, pause)
+                return
+            while True:
+                arriving = True
+                ended = self.stepper.arrive(last)
+                if self.heartbeat.stopped:
+                    raise Abandoned
+                if self.pacer is not None:
+                    self._pause(until)()
+                for observe in observers:
+                    observe(self.stepper.time, signals)
+                if ended or until():
+                    break
+                arriving = False
+                self.stepper.depart()
+        except UnitTerminated as e:
+            at_point = self.stepper.arriving if isinstance(self.stepper, PlanStepper) else arriving
+            self._end_with(e, observers, at_point=at_point)
+
+    def _end_with(self, request: UnitTerminated, observers: Sequence[Observer], *, at_point: bool) -> None:
+        """End the run with a unit's request, made before observers saw the communication point or in a step from it."""
+        instances, begin, reached = self.ensemble.instances, self.stepper.time, request.reached
+        request.reached = begin if at_point else self._on_grid(reached)
+        self.ended = request
+        if not at_point and reached <= begin:
+            return  # observers have seen where it ended
+        arrived = () if at_point else [n for n, i in instances.items() if is_rounding(i.time - reached, reached)]
+        try:
+            for name in dict.fromkeys((request.unit, *arrived)):
+                self.ensemble.publish(name)
+        except UnitFailure as e:
+            _log.warning("%s, but its last signals are left out: %s", request.told, e.cause)
             return
-        while True:
-            ended = self.stepper.arrive(last)
-            if self.heartbeat.stopped:
-                raise Abandoned
-            if self.pacer is not None:
-                self._pause(until)()
-            for observe in observers:
-                observe(self.stepper.time, signals)
-            if ended or until():
-                break
-            self.stepper.depart()
+        for observe in observers:
+            observe(request.reached, self.signals)
+
+    def _on_grid(self, t: float) -> float:
+        """Return the exact time of a tick where t is one but for rounding."""
+        exact = self.schedule.time(round(Fraction(t) / self.schedule.tick))
+        return exact if is_rounding(t - exact, exact) else t
 
     def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
         """Return a function that waits until the wall clock has reached the simulated time."""

@@ -103,5 +103,6 @@ def _loaded(file: Path) -> ctypes.CDLL:
     library.plan_free_kept.restype = None
     library.plan_arrive.argtypes = (plan, ctypes.c_int64)
     library.plan_depart.argtypes = (plan,)
+    library.plan_carry_out.argtypes = (plan, ctypes.c_int64, ctypes.c_int64)
     library.plan_run.argtypes = (plan, ctypes.c_int64, ctypes.c_int64, ctypes.c_bool, ctypes.POINTER(Rows))
     return library

@@ -80,6 +80,11 @@ API int plan_arrive(Plan *plan, int64_t last) { return arrive(plan, last); }
 
 API int plan_depart(Plan *plan) { return depart(plan); }
 
+/* Carry out a part of the operations, as what is left of a communication step in which one stopped the plan. */
+API int plan_carry_out(Plan *plan, int64_t first, int64_t end) {
+    return carry_out(plan, &(Segment){-1, first, end});
+}
+
 /* Pass at most `points` communication points, tick `last` at the latest, with a row of the record at each. `leave` is
  * whether the plan is at a communication point to depart from first, as after every call but the first of a run. */
 API int plan_run(Plan *plan, int64_t last, int64_t points, bool leave, const Record *record) {

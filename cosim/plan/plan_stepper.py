@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned
 from handover.cosim.plan import memory
 from handover.cosim.plan.plan_maker import PlanMaker
@@ -34,10 +35,12 @@ class PlanStepper:
 
     Attributes:
         coupling: what does the same as the plan on the general path.
+        arriving: whether a unit's request to end the simulation, or a failure, came before observers saw the signals.
     """
 
     def __init__(self, schedule: Schedule, ensemble: Ensemble, coupling: Coupling, plan: PlanMaker) -> None:
         self._schedule, self._ensemble, self.coupling = schedule, ensemble, coupling
+        self.arriving = False
         self._library, self._clock = plan.library, plan.has_clock
         self._judges, self._units = plan.judges, list(ensemble.instances)
         self._members = list(plan.groups.values())
@@ -48,6 +51,7 @@ class PlanStepper:
         )
         self._arrive = (memory.Segment * len(plan.arrive))(*plan.arrive)
         self._depart = (memory.Segment * len(plan.depart))(*plan.depart)
+        self._depart_from = min((segment.first for segment in plan.depart), default=len(plan.packed))
         self._times = (ctypes.c_double * n)()
         self._spent = (ctypes.c_double * (n * _ROOM if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
@@ -168,10 +172,39 @@ class PlanStepper:
         if outcome == _ABANDONED:
             raise Abandoned
         if outcome == _STOPPED:
+            stopped_at = self._plan.stopped_at
+            self.arriving = stopped_at < self._depart_from
             self._publish_times()
-            self._judges[self._plan.stopped_at](self._plan.status, self.time)
-            raise RuntimeError(f"operation {self._plan.stopped_at} of the plan stopped it without a reason")
+            try:
+                self._judges[stopped_at](self._plan.status, self.time)
+            except UnitTerminated as e:
+                self._read_times()
+                if e.completed:
+                    self._complete(stopped_at)
+                    self._publish_times()
+                raise
+            raise RuntimeError(f"operation {stopped_at} of the plan stopped it without a reason")
         return outcome
+
+    def _complete(self, stopped_at: int) -> None:
+        """Carry out what is left of a communication step in which a unit asked to end the simulation; see `LastStep`.
+
+        Raises:
+            UnitFailure: another unit's call failed. UnitTerminated: another asked for the same without completing.
+        """
+        tick, arriving = self._plan.tick, self.arriving
+        for segment in self._arrive if arriving else self._depart:
+            group = self._groups[segment.group] if segment.group >= 0 else None
+            is_due = group is None or (group.due == tick and not (arriving and group.acted >= tick))
+            if segment.end <= stopped_at + 1 or not is_due:
+                continue
+            outcome = self._library.plan_carry_out(self._plan, max(segment.first, stopped_at + 1), segment.end)
+            try:
+                self._checked(outcome)
+            except UnitTerminated as e:
+                if not e.completed:
+                    raise
+                return  # that one has completed what was left
 
     def _publish_times(self) -> None:
         for instance, t in zip(self._ensemble.instances.values(), self._times, strict=True):

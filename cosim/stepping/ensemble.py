@@ -15,7 +15,7 @@ from pathlib import Path
 
 from handover.cosim.exceptions import CosimError
 from handover.cosim.fmu.calls import State
-from handover.cosim.fmu.failures import StartValuesLost
+from handover.cosim.fmu.failures import StartValuesLost, UnitTerminated
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance import Instance
@@ -60,6 +60,35 @@ class SavedStates(dict[str, State]):
     def __init__(self, states: Mapping[str, State], memories: Mapping[str, Memory]) -> None:
         super().__init__(states)
         self.memories = memories
+
+
+class LastStep:
+    """Lets a communication step be completed in which a unit asks to end the simulation, and passes that on then.
+
+    Where the unit has not completed its own step, the others cannot meet it: its request is passed on at once.
+    """
+
+    def __init__(self) -> None:
+        self._first: UnitTerminated | None = None
+
+    @contextlib.contextmanager
+    def completed(self) -> Generator[None, None, None]:
+        """Keep the request that a unit's completed step makes, for `end`."""
+        try:
+            yield
+        except UnitTerminated as e:
+            if not e.completed:
+                raise
+            self._first = self._first or e
+
+    def end(self) -> None:
+        """End the communication step.
+
+        Raises:
+            UnitTerminated: the first request that was kept.
+        """
+        if self._first is not None:
+            raise self._first
 
 
 class Ensemble:
@@ -180,7 +209,7 @@ class Ensemble:
         """Step a unit from t to t + dt.
 
         Raises:
-            UnitFailure: its call failed.
+            UnitTerminated: it asks to end the simulation. UnitFailure: its call failed.
         """
         self.instances[unit].step(t, dt)
         if self.extrapolation is not None:

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.ensemble import Ensemble, LastStep
 from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.iteration import IteratedStep, IterationCount
 from handover.cosim.stepping.solvers import InterfaceSolver
@@ -42,16 +42,19 @@ class GroupStepping:
         """Step units that are due.
 
         Raises:
-            UnitFailure: a unit's call failed. NotConverged: a cycle did not converge.
+            UnitTerminated: a unit asks to end the simulation. UnitFailure: a unit's call failed. NotConverged: a cycle
+                did not converge.
         """
+        last = LastStep()
         in_order = sorted(due, key=lambda slot: self._place[slot.unit])
         for cycle, members in itertools.groupby(in_order, key=self._cycle_index):
             slots = list(members)
             iterated = None if cycle is None else self._iterated_step(self._groups[cycle], slots)
             if iterated is None:
-                self._one_after_another(t, slots)
+                self._one_after_another(t, slots, last)
             else:
                 iterated.step(t, slots)
+        last.end()
 
     def get_state(self) -> list[Any]:
         """Return the state of each solver with the units that iterate with it, as JSON can hold it."""
@@ -83,11 +86,12 @@ class GroupStepping:
             return None
         return IteratedStep(self._ensemble, interface, self._make_solver(interface), self._count, group.message)
 
-    def _one_after_another(self, t: float, due: Sequence[Slot]) -> None:
+    def _one_after_another(self, t: float, due: Sequence[Slot], last: LastStep) -> None:
         with self._ensemble.stopwatch() as charge:
             for slot in due:
                 self._ensemble.feed(slot.unit, t, slot.period)
-                self._ensemble.step(slot.unit, t, slot.period)
+                with last.completed():
+                    self._ensemble.step(slot.unit, t, slot.period)
                 self._ensemble.publish(slot.unit)
                 charge(slot.unit)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.ensemble import Ensemble, LastStep
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.schedule import Slot
 
@@ -31,10 +31,13 @@ class Jacobi:
             self._ensemble.feed(slot.unit, t)
         for slot in continuous:
             self._ensemble.feed(slot.unit, t, slot.period)
+        last = LastStep()
         with self._ensemble.stopwatch() as charge:
             for slot in due:
-                self._ensemble.step(slot.unit, t, slot.period)
+                with last.completed():
+                    self._ensemble.step(slot.unit, t, slot.period)
                 charge(slot.unit)
+        last.end()
 
     def get_state(self) -> Mapping[str, Any]:
         """Return nothing: all is in the units' states; see `Coupling`."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu.failures import UnitHung
+from handover.cosim.fmu.failures import UnitHung, UnitTerminated
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
@@ -105,7 +105,9 @@ def _run(
             observers = [ObserveAfter(resumption.checkpoint.time, observe) for observe in observers]
         try:
             master.run(stop, [*observers, report_progress], until=lambda: evaluator.over or interruption.asked)
-            if interruption.asked and not evaluator.over:
+            if master.ended is not None:
+                evaluator.note_end(master.ended.unit, master.ended.reached)
+            elif interruption.asked and not evaluator.over:
                 for checkpointer in checkpoints:
                     master.call_units(checkpointer.write)
             evaluator.finish(master.signals)
@@ -131,7 +133,8 @@ def _conclude(
     task: Task, master: Master, evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, spent: ElapsedTime
 ) -> RunResult:
     """Write the summary of a run at its end, its pictures and its report."""
-    outcome = _outcome(evaluator, failure, interrupted)
+    interrupted = interrupted and master.ended is None
+    outcome = _outcome(evaluator, failure, interrupted, master.ended)
     complete = failure is None and (evaluator.over or not interrupted)
     summary = finished_summary(task, outcome, master, spent, failure, complete)
     task.folder.write_summary(summary)
@@ -146,12 +149,16 @@ def _conclude(
     return RunResult(outcome=outcome, summary=summary, failure=failure)
 
 
-def _outcome(evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool) -> Outcome:
+def _outcome(
+    evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, ended: UnitTerminated | None
+) -> Outcome:
     seen = evaluator.outcome()
     if failure is not None:
         return Outcome(success=False, reason=failure_reason(failure), metrics=seen.metrics)
     if interrupted and not evaluator.over:
         return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
+    if ended is not None:
+        return Outcome(success=seen.success, reason=f"{seen.reason}; {ended.told}", metrics=seen.metrics)
     return seen
 
 

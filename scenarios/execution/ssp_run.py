@@ -26,10 +26,10 @@ class NoParameters:
 
 
 class UntilStop(Evaluator):
-    """Lets a run continue to its stop time; it succeeds if it reaches that."""
+    """Lets a run continue to its stop time; it succeeds if it reaches that, or a unit ends the simulation before."""
 
     def __init__(self, stop: Fraction) -> None:
-        self._stop, self._t = float(stop), 0.0
+        self._stop, self._t, self._ended = float(stop), 0.0, False
 
     def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
         """Note the time."""
@@ -40,10 +40,17 @@ class UntilStop(Evaluator):
         """False: a run does not end before its stop time."""
         return False
 
+    def note_end(self, unit: str, t: float) -> None:  # noqa: ARG002
+        """Note that the run has ended as it should."""
+        self._ended = True
+
     def outcome(self) -> Outcome:
-        """Return whether the stop time was reached."""
+        """Return whether the stop time was reached or a unit ended the simulation."""
         reached = self._t >= self._stop
-        return Outcome(success=reached, reason=f"ran to {self._t:g} s" + ("" if reached else f" of {self._stop:g} s"))
+        return Outcome(
+            success=reached or self._ended,
+            reason=f"ran to {self._t:g} s" + ("" if reached else f" of {self._stop:g} s"),
+        )
 
 
 def is_ssp(name: str) -> bool:

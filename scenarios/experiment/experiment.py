@@ -58,6 +58,9 @@ class Evaluator(abc.ABC):
     def finish(self, signals: Signals) -> None:  # noqa: B027 (many evaluators need nothing of it)
         """Take in the signals at the end of the run, however it ended."""
 
+    def note_end(self, unit: str, t: float) -> None:  # noqa: B027 (most tasks are judged by the signals alone)
+        """Take in that a unit has ended the simulation at t, as is its right; its signals there were seen before."""
+
     def pictures(self) -> Sequence[CameraPicture]:
         """Return what cameras saw at the run's key moments, in chronological order; none by default."""
         return ()

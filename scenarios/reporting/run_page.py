@@ -96,7 +96,7 @@ def run_header(facts: RunFacts) -> Markup:
             good=summary["success"],
             reason=summary["reason"],
             resumable=facts.folder.checkpoint.exists(),
-            failure={"log": (), "instance": None, **(summary.get("failure") or {})},
+            failure={"log": (), "instance": None, **(summary.get("failure") or summary.get("ended") or {})},
         )
     )
 

@@ -129,12 +129,14 @@ class UnitData(TypedDict):
 class _OfSomeSummaries(TypedDict, total=False):
     steps: dict[str, Any]
     pace: dict[str, Any]
+    ended: dict[str, Any]
 
 
 class Summary(Configuration, _OfSomeSummaries):
     """How a run went: one that is not `complete` can be resumed; `failure` is as `UnitFailure.as_data`, or None.
 
-    Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`.
+    Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`;
+    those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`.
     """
 
     complete: bool
@@ -226,6 +228,8 @@ def finished_summary(
     )
     if master.pacer is not None:
         summary["pace"] = master.pacer.report.as_data()
+    if master.ended is not None:
+        summary["ended"] = master.ended.as_data()
     return summary
 
 

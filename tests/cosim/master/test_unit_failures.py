@@ -105,19 +105,6 @@ def test_the_others_are_terminated_and_freed_and_the_failed_one_as_the_standard_
 
 @COMPILED
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_unit_that_ends_the_simulation_is_reported_and_terminated_like_the_others(
-    fmi: int, compiled: bool, tmp_path: Path
-):
-    failure, call_log = failed("ends", fmi, tmp_path / "r.parquet", compiled=compiled)
-    assert type(failure) is UnitTerminated
-    assert str(failure) == f"bad: fmi{fmi}DoStep at t = 0.2 s asked to end the simulation"
-    assert Record(tmp_path / "r.parquet").time.tolist() == [0.0, 0.1, 0.2]
-    ends = [(unit, call) for unit, call in call_log.calls if call.endswith(("Terminate", "FreeInstance"))]
-    assert [call for unit, call in ends if unit == "bad"] == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
-
-
-@COMPILED
-@pytest.mark.parametrize("fmi", [2, 3])
 def test_a_step_that_is_discarded_is_reported_and_the_unit_terminated(fmi: int, compiled: bool):
     s, call_log = System(), CallLog()
     s.add("bad", native_fmu("discards", fmi), period=Fraction(1, 10))

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from failing_systems import failing_ssp
 
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
@@ -72,6 +73,25 @@ def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(sprin
     summary = json.loads((out / "summary.json").read_text())
     assert summary["reason"].startswith("a unit failed: left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore")
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_that_ends_the_simulation_ends_the_run_well(fmi: int, tmp_path: Path):
+    out = tmp_path / "out"
+    result = run(failing_ssp(tmp_path, "ends", fmi), "--out", out, "--checkpoint", "0.1")
+    assert result.exit_code == 0, result.output
+    told = "ran to 0.3 s of 1 s; unit bad ended the simulation at t = 0.3 s"
+    assert f"ends.ssp succeeded: {told}" in result.output
+    assert "to resume" not in result.output
+    assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.1, 0.2, 0.3]
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["success"], summary["complete"], summary["failure"]) == (True, True, None)
+    assert (summary["reason"], summary["simulated_seconds"]) == (told, 0.3)
+    ended = summary["ended"]
+    assert (ended["instance"], ended["call"], ended["time"], ended["reached"]) == ("bad", f"fmi{fmi}DoStep", 0.2, 0.3)
+    page = " ".join((out / "report.html").read_text().split())  # numbers and units do not break
+    assert f"Succeeded</b>: {told}" in page
+    assert CliRunner().invoke(main, ["resume", str(out)]).exit_code == 2  # complete
 
 
 def test_of_a_run_that_ended_where_it_began_nothing_is_drawn(spring: Path, tmp_path: Path):
