@@ -8,7 +8,7 @@ and both forms are interchangeable.
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from handover.cosim.fmu.default_experiment import DefaultExperiment, default_exp
 from handover.cosim.fmu.xml import XmlElement
 
 if TYPE_CHECKING:
-    from handover.cosim.fmu.fmpy_edge import ModelDescription, ModelVariable
+    from handover.cosim.fmu.fmpy_edge import ModelVariable
 
 
 KINDS = {
@@ -134,11 +134,13 @@ class FmuDescription:
     """An FMU's ports and identity.
 
     `feedthrough` names, by output, the inputs with declared direct feedthrough to it; `presumed_feedthrough` likewise
-    where an FMU declares no dependencies, which the standards take as all inputs. `sampled` says that all outputs are
-    discrete and the step is fixed: such a unit computes at instants, from the inputs of the instant. It is stepped
-    without event mode, where it samples by itself, even if it declares a clock for hosts with event mode: so its
-    results are the same in all hosts. That needs ports that can be accessed without a clock, so a unit with clocked
-    ports, or with clocks that are not constant, is not sampled in this sense.
+    where an FMU declares no dependencies, which the standards take as all inputs. `initial_feedthrough` and
+    `presumed_initial_feedthrough` are the same in initialization mode (`InitialUnknowns`).
+
+    `sampled` says that all outputs are discrete and the step is fixed: such a unit computes at instants, from the
+    inputs of the instant. It is stepped without event mode, where it samples by itself, even if it declares a clock for
+    hosts with event mode: so its results are the same in all hosts. That needs ports that can be accessed without a
+    clock, so a unit with clocked ports, or with clocks that are not constant, is not sampled in this sense.
 
     `step` is the communication step that it proposes, in seconds. `untouched_fault` says how its model description
     breaks the standard in parts that co-simulation does not touch; a run warns of it.
@@ -156,6 +158,8 @@ class FmuDescription:
     feedthrough: Mapping[str, tuple[str, ...]]
     presumed_feedthrough: Mapping[str, tuple[str, ...]]
     sampled: bool
+    initial_feedthrough: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    presumed_initial_feedthrough: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     capabilities: Capabilities = Capabilities()
     experiment: DefaultExperiment = DefaultExperiment()
     untouched_fault: str = ""
@@ -183,7 +187,11 @@ def describe_fmu(path: Path) -> FmuDescription:
     by_causality: dict[Causality, dict[str, FmuPort]] = {c: {} for c in Causality}
     for p in grouped:
         by_causality[p.causality][p.name] = p
-    declared, presumed = _feedthrough(md, owner, by_causality[Causality.INPUT])
+    inputs = by_causality[Causality.INPUT]
+    declared, presumed = _feedthrough(md.outputs, owner, inputs)
+    initial, presumed_initial = _feedthrough(md.initialUnknowns, owner, inputs)
+    told_initially = {owner.get(u.variable.valueReference) for u in md.initialUnknowns}
+    presumed_initial |= {y: us for y, us in presumed.items() if y not in told_initially}
     outputs = [v for v in md.modelVariables if v.causality == "output"]
     capabilities = capabilities_of(root, 2 if is_fmi2 else 3)
     clocks = _clocks(path, root)
@@ -203,6 +211,12 @@ def describe_fmu(path: Path) -> FmuDescription:
         outputs=by_causality[Causality.OUTPUT],
         feedthrough=declared,
         presumed_feedthrough=presumed,
+        initial_feedthrough=_united(
+            declared, {y: us for y, us in initial.items() if y in by_causality[Causality.OUTPUT]}
+        ),
+        presumed_initial_feedthrough={
+            y: us for y, us in presumed_initial.items() if y in by_causality[Causality.OUTPUT]
+        },
         sampled=is_discrete and not capabilities.varies_step and not is_clocked,
         capabilities=capabilities,
         clocks=clocks,
@@ -290,13 +304,17 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
     return grouped
 
 
+def _united(a: Mapping[str, tuple[str, ...]], b: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    return {y: tuple(sorted({*a.get(y, ()), *b.get(y, ())})) for y in (*a, *(y for y in b if y not in a))}
+
+
 def _feedthrough(
-    md: "ModelDescription", owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
+    unknowns: Iterable[Any], owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
-    """Return the declared and the presumed dependencies of outputs on inputs."""
+    """Return the declared and the presumed dependencies of unknowns on inputs."""
     declared: dict[str, set[str]] = defaultdict(set)
     presumed: dict[str, tuple[str, ...]] = {}
-    for unknown in md.outputs:
+    for unknown in unknowns:
         name = owner.get(unknown.variable.valueReference)
         if name is None:
             continue

@@ -55,6 +55,7 @@ class ModelDescription(Protocol):
     unitDefinitions: list[Any]
     modelVariables: list[ModelVariable]
     outputs: list[Any]
+    initialUnknowns: list[Any]
 
 
 def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:

@@ -37,7 +37,7 @@ class StepperFactory:
             check_control(system, options.adaptive)
         check_off_grid(system, options)
         self._continuous = self._groups()
-        check_loops(system, self.schedule.loops, rolls_back=options.algorithm is not Algorithm.JACOBI)
+        check_loops(system, self.schedule.declared_loops)
 
     @property
     def has_events(self) -> bool:
@@ -47,8 +47,7 @@ class StepperFactory:
     @property
     def iterates(self) -> bool:
         """Whether units repeat steps after a rollback."""
-        rolls_back = self._options.algorithm is not Algorithm.JACOBI
-        return rolls_back and any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
+        return any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
 
     def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
         """Load the units; the caller closes `cleanups`, also if this fails."""
@@ -60,14 +59,14 @@ class StepperFactory:
     def initialize(self, ensemble: Ensemble) -> None:
         """Take the units through initialisation mode; algebraic loops are solved."""
         schedule = self.schedule
-        values = InitialValues(ensemble, schedule.groups, schedule.initial_passes, self._solver)
+        values = InitialValues(ensemble, schedule.initial_groups, schedule.initial_passes, self._solver)
         ensemble.initialize(schedule.slots, values)
 
     def couple(self, ensemble: Ensemble) -> Coupling:
         """Return the coupling of the algorithm."""
         match self._options.algorithm:
             case Algorithm.JACOBI:
-                return Jacobi(ensemble)
+                return Jacobi(ensemble, self.schedule.groups, self._solver)
             case Algorithm.GAUSS_SEIDEL | Algorithm.FIXED_POINT | Algorithm.NEWTON:
                 return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
 

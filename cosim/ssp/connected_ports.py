@@ -66,6 +66,8 @@ def split_arrays(d: FmuDescription, names: Collection[str]) -> FmuDescription:
         outputs=ports(d.outputs),
         feedthrough=feedthrough(d.feedthrough),
         presumed_feedthrough=feedthrough(d.presumed_feedthrough),
+        initial_feedthrough=feedthrough(d.initial_feedthrough),
+        presumed_initial_feedthrough=feedthrough(d.presumed_initial_feedthrough),
     )
 
 

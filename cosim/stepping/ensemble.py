@@ -147,7 +147,7 @@ class Ensemble:
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
-            lost[name] = keep_start(self.instances[name], unit.start, self.system.sources_of(name))
+            lost[name] = keep_start(self.instances[name], unit.start, self.system.fed_inputs(name))
         if losers := [name for name in lost if lost[name]]:
             raise StartValuesLost(losers, 0.0, [value for name in losers for value in lost[name]])
         compute_values()

@@ -1,23 +1,37 @@
-"""Jacobi coupling: all units step from the values at a communication point, as if in parallel."""
+"""Jacobi coupling: all units step from the values at a communication point, as if in parallel; loops are solved."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from handover.cosim.stepping.ensemble import Ensemble, LastStep
+from handover.cosim.stepping.gauss_seidel import GroupStepping, MakeSolver
 from handover.cosim.stepping.iteration import IterationCount
+from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
 
 
 class Jacobi:
     """A step's results count from the time where it ends, for sampled units too.
 
-    Direct feedthrough takes effect a step later here, so there is no algebraic loop to solve but at the start.
+    Direct feedthrough takes effect a step later here. In an algebraic loop that delay would make another system of it,
+    which may grow without bound although the loop has a solution: so the units of a loop step together, iterated until
+    they converge as with Gauss-Seidel, from the values that all others have at the communication point. Where loops
+    feed each other, later ones get the results of those before.
+
     Also called the parallel scheme: C. Gomes et al., Co-simulation: a survey, ACM Comput. Surv. 51 (2018) 49.
+
+    Args:
+        ensemble: the units.
+        groups: groups of all units, those of algebraic loops together.
+        make_solver: makes a solver for each loop.
     """
 
-    def __init__(self, ensemble: Ensemble) -> None:
+    def __init__(self, ensemble: Ensemble, groups: Sequence[Group], make_solver: MakeSolver) -> None:
         self._ensemble = ensemble
         self.count = IterationCount()
+        loops = [group for group in groups if group.cycle]
+        self._looped = {name for group in loops for name in group.units}
+        self._loops = GroupStepping(ensemble, loops, make_solver, self.count)
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
         """Fetch what steps that end at t have computed."""
@@ -25,23 +39,28 @@ class Jacobi:
             self._ensemble.publish(slot.unit)
 
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
-        """Set all inputs, then step."""
-        due = (*sampled, *continuous)
+        """Set all inputs, then step; units of loops come last, so that their results reach no other input."""
         for slot in sampled:
-            self._ensemble.feed(slot.unit, t)
+            if slot.unit not in self._looped:
+                self._ensemble.feed(slot.unit, t)
         for slot in continuous:
-            self._ensemble.feed(slot.unit, t, slot.period)
+            if slot.unit not in self._looped:
+                self._ensemble.feed(slot.unit, t, slot.period)
         last = LastStep()
         with self._ensemble.stopwatch() as charge:
-            for slot in due:
-                with last.completed():
-                    self._ensemble.step(slot.unit, t, slot.period)
-                charge(slot.unit)
+            for slot in (*sampled, *continuous):
+                if slot.unit not in self._looped:
+                    with last.completed():
+                        self._ensemble.step(slot.unit, t, slot.period)
+                    charge(slot.unit)
+        self._loops.step(t, [slot for slot in (*sampled, *continuous) if slot.unit in self._looped])
         last.end()
 
     def get_state(self) -> Mapping[str, Any]:
-        """Return nothing: all is in the units' states; see `Coupling`."""
-        return {}
+        """Return the solvers' states and the counts, nothing where no unit iterates; see `Coupling`."""
+        return {"loops": self._loops.get_state(), "count": self.count.get_state()} if self.count.steps else {}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
-        """Do nothing; see `Coupling`."""
+        """Restore what `get_state` returned."""
+        self._loops.set_state(state.get("loops", []))
+        self.count.set_state(state.get("count", IterationCount().get_state()))

@@ -75,11 +75,12 @@ class Extrapolation(enum.Enum):
 class Algorithm(enum.Enum):
     """How units that are due at the same time get their inputs.
 
-    JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values; the units of
-    an algebraic loop repeat the step after a rollback until they converge. FIXED_POINT and NEWTON: the same for all
-    units that are connected in a cycle (iterated, strong or implicit coupling), with inputs of the end of the step, by
-    relaxed fixed-point iteration or by Newton's method. Sampled units act one after another, except in loops.
-    FIXED_POINT solves all loops, also those at the start, by its own iteration, the others by Newton's method.
+    JACOBI: all from the values at that time. GAUSS_SEIDEL: one after another, each from the newest values. With both,
+    the units of an algebraic loop repeat the step after a rollback until they converge. FIXED_POINT and NEWTON: one
+    after another, and all units that are connected in a cycle do the same (iterated, strong or implicit coupling), with
+    inputs of the end of the step, by relaxed fixed-point iteration or by Newton's method. Sampled units act one after
+    another, except in loops. FIXED_POINT solves all loops, also those at the start, by its own iteration, the others by
+    Newton's method.
     """
 
     JACOBI = "jacobi"

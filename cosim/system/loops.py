@@ -1,17 +1,19 @@
 """Algebraic loops of ports, the groups of units that have to be stepped together, and whether they can be solved.
 
 An algebraic loop is a cycle of outputs that depend on themselves through direct feedthrough and connections, at one
-instant. An algorithm that iterates works on groups of units: those of a loop, or all that are connected in a cycle.
-`check_loops` and `check_cycles` reject what an algorithm cannot solve, before any unit is loaded.
+instant. An output whose FMU declares no dependencies is taken to depend on all inputs, as the standards say, so loops
+may be presumed, too. An algorithm that iterates works on groups of units: those of a loop, or all that are connected in
+a cycle. `check_loops` and `check_cycles` reject what an algorithm cannot solve, before any unit is loaded.
 """
 
 from collections import deque
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import ScheduleError
+from handover.cosim.fmu.description import FmuDescription
 from handover.cosim.system.ordering import DescribeWait, Needs, ordered, strongly_connected
 from handover.cosim.system.system import Connection, PortName, System
 
@@ -28,6 +30,8 @@ class AlgebraicLoop:
     connections: tuple[Connection, ...]
     message: str
     """A shortest cycle, spelled out: `a.y -> b.u, b.u feeds through to b.y, b.y -> a.u, ...`."""
+    is_presumed: bool = False
+    """Whether it is one only if all outputs depend on all inputs of units that do not declare it."""
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -35,30 +39,94 @@ class AlgebraicLoop:
         return tuple(dict.fromkeys(p.unit for p in self.outputs))
 
 
-def algebraic_loops(system: System, units: Collection[str]) -> list[AlgebraicLoop]:
-    """Return the loops among some of a system's units by what their FMUs declare; presumed feedthrough makes none."""
+Feeding = Mapping[PortName, Sequence[Connection]]
+"""By output, the connections into inputs that feed through to it."""
+
+
+def declared_loops(system: System, units: Collection[str]) -> list[AlgebraicLoop]:
+    """Return the loops among some of a system's units by what their FMUs declare."""
+    return _loops(_feeding(system, units, _declared), frozenset())
+
+
+def solved_loops(
+    system: System, units: Collection[str], *, initial: bool
+) -> tuple[list[AlgebraicLoop], list[AlgebraicLoop]]:
+    """Return the loops that are to be solved among some of a system's units, and presumed ones that cannot be.
+
+    Presumed feedthrough counts where its signal is real; of others nothing can be iterated. At the start (`initial`)
+    all loops can be solved; at the steps, presumed ones with a unit that cannot roll back are not, but what is declared
+    of them is.
+    """
+    declared = _feeding(system, units, _declared_initially if initial else _declared)
+    presumed = _feeding(system, units, _presumed_initially if initial else _presumed)
+    real = {y: [c for c in cs if _kind(system, c) is Kind.REAL and c not in declared[y]] for y, cs in presumed.items()}
+    if not any(real.values()):
+        return _loops(declared, frozenset()), []
+    doubtful = frozenset((c.target, y) for y, cs in real.items() for c in cs)
+    solved: list[AlgebraicLoop] = []
+    unsolved: list[AlgebraicLoop] = []
+    for loop in _loops({y: [*declared[y], *real[y]] for y in declared}, doubtful):
+        if not loop.is_presumed or initial or not _stateless(system, loop.units):
+            solved.append(loop)
+        else:
+            unsolved.append(loop)
+            solved += _loops({y: declared[y] for y in loop.outputs}, frozenset())
+    return solved, unsolved
+
+
+def _declared(d: FmuDescription) -> Mapping[str, tuple[str, ...]]:
+    return d.feedthrough
+
+
+def _presumed(d: FmuDescription) -> Mapping[str, tuple[str, ...]]:
+    return d.presumed_feedthrough
+
+
+def _declared_initially(d: FmuDescription) -> Mapping[str, tuple[str, ...]]:
+    return d.initial_feedthrough
+
+
+def _presumed_initially(d: FmuDescription) -> Mapping[str, tuple[str, ...]]:
+    return d.presumed_initial_feedthrough
+
+
+def _feeding(
+    system: System, units: Collection[str], feedthrough: Callable[[FmuDescription], Mapping[str, tuple[str, ...]]]
+) -> dict[PortName, list[Connection]]:
     by_target = {c.target: c for c in system.connections if c.source.unit in units}
-    feeding: dict[PortName, list[Connection]] = {}  # by output, the connections into inputs that feed through to it
+    feeding: dict[PortName, list[Connection]] = {}
     for name in units:
         d = system.units[name].description
+        through = feedthrough(d)
         for y in d.outputs:
-            inputs = [PortName(name, u) for u in d.feedthrough.get(y, ())]
+            inputs = [PortName(name, u) for u in through.get(y, ())]
             feeding[PortName(name, y)] = [by_target[u] for u in inputs if u in by_target]
+    return feeding
+
+
+def _loops(feeding: Feeding, doubtful: Collection[tuple[PortName, PortName]]) -> list[AlgebraicLoop]:
+    """Return the loops; those that need one of the doubtful pairs of an input and an output are presumed."""
     needs = {y: [c.source for c in cs] for y, cs in feeding.items()}
     cycles = [c for c in strongly_connected(needs) if len(c) > 1 or c[0] in needs[c[0]]]
-    return [_loop(cycle, feeding) for cycle in cycles]
+    return [_loop(cycle, feeding, doubtful) for cycle in cycles]
 
 
-def _loop(cycle: Sequence[PortName], feeding: Mapping[PortName, Sequence[Connection]]) -> AlgebraicLoop:
+def _loop(
+    cycle: Sequence[PortName], feeding: Feeding, doubtful: Collection[tuple[PortName, PortName]]
+) -> AlgebraicLoop:
     inside = set(cycle)
     kept = {y: [c for c in feeding[y] if c.source in inside] for y in cycle}
     connections = tuple(dict.fromkeys(c for cs in kept.values() for c in cs))
     shortest = _shortest(cycle[0], kept)
-    message = ", ".join(f"{c.source} -> {c.target}, {c.target} feeds through to {y}" for c, y in shortest)
+    message = ", ".join(
+        f"{c.source} -> {c.target}, {c.target} {'may feed' if (c.target, y) in doubtful else 'feeds'} through to {y}"
+        for c, y in shortest
+    )
     more = len(connections) - len({c for c, _ in shortest})
     if more:
         message += f" (and {more} more connection{'s' if more > 1 else ''} between these outputs and inputs)"
-    return AlgebraicLoop(tuple(cycle), connections, message)
+    is_presumed = any((c.target, y) in doubtful for y, cs in kept.items() for c in cs)
+    return AlgebraicLoop(tuple(cycle), connections, message, is_presumed)
 
 
 def _shortest(start: PortName, feeding: Mapping[PortName, Sequence[Connection]]) -> list[tuple[Connection, PortName]]:
@@ -174,28 +242,37 @@ def _silent(_item: object, _waits: object) -> None:
 
 
 _REMEDIES = (
-    "remedies: units that save their state (canGetAndSetFMUState) in their place, the algorithm jacobi, in which every "
-    "connection is delayed by a step, or a unit in the loop whose output has no direct feedthrough"
+    "remedies: units that save their state (canGetAndSetFMUState) in their place, or a unit in the loop whose output "
+    "has no direct feedthrough, which delays it by a step"
 )
 
 
-def check_loops(system: System, loops: Sequence[AlgebraicLoop], rolls_back: bool) -> None:
+def check_loops(system: System, loops: Sequence[AlgebraicLoop]) -> None:
     """Check that algebraic loops can be solved: their signals are real, and units can roll back a step.
 
     Args:
         system: one whose wiring is valid.
-        loops: its algebraic loops.
-        rolls_back: whether loops are solved at each step, and not at the start alone.
+        loops: its declared loops.
 
     Raises:
         ScheduleError: with all loops that cannot be solved, each spelled out, and the remedies.
     """
-    faults = [(loop, fault) for loop in loops if (fault := _fault(system, loop, rolls_back))]
+    faults = [(loop, fault) for loop in loops if (fault := _fault(system, loop))]
     if not faults:
         return
     lines = "".join(f"\n  - {loop.message}: {fault}" for loop, fault in faults)
     n = f"{len(faults)} algebraic loop{'s' if len(faults) > 1 else ''}"
     raise ScheduleError(f"{n} cannot be solved (outputs depend on themselves by direct feedthrough):{lines}")
+
+
+def unsolved_text(system: System, loop: AlgebraicLoop) -> str:
+    """Return what a presumed loop that cannot be solved at the steps means, for the log."""
+    stateless = _stateless(system, loop.units)
+    return (
+        "there may be an algebraic loop, as outputs without declared dependencies depend on all inputs: "
+        f"{loop.message}. It is solved at the start, but not at the steps: {_unable(stateless)}. If it is one, a unit "
+        "in it gets values of the step before: signals are late by a step, and may grow without bound where it amplifies"
+    )
 
 
 def check_cycles(system: System, groups: Sequence[Group]) -> None:
@@ -211,22 +288,28 @@ def check_cycles(system: System, groups: Sequence[Group]) -> None:
     lines = "".join(f"\n  - {', '.join(names)} (connected in a cycle: {_list(g.units)})" for g, names in faults)
     raise ScheduleError(
         "iterating rolls steps back, which needs units that save their state (canGetAndSetFMUState), but these "
-        f"do not:{lines}\n  gauss-seidel and jacobi need no rollback"
+        f"do not:{lines}\n  gauss-seidel and jacobi need no rollback, but for algebraic loops"
     )
 
 
-def _fault(system: System, loop: AlgebraicLoop, rolls_back: bool) -> str | None:
-    kinds = [(c, system.units[c.source.unit].description.outputs[c.source.port].kind) for c in loop.connections]
+def _fault(system: System, loop: AlgebraicLoop) -> str | None:
+    kinds = [(c, _kind(system, c)) for c in loop.connections]
     not_real = [f"{c.source} is {kind.value}" for c, kind in kinds if kind is not Kind.REAL]
     if not_real:
         return (
             f"only real signals can be iterated, but {', '.join(not_real)}; remedy: a unit in between that delays one"
         )
-    stateless = _stateless(system, loop.units) if rolls_back else []
-    if stateless:
-        verb = "do not save their states" if len(stateless) > 1 else "does not save its state"
-        return f"{', '.join(stateless)} {verb}, so a step cannot be rolled back; {_REMEDIES}"
-    return None
+    stateless = _stateless(system, loop.units)
+    return f"{_unable(stateless)}; {_REMEDIES}" if stateless else None
+
+
+def _kind(system: System, c: Connection) -> Kind:
+    return system.units[c.source.unit].description.outputs[c.source.port].kind
+
+
+def _unable(stateless: Sequence[str]) -> str:
+    verb = "do not save their states" if len(stateless) > 1 else "does not save its state"
+    return f"{', '.join(stateless)} {verb}, so a step cannot be rolled back"
 
 
 def _stateless(system: System, units: Sequence[str]) -> list[str]:
