@@ -271,7 +271,7 @@ def unsolved_text(system: System, loop: AlgebraicLoop) -> str:
     return (
         "there may be an algebraic loop, as outputs without declared dependencies depend on all inputs: "
         f"{loop.message}. It is solved at the start, but not at the steps: {_unable(stateless)}. If it is one, a unit "
-        "in it gets values of the step before: signals are late by a step, and may grow without bound where it amplifies"
+        "in it gets values of the step before: signals are late by a step, and may grow without bound if it amplifies"
     )
 
 

@@ -59,10 +59,10 @@ def test_a_loop_is_solved_at_the_start_and_at_the_steps(fmi: int, algorithm: Alg
 def test_a_loop_of_units_without_states_is_solved_at_the_start_and_told(
     fmi: int, algorithm: Algorithm, caplog: pytest.LogCaptureFixture
 ):
-    state = "canGetAndSetFMUstate" if fmi == 2 else "canGetAndSetFMUState"
+    stateless: dict[str, Any] = {"canGetAndSetFMUstate" if fmi == 2 else "canGetAndSetFMUState": False}
     with (
         caplog.at_level(logging.WARNING),
-        Master(cycle(fmi, **{state: False}), MasterOptions(algorithm=algorithm)) as master,
+        Master(cycle(fmi, **stateless), MasterOptions(algorithm=algorithm)) as master,
     ):
         assert values(master) == pytest.approx(solution(), rel=1e-7)
         master.run(Fraction(1))
