@@ -64,12 +64,22 @@ class Schedule:
         units = list(system.units.values())
         self.tick = _common_divisor(units)
         parts = [u for u in units if u.sampled], [u for u in units if not u.sampled]
-        self.loops: list[AlgebraicLoop] = []
-        self.declared_loops = [loop for part in parts for loop in declared_loops(system, [u.name for u in part])]
-        self.initial_passes = 1
-        self.sampled_groups, self.continuous_groups = (self._groups(system, part, initial=False) for part in parts)
-        sampled, continuous = (self._groups(system, part, initial=True) for part in parts)
-        self.initial_groups = continuous + sampled
+        steps = [_arranged(system, part, initial=False) for part in parts]
+        start = [
+            at_steps if at_steps.is_same_at_start(part) else _arranged(system, part, initial=True)
+            for part, at_steps in zip(parts, steps, strict=True)
+        ]
+        for warning in (w for arrangement in steps for w in arrangement.warnings):
+            _log.warning("%s", warning)
+        self.loops = [loop for arrangement in steps for loop in arrangement.loops]
+        self.declared_loops = [
+            loop
+            for part, at_steps in zip(parts, steps, strict=True)
+            for loop in (declared_loops(system, [u.name for u in part]) if at_steps.presumes else at_steps.loops)
+        ]
+        self.sampled_groups, self.continuous_groups = (arrangement.groups for arrangement in steps)
+        self.initial_groups = start[1].groups + start[0].groups
+        self.initial_passes = 1 + sum(arrangement.late_ports for arrangement in start)
         self.sampled = self._slots(system, self.sampled_groups)
         self.continuous = self._slots(system, self.continuous_groups)
 
@@ -91,46 +101,69 @@ class Schedule:
         """Return the number of whole ticks in a duration, rounded up."""
         return math.ceil(duration / self.tick)
 
-    def _groups(self, system: System, units: Sequence[PlacedUnit], *, initial: bool) -> tuple[Group, ...]:
-        """Return the groups of units in order, at the start or at the steps, of which is logged what it means."""
-        names = [u.name for u in units]
-        loops, unsolved = solved_loops(system, names, initial=initial)
-        sources = {n: {port: source.unit for port, source in system.sources_of(n).items()} for n in names}
-        through = {u.name: _feedthrough_of(u, initial=initial) for u in units}
-        declared = {n: _feeding_through(sources[n], through[n][0]) for n in names}
-        presumed = {n: _feeding_through(sources[n], through[n][1]) for n in names}
-        groups = groups_of_loops(names, loops)
-
-        def units_of(waits: set[int], needed: Mapping[str, set[str]], group: int) -> str:
-            needs = {n for name in groups[group].units for n in needed[name]}
-            return ", ".join(sorted(n for i in waits for n in groups[i].units if n in needs))
-
-        def log_presumed(group: int, waits: set[int]) -> None:
-            if initial:
-                return
-            names, others = ", ".join(groups[group].units), units_of(waits, presumed, group)
-            _log.warning("%s does not declare its direct feedthrough; it gets the previous values of %s", names, others)
-
-        def note_declared(group: int, waits: set[int]) -> None:
-            if initial:
-                late = {n for i in waits for n in groups[i].units}
-                ports = [(n, port) for n in groups[group].units for port in _ports(through[n][0])]
-                self.initial_passes += sum(sources[n].get(port) in late for n, port in ports)
-                return
-            names, others = ", ".join(groups[group].units), units_of(waits, declared, group)
-            _log.warning(
-                "%s steps first where units wait for each other; it gets the previous values of %s", names, others
-            )
-
-        if not initial:
-            self.loops += loops
-            for loop in unsolved:
-                _log.warning("%s", unsolved_text(system, loop))
-        return tuple(in_order(groups, declared, presumed, log_presumed, note_declared))
-
     def _slots(self, system: System, groups: Sequence[Group]) -> tuple[Slot, ...]:
         periods = {n: system.units[n].period for group in groups for n in group.units}
         return tuple(Slot(n, int(period / self.tick), float(period)) for n, period in periods.items())
+
+
+@dataclass(frozen=True)
+class _Arrangement:
+    """Units in an order, at the steps or at the start.
+
+    Attributes:
+        groups: the units in order, those of a loop that is solved together.
+        loops: the loops that are solved.
+        presumes: whether some of the loops, solved or not, are presumed.
+        is_complete: whether all loops are solved.
+        warnings: what the order means, where units get values of the step before.
+        late_ports: how many inputs with declared feedthrough get those.
+    """
+
+    groups: tuple[Group, ...]
+    loops: Sequence[AlgebraicLoop]
+    presumes: bool
+    is_complete: bool
+    warnings: Sequence[str]
+    late_ports: int
+
+    def is_same_at_start(self, units: Sequence[PlacedUnit]) -> bool:
+        """Return whether this order for the steps is also that for the start."""
+        same = (_feedthrough_of(u, initial=True) == _feedthrough_of(u, initial=False) for u in units)
+        return self.is_complete and all(same)
+
+
+def _arranged(system: System, units: Sequence[PlacedUnit], *, initial: bool) -> _Arrangement:
+    names = [u.name for u in units]
+    loops, unsolved = solved_loops(system, names, initial=initial)
+    sources = {n: {port: source.unit for port, source in system.sources_of(n).items()} for n in names}
+    through = {u.name: _feedthrough_of(u, initial=initial) for u in units}
+    declared = {n: _feeding_through(sources[n], through[n][0]) for n in names}
+    presumed = {n: _feeding_through(sources[n], through[n][1]) for n in names}
+    groups = groups_of_loops(names, loops)
+    warnings = [unsolved_text(system, loop) for loop in unsolved]
+    late_ports = 0
+
+    def names_of(group: int, waits: set[int], needed: Mapping[str, set[str]]) -> tuple[str, str]:
+        needs = {n for name in groups[group].units for n in needed[name]}
+        return ", ".join(groups[group].units), ", ".join(
+            sorted(n for i in waits for n in groups[i].units if n in needs)
+        )
+
+    def note_presumed(group: int, waits: set[int]) -> None:
+        first, others = names_of(group, waits, presumed)
+        warnings.append(f"{first} does not declare its direct feedthrough; it gets the previous values of {others}")
+
+    def note_declared(group: int, waits: set[int]) -> None:
+        nonlocal late_ports
+        late = {n for i in waits for n in groups[i].units}
+        ports = [(n, port) for n in groups[group].units for port in _ports(through[n][0])]
+        late_ports += sum(sources[n].get(port) in late for n, port in ports)
+        first, others = names_of(group, waits, declared)
+        warnings.append(f"{first} steps first where units wait for each other; it gets the previous values of {others}")
+
+    ordered = tuple(in_order(groups, declared, presumed, note_presumed, note_declared))
+    presumes = bool(unsolved) or any(loop.is_presumed for loop in loops)
+    return _Arrangement(ordered, loops, presumes, not unsolved, warnings, late_ports)
 
 
 def _common_divisor(units: Sequence[PlacedUnit]) -> Fraction:

@@ -133,3 +133,13 @@ def test_a_run_of_any_kind_ends_so(fmi: int, path: str, tmp_path: Path):
     assert record.time[-1] == ended.reached
     assert 0.25 < ended.reached <= 0.3 + 1e-12
     assert all(record.time[1:] > record.time[:-1])
+
+
+def test_a_unit_ends_the_simulation_at_an_event(tmp_path: Path):
+    s = around("ends_at_event", 3)
+    record, ended, _, _ = run(s, MasterOptions(compiled=False), tmp_path / "r.parquet")
+    assert ended is not None
+    assert (ended.call, ended.reached) == ("fmi3UpdateDiscreteStates", 0.25)
+    assert record.time.tolist() == [0.0, 0.1, 0.2, 0.25]
+    for signal in ("before.x", "bad.y", "after.x"):  # the others are brought to the event
+        assert record[signal].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.25])

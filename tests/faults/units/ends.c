@@ -24,3 +24,21 @@ static const Model ends_within_step = {
     "ends_within_step", variables, COUNT(variables), 0.1, 0, sizeof(Ending), .step = step,
 };
 UNIT(ends_within_step)
+
+/* FMI 3: an event at `at`, in which it asks for it */
+static enum status step_to_event(Unit *unit, double t, double h, StepEnd *end) {
+    SELF(Ending);
+    if (t + h > self->at * (1 + 1e-12))
+        *end = (StepEnd){.event_needed = true, .early = true, .last_time = self->at};
+    self->y += (end->last_time - t) * self->u;
+    return OK;
+}
+static void end_at_event(Unit *unit, Update *update) {
+    SELF(Ending);
+    update->terminate = unit->kept->time >= self->at;
+}
+static const Model ends_at_event = {
+    "ends_at_event", variables, COUNT(variables), 0.1, EVENTS | EARLY_RETURN, sizeof(Ending), .step = step_to_event,
+    .update = end_at_event,
+};
+UNIT(ends_at_event)

@@ -88,7 +88,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
             *(int32_t *)place(unit, &unit->model->variables[i]) = false;
     unit->kept->stale = true;
     *again = update.again;
-    *terminate = *nominals = *states = false;
+    *terminate = update.terminate;
+    *nominals = *states = false;
     *next_defined = update.next_defined;
     *next = update.next;
     return fmi3OK;

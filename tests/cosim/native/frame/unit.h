@@ -43,7 +43,7 @@ typedef struct {
 } StepEnd;
 
 typedef struct {
-    bool again, next_defined;
+    bool again, next_defined, terminate;
     double next;
 } Update;
 
