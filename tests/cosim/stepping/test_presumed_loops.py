@@ -99,7 +99,7 @@ def test_a_presumed_loop_around_a_declared_one_leaves_that_solved():
 
 
 @ALGORITHMS
-def test_a_cycle_that_is_no_loop_comes_out_as_it_would_with_what_it_depends_on(algorithm: Algorithm):
+def test_a_cycle_that_is_no_loop_starts_as_it_would_with_declared_dependencies(algorithm: Algorithm):
     found: list[list[float]] = []
     for dependencies in (True, False):
         s = System()
