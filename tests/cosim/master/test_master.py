@@ -215,14 +215,17 @@ def without_dependencies(file: Path, folder: Path, *, states: bool) -> Path:
 
 @pytest.mark.parametrize("states", [True, False])
 def test_units_that_declare_no_dependencies_run_in_a_loop(fmu: FmuOf, states: bool, tmp_path: Path):
-    s = System()
-    mass = s.add("mass", without_dependencies(fmu("Mass"), tmp_path, states=states))
-    spring = s.add("spring", without_dependencies(fmu("Spring"), tmp_path, states=states))
-    s.connect(mass.y.x, spring.u.x)
-    s.connect(spring.y.f, mass.u.f)
-    found = list(positions(s, Fraction(1)).values())
+    def system(file_of: Callable[[str], Path]) -> System:
+        s = System()
+        mass, spring = s.add("mass", file_of("Mass")), s.add("spring", file_of("Spring"))
+        s.connect(mass.y.x, spring.u.x)
+        s.connect(spring.y.f, mass.u.f)
+        return s
+
+    bare = system(lambda block: without_dependencies(fmu(block), tmp_path, states=states))
+    found = list(positions(bare, Fraction(1)).values())
     if states:  # solved as if it were an algebraic loop, which is what the iterated coupling does
-        iterated = positions(oscillator(fmu), Fraction(1), Algorithm.NEWTON)
+        iterated = positions(system(fmu), Fraction(1), Algorithm.NEWTON)
         assert found == pytest.approx(list(iterated.values()), rel=1e-6)
     else:
         assert found == held_force(10, 0.1, delay=0)
