@@ -13,7 +13,7 @@ from handover.cosim.exceptions import InitializationError, ScheduleError
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.initial_values import ChainedDerivatives
 from handover.cosim.stepping.iteration import NotConverged
-from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.loops import declared_loops
 from handover.cosim.system.schedule import Schedule
@@ -132,6 +132,24 @@ def test_a_loop_is_solved_beside_units_with_events():
         master.stepper.set_state(state)
     assert x == pytest.approx(1.0)
     assert (y, z) == pytest.approx((-1.0 / 7.0, 4.0 / 7.0), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        MasterOptions(algorithm=Algorithm.JACOBI, repeat_discarded=True),
+        MasterOptions(algorithm=Algorithm.JACOBI, adaptive=AdaptiveStep()),
+        MasterOptions(algorithm=Algorithm.JACOBI, extrapolation=Extrapolation.LINEAR),
+    ],
+    ids=["events", "adaptive", "extrapolated"],
+)
+def test_jacobi_solves_loops_however_steps_are_taken(options: MasterOptions):
+    s = driven()
+    with Master(s, options) as master:
+        master.run(Fraction(1))
+        x, y, z = (float(master.signals[name]) for name in ("ramp.x", "y.y", "z.y"))
+    assert z == pytest.approx(3.0 * y + 1.0, rel=1e-5, abs=1e-7)
+    assert y == pytest.approx((x - 2.0) / 7.0, abs=0.1 / 7.0 * 1.0001)  # late by at most a step
 
 
 def test_a_cycle_of_units_that_is_none_of_ports_is_no_loop(caplog: pytest.LogCaptureFixture):
