@@ -9,20 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats, Raster
+from handover.cosim.blocks.state import InvalidState
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.fmus.layout import Buffer, Layout, Slot, capacity
 
 ALIGNMENT = 64
 """Bytes: arrays begin at multiples of a cache line in their memory."""
-
-
-class InvalidState(ValueError):
-    """A saved state is of another unit than the one that is to restore it."""
-
-    is_refusal = True
-
-    def __init__(self) -> None:
-        super().__init__("the state was saved by another unit, or by another version of this one")
 
 
 class Buffers:

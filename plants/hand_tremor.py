@@ -1,12 +1,12 @@
 """Tremor and drift of a hand that holds something out, as random processes."""
 
 import math
-import pickle
 from typing import NamedTuple
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.state import pack_state, unpack_state
 
 
 class _Step(NamedTuple):
@@ -68,11 +68,11 @@ class HandTremor:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self._tremor, self._drift, self._rng.bit_generator.state))
+        return pack_state((self._tremor, self._drift, self._rng.bit_generator))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this process or of one with equal arguments."""
-        self._tremor, self._drift, self._rng.bit_generator.state = pickle.loads(state)
+        self._tremor, self._drift, self._rng.bit_generator.state = unpack_state(state)
 
     def _step_of(self, dt: float) -> "_Step":
         F = self._transition(dt)

@@ -1,7 +1,6 @@
 """The sequence of a free-flyer's handovers. [Fernandes2020] chapter 3, figures 3.1 to 3.3."""
 
 import enum
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -29,6 +28,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
 __all__ = [
@@ -195,11 +195,11 @@ class HandoverStateMachine:
         """Return phase, goal, counters and the monitor's filter."""
         counters = (self._failed, self._steps, self._settled)
         switches = (self._impedance, self._closure, self._receiving)
-        return pickle.dumps((int(self._phase), self._goal, counters, switches, self._monitor.get_state()))
+        return pack_state((int(self._phase), self._goal, counters, switches, self._monitor.get_state()))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this machine or of one with equal parameters."""
-        phase, self._goal, counters, switches, monitor = pickle.loads(state)
+        phase, self._goal, counters, switches, monitor = unpack_state(state)
         self._phase = HandoverPhase(phase)
         self._failed, self._steps, self._settled = counters
         self._impedance, self._closure, self._receiving = switches

@@ -1,6 +1,5 @@
 """Pose control of a free-flyer's gripper, by a PID along a trajectory. [Fernandes2020] sec. 3.1.1 and 4.1.2."""
 
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -36,6 +35,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
@@ -212,11 +212,11 @@ class PoseController:
     def get_state(self) -> bytes:
         """Return the trajectory, the samples since its start, its goal and the sums."""
         profile = None if self._profile is None else vars(self._profile)
-        return pickle.dumps((profile, self._elapsed, self._goal, self._sum_e, self._sum_phi))
+        return pack_state((profile, self._elapsed, self._goal, self._sum_e, self._sum_phi))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this controller or of one with equal parameters."""
-        profile, self._elapsed, self._goal, self._sum_e, self._sum_phi = pickle.loads(state)
+        profile, self._elapsed, self._goal, self._sum_e, self._sum_phi = unpack_state(state)
         self._profile = None if profile is None else Profile(**profile)
 
     def _reset(self) -> None:

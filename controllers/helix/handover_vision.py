@@ -1,6 +1,5 @@
 """Finds ball, wrist and gripper in a pair of pictures, after [Vervloet2025] sec. 3.2."""
 
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -25,6 +24,7 @@ from handover.cosim.blocks.ports import (
     parameter,
     port,
 )
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Number, Pixel, SquareMetre
 
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
@@ -164,11 +164,11 @@ class HandoverVision:
 
     def get_state(self) -> bytes:
         """Return the last measurement and whether it is fresh."""
-        return pickle.dumps((self._p_WO, self._wrist, self._p_WG, self._fresh_O, self._fresh_R))
+        return pack_state((self._p_WO, self._wrist, self._p_WG, self._fresh_O, self._fresh_R))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        self._p_WO, self._wrist, self._p_WG, self._fresh_O, self._fresh_R = pickle.loads(state)
+        self._p_WO, self._wrist, self._p_WG, self._fresh_O, self._fresh_R = unpack_state(state)
 
     def _find_ball(self, pictures: tuple[Pixels, Pixels]) -> BallPosition | None:
         if self._fresh_O:

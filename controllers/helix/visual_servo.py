@@ -2,7 +2,6 @@
 
 import enum
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,6 +14,7 @@ from handover.controllers.helix.estimation import PositionFilter, optimise_state
 from handover.controllers.helix.jacobian_control import Limits, blend, control_step
 from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Number, SquareMetre
 
 __all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "VisualServo"]
@@ -140,11 +140,11 @@ class VisualServo:
         """Return filters, states, phase and counters."""
         filters = [f.get_state() for f in (self._ball, self._wrist, self._direction)]
         counters = (self._t_next, self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best)
-        return pickle.dumps((filters, self._q_sys, self._q_est, int(self._phase), counters))
+        return pack_state((filters, self._q_sys, self._q_est, int(self._phase), counters))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        saved: Any = pickle.loads(state)
+        saved: Any = unpack_state(state)
         filters, self._q_sys, self._q_est, phase, counters = saved
         for f, s in zip((self._ball, self._wrist, self._direction), filters, strict=True):
             f.set_state(s)

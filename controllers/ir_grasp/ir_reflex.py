@@ -2,7 +2,6 @@
 
 import enum
 import math
-import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,6 +15,7 @@ from handover.controllers.ir_grasp.parameters import InvalidReflexParameters, Pa
 from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre, Tick
 
 __all__ = [
@@ -178,11 +178,11 @@ class IrReflex:
         """Return phase, move, recovery, probing, descent and counters."""
         parts = [part.get_state() for part in (self._move, self._recovery, self._probing, self._descent)]
         counters = (self._recoveries, self._closings, self._shaken)
-        return pickle.dumps((int(self._phase), int(self._stop), parts, counters))
+        return pack_state((int(self._phase), int(self._stop), parts, counters))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        phase, stop, parts, (self._recoveries, self._closings, self._shaken) = pickle.loads(state)
+        phase, stop, parts, (self._recoveries, self._closings, self._shaken) = unpack_state(state)
         self._phase, self._stop = Phase(phase), Stop(stop)
         for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
             part.set_state(saved)

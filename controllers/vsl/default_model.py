@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "e268a9fde08f5dfa44154470169cd9c20ae11fd50d99421c1bdba81637ee1ab2",
+   "key": "72608b037e7947012f2ff8008add582b4b8400eb842de6e6dc37002f202beb18",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

@@ -2,7 +2,6 @@
 
 import enum
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,6 +15,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Method", "Outputs", "Params"]
@@ -116,11 +116,11 @@ class HybridKinematics:
 
     def get_state(self) -> bytes:
         """Return the smoothed currents."""
-        return pickle.dumps(self._i)
+        return pack_state(self._i)
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
-        self._i = pickle.loads(state)
+        self._i = unpack_state(state)
 
     def _smoothed(self, i_meas: Floats, dt: float) -> tuple[Floats, Floats]:
         if self._i is None or self._params.i_lag == 0.0:

@@ -2,7 +2,6 @@
 
 import bisect
 import math
-import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,6 +14,7 @@ from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "Inputs", "InvalidPath", "Outputs", "Params", "Path", "TrajectoryPlanner"]
@@ -131,11 +131,11 @@ class TrajectoryPlanner:
 
     def get_state(self) -> bytes:
         """Return the periods waited, and those since the path began."""
-        return pickle.dumps((self._waited, self._periods))
+        return pack_state((self._waited, self._periods))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this planner or of one with equal parameters."""
-        self._waited, self._periods = pickle.loads(state)
+        self._waited, self._periods = unpack_state(state)
 
     def _periods_on_path(self, u: Inputs) -> int | None:
         """Return the periods since the path began, 0 if it begins here, None if it does not yet."""

@@ -1,7 +1,6 @@
 """A free-flying robot in microgravity whose arm is fixed: one rigid body, after [Fernandes2020] sec. 4.1."""
 
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,6 +19,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.ports import Matrix3, Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
@@ -158,12 +158,12 @@ class FreeFlyer:
     def get_state(self) -> bytes:
         """Return the complete state."""
         b = self._body
-        return pickle.dumps((b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state))
+        return pack_state((b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this robot or of one with equal parameters."""
         b = self._body
-        b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state = pickle.loads(state)
+        b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state = unpack_state(state)
 
     def _substeps(self, dt: float) -> int:
         rate = math.hypot(*self._body.w)

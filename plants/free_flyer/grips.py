@@ -4,8 +4,6 @@ The hand follows its course, the object that it holds, or keeps off a palm that 
 that close along z of G around an object, and a palm behind them.
 """
 
-import pickle
-
 from handover.cosim.blocks.plain_rotation import (
     IDENTITY,
     ZERO,
@@ -30,6 +28,7 @@ from handover.cosim.blocks.plain_rotation import (
     subtract,
     vector,
 )
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.free_flyer.attachment import Attachment, Frame, Palm, Stiffness
 from handover.plants.free_flyer.parameters import Params
 from handover.plants.free_flyer.rigid_body import RigidBody
@@ -133,11 +132,11 @@ class FlyerHand:
         h, c = self.hold, self.course
         hold = None if h is None else (h.r, h.place, h.turn)
         places = (self._shake, self._target, self.p, self.q, self.p_OH, self.q_OH)
-        return pickle.dumps((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places))
+        return pack_state((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this hand or of one with equal parameters."""
-        tremor, hold, course, places = pickle.loads(state)
+        tremor, hold, course, places = unpack_state(state)
         self._tremor.set_state(tremor)
         self.hold = None if hold is None else Attachment(self._arm, *hold)
         self.course = Frame(*course)

@@ -2,7 +2,6 @@
 
 import enum
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -27,6 +26,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector14, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import (
     Metre,
     MetrePerSecond,
@@ -178,12 +178,12 @@ class HandAndObject:
         parts = (self._person.get_state(), self._hand.get_state(), self._gripper.angle)
         held = None if grip is None else (grip.r, grip.place, grip.turn)
         robot = None if G is None else (G.p, G.q, G.v, G.w)
-        return pickle.dumps(((b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H)))
+        return pack_state(((b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H)))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
         b = self._object.body
-        (b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H) = pickle.loads(state)
+        (b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H) = unpack_state(state)
         person, hand, self._gripper.angle = parts
         self._person.set_state(person)
         self._hand.set_state(hand)

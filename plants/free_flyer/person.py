@@ -1,7 +1,6 @@
 """A person who takes an object from a free-flying robot, gives it one, or only pushes it."""
 
 import enum
-import pickle
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +20,7 @@ from handover.cosim.blocks.plain_rotation import (
     subtract,
     vector,
 )
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.free_flyer.attachment import Frame
 from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
 
@@ -133,15 +133,16 @@ class FlyerPerson:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        where = (self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis)
+        where = (int(self.activity), int(self._motion), self.p, self.q, self._from, self._from_q, self._axis)
         signal = (self._saw_light, self._called, self._answered, self._reaction)
         course = (self.holding, self.fingers, self._duration, self._clock, self._since, self._travelled, self._speed)
-        return pickle.dumps((where, signal, course, self._rng.bit_generator.state))
+        return pack_state((where, signal, course, self._rng.bit_generator))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this person or of one with equal parameters."""
-        where, signal, course, self._rng.bit_generator.state = pickle.loads(state)
-        self.activity, self._motion, self.p, self.q, self._from, self._from_q, self._axis = where
+        where, signal, course, self._rng.bit_generator.state = unpack_state(state)
+        activity, motion, self.p, self.q, self._from, self._from_q, self._axis = where
+        self.activity, self._motion = Activity(activity), Motion(motion)
         self._saw_light, self._called, self._answered, self._reaction = signal
         self.holding, self.fingers, self._duration, self._clock, self._since, self._travelled, self._speed = course
 

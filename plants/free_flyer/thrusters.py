@@ -1,7 +1,6 @@
 """Propulsion of a free-flyer: limits, delay and lag of commanded wrenches, after [Fernandes2020] sec. 4.1.1."""
 
 import math
-import pickle
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Vector3, output, parameter, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Newton, NewtonMetre, Second
 
 _Command = list[float]
@@ -95,11 +95,11 @@ class Thrusters:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self._thrust, list(self._delay_line)))
+        return pack_state((self._thrust, list(self._delay_line)))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of these thrusters or of ones with equal parameters."""
-        self._thrust, delay_line = pickle.loads(state)
+        self._thrust, delay_line = unpack_state(state)
         self._delay_line = deque(delay_line)
 
     def _clip(self, command: _Command) -> _Command:

@@ -1,7 +1,6 @@
 """A person's hand that offers a ball, guides the arm if asked to, and lets go, after [Vervloet2025] sec. 3.5."""
 
 import enum
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -12,6 +11,7 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import (
     Hertz,
     Kilogram,
@@ -175,11 +175,11 @@ class HandoverPartner:
         """Return the complete state."""
         arrays = (self._p_WO, self._v_WO, self._p_GO, self._f_G, self._p_WG)
         times = (self._withdrawing, self._elapsed)
-        return pickle.dumps((self._tremor.get_state(), int(self._holder), arrays, times))
+        return pack_state((self._tremor.get_state(), int(self._holder), arrays, times))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this partner or of one with equal parameters."""
-        tremor, holder, arrays, (self._withdrawing, self._elapsed) = pickle.loads(state)
+        tremor, holder, arrays, (self._withdrawing, self._elapsed) = unpack_state(state)
         self._tremor.set_state(tremor)
         self._holder = Holder(holder)
         self._p_WO, self._v_WO, self._p_GO, self._f_G, self._p_WG = arrays

@@ -1,6 +1,5 @@
 """Two cameras behind the arm and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14."""
 
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,6 +20,7 @@ from handover.cosim.blocks.ports import (
     parameter,
     port,
 )
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Levels, Metre, Number, Pixel, Second
 from handover.plants.helix.painting import Backdrop, Canvas
 from handover.plants.helix.scene import HandoverScene, MarkerCollar
@@ -191,11 +191,11 @@ class StereoCamera:
 
     def get_state(self) -> bytes:
         """Return the noise generator's state and the offsets of the last pair's noise."""
-        return pickle.dumps((self._rng.bit_generator.state, self._offsets))
+        return pack_state((self._rng.bit_generator, self._offsets))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        self._rng.bit_generator.state, self._offsets = pickle.loads(state)
+        self._rng.bit_generator.state, self._offsets = unpack_state(state)
 
     def _covers(self) -> list[tuple[str, float, float]]:
         p = self.params

@@ -1,6 +1,5 @@
 """Soft arm of three tendon-driven segments with a gripper, after [Vervloet2025] sec. 3.1."""
 
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Newton, Number
 from handover.plants.helix.tendon_parameters import Params
 
@@ -123,11 +123,11 @@ class TendonArm:
 
     def get_state(self) -> bytes:
         """Return coordinates and rates of discs and motors, and the grip."""
-        return pickle.dumps((self._chain.edge.get_state(), self._grip))
+        return pack_state((self._chain.edge.get_state(), self._grip))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this arm or of one with equal parameters."""
-        system, self._grip = pickle.loads(state)
+        system, self._grip = unpack_state(state)
         self._chain.edge.set_state(system)
 
 

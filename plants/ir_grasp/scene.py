@@ -1,7 +1,6 @@
 """A soft hand with infrared sensors on its fingertips and an object on a table, seen from above, after [Luberto]."""
 
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,6 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.ir_grasp.hand import FINGERS
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, InvalidSceneParameters, Params
@@ -148,12 +148,12 @@ class GraspScene:
 
     def get_state(self) -> bytes:
         """Return the last checkpoint, the commands since, and the sensors."""
-        sensors = (self._clock, self._ticks, self._rng.bit_generator.state)
-        return pickle.dumps((self._checkpoint, self._since, sensors))
+        sensors = (self._clock, self._ticks, self._rng.bit_generator)
+        return pack_state((self._checkpoint, self._since, sensors))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this scene or of one with equal parameters."""
-        self._checkpoint, since, (self._clock, self._ticks, self._rng.bit_generator.state) = pickle.loads(state)
+        self._checkpoint, since, (self._clock, self._ticks, self._rng.bit_generator.state) = unpack_state(state)
         self._world, self._since, self._replayed = GraspWorld(self._params, self._checkpoint), [], 0
         for steps, command in since:
             self._advance(steps, command)

@@ -1,7 +1,8 @@
 """Actuators of the VSL arm: a link's pressure regulator with its valve, and a joint's geared servo with its current."""
 
 import math
-import pickle
+
+from handover.cosim.blocks.state import pack_state, unpack_state
 
 
 class PressureLine:
@@ -39,11 +40,11 @@ class PressureLine:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self.p, self.open))
+        return pack_state((self.p, self.open))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this line or of one with equal arguments."""
-        self.p, self.open = pickle.loads(state)
+        self.p, self.open = unpack_state(state)
 
     def _regulate(self, dt: float, p_cmd: float) -> float:
         """Regulate until the tolerance is reached, at most for dt; return what is left of dt."""
@@ -115,8 +116,8 @@ class VslServo:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self.angle, self._friction, self._shown))
+        return pack_state((self.angle, self._friction, self._shown))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this servo or of one with equal arguments."""
-        self.angle, self._friction, self._shown = pickle.loads(state)
+        self.angle, self._friction, self._shown = unpack_state(state)

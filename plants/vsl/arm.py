@@ -1,7 +1,6 @@
 """Arm of three joints with two links of variable stiffness, its motors, air and sensors, after [Gandarias2020]."""
 
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,6 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
@@ -144,12 +144,12 @@ class VslArm:
     def get_state(self) -> bytes:
         """Return the complete state, random generator included."""
         parts = [part.get_state() for part in (self._mechanics, *self._servos, *self._lines)]
-        random = (self._rng.bit_generator.state, self._noise)
-        return pickle.dumps((parts, random, self._spin, self._q, self._i, self._started))
+        random = (self._rng.bit_generator, self._noise)
+        return pack_state((parts, random, self._spin, self._q, self._i, self._started))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this arm or of one with equal parameters."""
-        parts, random, self._spin, self._q, self._i, self._started = pickle.loads(state)
+        parts, random, self._spin, self._q, self._i, self._started = unpack_state(state)
         for part, own in zip((self._mechanics, *self._servos, *self._lines), parts, strict=True):
             part.set_state(own)
         self._rng.bit_generator.state, self._noise = random

@@ -1,12 +1,12 @@
 """Dynamics of the VSL arm's chain: how it swings, integrated by generalized-alpha."""
 
 import math
-import pickle
 from typing import NamedTuple
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.vsl.chain import Complexes, Pose, VslChain
 from handover.plants.vsl.parameters import Params
 from handover.plants.vsl.statics import VslStatics
@@ -121,11 +121,12 @@ class VslDynamics:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self._y, self._v, self._a, self._a_mean, self._offset, self.pose))
+        return pack_state((self._y, self._v, self._a, self._a_mean, self._offset, tuple(self.pose)))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._y, self._v, self._a, self._a_mean, self._offset, self.pose = pickle.loads(state)
+        self._y, self._v, self._a, self._a_mean, self._offset, pose = unpack_state(state)
+        self.pose = Pose(*pose)
 
     def _held(self, p: tuple[float, float], load: float, spin: float) -> _Held:
         hinge, shear = self._chain.springs(p)

@@ -1,11 +1,11 @@
 """Statics of the VSL arm's chain: where it rests under its weight, against bending, shear and joints."""
 
 import math
-import pickle
 from typing import NamedTuple
 
 import numpy as np
 
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.vsl.chain import Pose, VslChain
 
 _TOLERANCE = 1e-12
@@ -96,11 +96,12 @@ class VslStatics:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pickle.dumps((self._tip, self.pose))
+        return pack_state((self._tip, tuple(self.pose)))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._tip, self.pose = pickle.loads(state)
+        self._tip, pose = unpack_state(state)
+        self.pose = Pose(*pose)
 
     def _bodies(self, theta: tuple[float, float], p: tuple[float, float], load: float, share: float) -> list[_Body]:
         """Return all bodies from the tip inwards, at a share of gravity."""
