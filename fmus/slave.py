@@ -125,7 +125,7 @@ class Slave:
         """Restore what `get_state` returned, here or in another instance.
 
         Raises:
-            InvalidState: it is a state of another unit; nothing is changed.
+            InvalidState: it is a state of another unit, or damaged; nothing is changed.
             ParameterOutOfRange, UnknownItem: a parameter in it is invalid; nothing is changed.
         """
         parts = split(state)
@@ -143,7 +143,11 @@ class Slave:
                 self._buffers.from_bytes(before)
                 raise
         self._before_tick = None
-        self._block.set_state(parts[1])
+        try:
+            self._block.set_state(parts[1])
+        except BaseException:
+            self._buffers.from_bytes(before)
+            raise
 
     def get_string(self, index: int) -> bytes:
         """Return a string variable as UTF-8; the bytes live until the variable changes."""

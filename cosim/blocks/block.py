@@ -43,11 +43,18 @@ class Block(Protocol):
         ...
 
     def get_state(self) -> bytes:
-        """Return the complete state: after `set_state` with it, the block continues in the same way, bit for bit."""
+        """Return the complete state: after `set_state` with it, the block continues in the same way, bit for bit.
+
+        It is data: `handover.cosim.blocks.state.pack_state` makes bytes of numbers, texts, arrays and the like.
+        """
         ...
 
     def set_state(self, state: bytes) -> None:
-        """Restore a state that `get_state` returned."""
+        """Restore a state that `get_state` returned.
+
+        Raises:
+            InvalidState: it is not such a state (`handover.cosim.blocks.state.unpack_state` raises it).
+        """
         ...
 
 

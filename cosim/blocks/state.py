@@ -73,18 +73,20 @@ def pack_state(state: object, records: Sequence[type[Any]] = ()) -> bytes:
     return cast(bytes, msgpack.packb(state, default=default, strict_types=True, buf_size=_BUFFER))
 
 
-def unpack_state(packed: bytes, records: Sequence[type[Any]] = ()) -> Any:
+def unpack_state(packed: Any, records: Sequence[type[Any]] = ()) -> Any:
     """Return the plain data from which `pack_state` made these bytes.
 
     Only as much memory is taken as the bytes can fill, whatever lengths they claim.
 
     Args:
-        packed: the bytes.
+        packed: the bytes; anything else is refused.
         records: the types besides plain data that are made of them, by their names; none by default.
 
     Raises:
         InvalidState: the bytes are damaged, hold another type, or were not made by `pack_state`.
     """
+    if not isinstance(packed, bytes | bytearray):  # what was read out of another state may be anything
+        raise InvalidState(f"a {type(packed).__name__} where the bytes of a state are expected")
     of_extension, of_list = (_extension, _list) if not records else _unpackers_of(tuple(records))
     try:
         state = _unpackb(packed, ext_hook=of_extension, list_hook=of_list, strict_map_key=False)

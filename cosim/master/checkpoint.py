@@ -1,7 +1,8 @@
 """Checkpoints, from which a run resumes in another process: the states of its units and of its master, in one file.
 
-A `Checkpointer` writes them during a run. The file is a zip archive: `checkpoint.json`, for each unit its state, the
-contents of its buffers and its CPU times, and `kept`, bytes of whoever runs the master.
+A `Checkpointer` writes them during a run. The file is a zip archive, not compressed: `checkpoint.json`, for each unit
+its state, the contents of its buffers and its CPU times, and `kept`, bytes of whoever runs the master. All of it is
+plain data; what a unit makes of its state is the unit's.
 """
 
 import array
@@ -9,7 +10,6 @@ import json
 import logging
 import math
 import os
-import pickle
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.exceptions import CosimError, one_line
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
@@ -25,7 +26,7 @@ from handover.cosim.system.system import System
 
 _log = logging.getLogger(__name__)
 
-_FORMAT = 1
+_FORMAT = 2
 
 
 class InvalidCheckpoint(CosimError):
@@ -90,16 +91,20 @@ class Checkpoint:
         """Restore this run in a master that has been entered.
 
         Raises:
-            UnitFailure: a unit does not accept its state. CosimError: the master has other units.
+            UnitFailure: a unit does not accept its state. CosimError: the master has other units, or the checkpoint's
+                parts do not fit them.
         """
         if set(self.units) != set(master.system.units):
             raise CosimError(f"a checkpoint of the units {', '.join(self.units)}, not of these")
-        for name, instance in master.ensemble.instances.items():
-            instance.time = self.time
-            instance.deserialise_state(self.units[name])
-            instance.refill(self.contents[name])
-            master.cpu[name][:] = array.array("d", self.cpu[name])
-        master.stepper.set_state(self.stepper)
+        try:
+            for name, instance in master.ensemble.instances.items():
+                instance.time = self.time
+                instance.deserialise_state(self.units[name])
+                instance.refill(self.contents[name])
+                master.cpu[name][:] = array.array("d", self.cpu[name])
+            master.stepper.set_state(self.stepper)
+        except (LookupError, TypeError, ValueError, AttributeError) as e:
+            raise CosimError(f"the checkpoint does not fit its run ({type(e).__name__}: {one_line(e)})") from e
 
 
 def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
@@ -140,7 +145,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
                 archive.writestr("checkpoint.json", json.dumps(header))
                 for i, name in enumerate(checkpoint.units):
                     archive.writestr(f"{i}.state", checkpoint.units[name])
-                    archive.writestr(f"{i}.contents", pickle.dumps(checkpoint.contents[name]))
+                    archive.writestr(f"{i}.contents", pack_state(checkpoint.contents[name]))
                     archive.writestr(f"{i}.cpu", checkpoint.cpu[name])
                 archive.writestr("kept", checkpoint.kept)
             file.flush()
@@ -158,13 +163,15 @@ def remove_checkpoint(path: Path) -> None:
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Read a checkpoint. Python objects in it are unpickled, so it must be from a trusted source.
+    """Read a checkpoint. It takes no more memory than the file is long.
 
     Raises:
         InvalidCheckpoint: there is none, or it is damaged or of another version.
     """
     try:
         with zipfile.ZipFile(path) as archive:
+            if compressed := [e.filename for e in archive.infolist() if e.compress_type != zipfile.ZIP_STORED]:
+                raise InvalidCheckpoint(path, f"{compressed[0]} in it is compressed; checkpoints are written without")
             header = json.loads(archive.read("checkpoint.json"))
             if header["format"] != _FORMAT:
                 raise InvalidCheckpoint(
@@ -176,7 +183,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 rows=header["rows"],
                 stepper=header["stepper"],
                 units={name: archive.read(f"{i}.state") for i, name in enumerate(names)},
-                contents={name: pickle.loads(archive.read(f"{i}.contents")) for i, name in enumerate(names)},
+                contents={name: unpack_state(archive.read(f"{i}.contents")) for i, name in enumerate(names)},
                 cpu={name: archive.read(f"{i}.cpu") for i, name in enumerate(names)},
                 kept=archive.read("kept"),
             )
@@ -184,7 +191,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e
     except InvalidCheckpoint:
         raise
-    except Exception as e:  # the readers of zip, JSON and pickle raise various exceptions on damaged bytes
+    except Exception as e:  # the readers of zip, JSON and states raise various exceptions on damaged bytes
         raise InvalidCheckpoint(path, f"the checkpoint is damaged: {one_line(e)}") from e
 
 

@@ -177,6 +177,10 @@ class MasterOptions:
         return 2 if self.extrapolation is Extrapolation.LINEAR else 1
 
 
+OPTION_RECORDS = (MasterOptions, AdaptiveStep, Algorithm, Extrapolation)
+"""Types of which options are made, for `pack_state` and `unpack_state`."""
+
+
 def _names(kind: type[enum.Enum]) -> str:
     return ", ".join(f"{kind.__name__}.{item.name}" for item in kind)
 

@@ -1,8 +1,8 @@
 """A process that runs one job after the other, each in a forked child: `python -m` this module.
 
 It has loaded what runs need, so that a run costs a fork and not the start of an interpreter. It reads jobs from
-standard input and writes results to standard output, all pickled: a job is a `RunJob` and the folder for its files
-while it runs; the result is a `JobResult`. It ends when its input is closed, and a run under way with it.
+standard input and writes results to standard output, as messages of plain data: a job is a `RunJob` and the folder for
+its files while it runs; the result is a `JobResult`. It ends when its input is closed, and a run under way with it.
 
 Where processes cannot be forked (Windows) it runs jobs itself, and a unit that crashes crashes the server.
 """
@@ -11,7 +11,6 @@ import contextlib
 import gc
 import importlib
 import os
-import pickle
 import select
 import shutil
 import sys
@@ -31,7 +30,7 @@ from handover.scenarios.campaign.run_job import (
     record_failed_job,
     run_job,
 )
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
@@ -56,15 +55,18 @@ class RunServer:
         self._forks = supervisor.can_supervise()
 
     def serve(self) -> None:
-        """Run jobs until there are no more."""
+        """Run jobs until there are no more.
+
+        Raises:
+            InvalidState: what came is no job.
+        """
         while self._job_comes():
             try:
-                job, folder = pickle.load(self._jobs)
-            except (EOFError, pickle.UnpicklingError):  # the worker has ended, maybe while it wrote a job
+                job, folder = read_message(self._jobs)
+            except EOFError:  # the worker has ended, maybe while it wrote a job
                 return
             self._load(job.scenario)
-            pickle.dump(self._run_job(job, folder), self._results)
-            self._results.flush()
+            write_message(self._results, self._run_job(job, Path(folder)))
 
     def _job_comes(self) -> bool:
         """Wait for a job, or the end of the stream; return False if none came in time."""

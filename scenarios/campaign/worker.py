@@ -7,7 +7,6 @@ after the other. All jobs of one worker pool have the same `batch`, by which the
 import contextlib
 import functools
 import os
-import pickle
 import queue
 import shutil
 import subprocess
@@ -21,7 +20,8 @@ from typing import Any, BinaryIO, cast
 
 from distributed import get_worker
 
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.cosim.blocks.state import InvalidState
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
 from handover.scenarios.results.run_folder import version_differences, versions
 
 _POLL_INTERVAL = 0.5
@@ -82,8 +82,7 @@ class ServerProcess:
         folder = Path(job.runs, f".{job.name}.{uuid.uuid4().hex[:12]}")
         try:
             try:
-                pickle.dump((job, folder), self._jobs)
-                self._jobs.flush()
+                write_message(self._jobs, (job, str(folder)))
             except (OSError, ValueError) as e:
                 raise ServerLost(self._how_it_ended()) from e
             while True:
@@ -124,9 +123,9 @@ class ServerProcess:
     def _listen(self) -> None:
         """Take results until both the server and its run have ended."""
         results = cast(BinaryIO, self._process.stdout)
-        with contextlib.suppress(EOFError, OSError, pickle.UnpicklingError):  # it ended, maybe amid a result
+        with contextlib.suppress(EOFError, OSError, InvalidState):  # it ended, maybe amid a result
             while True:
-                self._results.put(pickle.load(results))
+                self._results.put(read_message(results))
         self._results.put(None)
         results.close()
 

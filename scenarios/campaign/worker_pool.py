@@ -1,4 +1,4 @@
-"""The worker pool that runs a campaign, as a protocol; its jobs, their results, and counts of runs.
+"""The worker pool that runs a campaign, as a protocol; its jobs, their results, how they pass a pipe, counts of runs.
 
 `handover.scenarios.campaign.cluster` implements it by Dask.
 """
@@ -7,14 +7,15 @@ import os
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, BinaryIO, Protocol
 
-from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.blocks.state import InvalidState, pack_state, unpack_state
+from handover.cosim.stepping.options import OPTION_RECORDS, MasterOptions
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunJob:
-    """What a worker needs for a run. It can be pickled; paths are absolute and the same for all workers.
+    """What a worker needs for a run, as plain data; paths are absolute and the same for all workers.
 
     Attributes:
         name: of the run's folder in `runs`. While it runs, its files are in a folder of another name beside it, which
@@ -47,6 +48,38 @@ class JobResult:
     name: str
     lost: str = ""
     no_room: str = ""
+
+
+_RECORDS = (RunJob, JobResult, *OPTION_RECORDS)
+_LONGEST = 2**26
+"""Bytes of a message at most: jobs and results have some hundreds, and a table of FMUs some thousands."""
+
+
+def write_message(pipe: BinaryIO, message: Any) -> None:
+    """Write a job or a result to a pipe: the length of its bytes (8, big endian), then what `pack_state` makes of it.
+
+    Raises:
+        OSError, ValueError: the pipe is closed.
+    """
+    packed = pack_state(message, _RECORDS)
+    pipe.write(len(packed).to_bytes(8, "big") + packed)
+    pipe.flush()
+
+
+def read_message(pipe: BinaryIO) -> Any:
+    """Read what `write_message` wrote. Nothing in it is executed.
+
+    Raises:
+        EOFError: the pipe has ended, perhaps amid a message. InvalidState: it is not such a message.
+    """
+    head = pipe.read(8)
+    size = int.from_bytes(head, "big")
+    if len(head) == 8 and size > _LONGEST:
+        raise InvalidState(f"what came through the pipe is no message: it begins with {head!r}")
+    packed = pipe.read(size)
+    if len(head) < 8 or len(packed) < size:
+        raise EOFError
+    return unpack_state(packed, _RECORDS)
 
 
 class WorkerPool(Protocol):

@@ -23,8 +23,8 @@ signals; only the times that it took differ. Units and versions must be those th
 not kept with the run: give them again where they are wanted. Where the run cannot be resumed, its record is completed
 all the same.
 
-A checkpoint holds Python objects, which can run any code when they are read: resume only runs from people whom you
-trust.
+A checkpoint is data, but a unit is a program: the run's run.json names the FMUs that are loaded. Where the folder is
+somebody else's, see that they are yours.
 """
 
 

@@ -13,7 +13,7 @@ from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution.fmu_run import reopened
-from handover.scenarios.execution.resumption import Resumption, unpack
+from handover.scenarios.execution.resumption import Resumption
 from handover.scenarios.execution.ssp_run import open_experiment
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import (
@@ -63,7 +63,7 @@ class InterruptedRun:
             raise InvalidRunFolder(folder.path, "the run is complete; there is nothing to resume")
         rows = complete_signals(folder)
         self._check_versions(self._object("versions"))
-        self.resumption: Resumption = unpack(folder.checkpoint)
+        self.resumption = Resumption(folder.checkpoint)
         if rows < self.resumption.checkpoint.rows:
             counted = self.resumption.checkpoint.rows
             raise InvalidCheckpoint(folder.checkpoint, f"it counts {counted} rows, the record beside it has {rows}")
@@ -81,7 +81,7 @@ class InterruptedRun:
             every = description["checkpoint"]
             task = Task(
                 experiment=experiment,
-                parameters=self.resumption.parameters,
+                parameters=self.resumption.parameters(type(experiment)),
                 seed=int(description["seed"] or 0),
                 fmus=fmus,
                 folder=self.folder,

@@ -1,42 +1,104 @@
-"""What a run keeps in its checkpoints besides the units' states, so that another process can resume it."""
+"""What a run keeps in its checkpoints besides the units' states, so that another process can resume it: plain data."""
 
-import pickle
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.blocks.state import InvalidState, pack_state, unpack_state
 from handover.cosim.exceptions import one_line
 from handover.cosim.master.checkpoint import Checkpoint, InvalidCheckpoint, read_checkpoint
-from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.experiment.experiment import Evaluator
+from handover.cosim.stepping.options import OPTION_RECORDS, MasterOptions
+from handover.scenarios.experiment.experiment import Evaluator, Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.summary import ElapsedTime
 
 
 @dataclass(frozen=True, kw_only=True)
-class Resumption:
-    """What a run is resumed from: its checkpoint, and what `pack` put into it."""
+class _Kept:
+    """What the checkpoint holds of the run.
 
-    checkpoint: Checkpoint
-    evaluator: Evaluator
-    parameters: Any
+    Attributes:
+        evaluator: the evaluator's state.
+        parameters: the text of each of the scenario's parameters.
+        options: of the master.
+        spent: seconds so far.
+    """
+
+    evaluator: bytes
+    parameters: Mapping[str, str]
     options: MasterOptions
     spent: ElapsedTime
 
+    def __post_init__(self) -> None:
+        parts = zip((self.parameters, self.options, self.spent), (dict, MasterOptions, ElapsedTime), strict=True)
+        if not all(isinstance(part, kind) for part, kind in parts):
+            raise TypeError("parameters, options or times are missing")
 
-def pack(evaluator: Evaluator, parameters: Any, options: MasterOptions, spent: ElapsedTime) -> bytes:
-    """Return what a checkpoint keeps besides the units' states."""
-    return pickle.dumps((evaluator, parameters, options, spent))
+
+RECORDS = (_Kept, ElapsedTime, *OPTION_RECORDS)
+"""Types of which `pack` makes what it keeps."""
 
 
-def unpack(path: Path) -> Resumption:
-    """Read a run's checkpoint. Python objects are unpickled: it must be from someone whom one trusts.
+class Resumption:
+    """What a run is resumed from: its checkpoint, and what `pack` put into it.
+
+    Attributes:
+        checkpoint: the states of the units and of the master.
+        options: of the master.
+        spent: seconds that the run has taken so far.
 
     Raises:
         InvalidCheckpoint: there is none, or it cannot be used.
     """
-    checkpoint = read_checkpoint(path)
-    try:
-        evaluator, parameters, options, spent = pickle.loads(checkpoint.kept)
-    except Exception as e:  # unpickling raises what it likes
-        raise InvalidCheckpoint(path, f"what it keeps of the scenario cannot be read: {one_line(e)}") from e
-    return Resumption(checkpoint=checkpoint, evaluator=evaluator, parameters=parameters, options=options, spent=spent)
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.checkpoint: Checkpoint = read_checkpoint(path)
+        try:
+            kept = unpack_state(self.checkpoint.kept, RECORDS)
+        except InvalidState as e:
+            raise self._unusable(e) from e
+        if not isinstance(kept, _Kept):
+            raise self._unusable(InvalidState())
+        self._kept = kept
+        self.options, self.spent = kept.options, kept.spent
+
+    def parameters(self, experiment: type[Experiment[Any]]) -> Any:
+        """Return the parameters of the run's scenario.
+
+        Raises:
+            InvalidCheckpoint: they are not those of the scenario.
+        """
+        texts = self._kept.parameters
+        try:
+            if {v.name for v in experiment.parameters()} != set(texts):
+                raise InvalidParameter([f"the parameters of {experiment.name} are others than {', '.join(texts)}"])
+            return parse_parameters(experiment, [f"{name}={text}" for name, text in texts.items()])
+        except InvalidParameter as e:
+            raise self._unusable(e) from e
+
+    def evaluator(self, experiment: Experiment[Any], parameters: Any) -> Evaluator:
+        """Return an evaluator of the run that has seen what the run's evaluator had.
+
+        Raises:
+            InvalidCheckpoint: it is that of another scenario.
+        """
+        evaluator: Evaluator = experiment.evaluator(parameters)
+        try:
+            evaluator.set_state(self._kept.evaluator)
+        except InvalidState as e:
+            raise self._unusable(e) from e
+        return evaluator
+
+    def _unusable(self, error: Exception) -> InvalidCheckpoint:
+        return InvalidCheckpoint(self._path, f"what it keeps of the scenario cannot be read: {one_line(error)}")
+
+
+def pack(
+    experiment: Experiment[Any], evaluator: Evaluator, parameters: Any, options: MasterOptions, spent: ElapsedTime
+) -> bytes:
+    """Return what a checkpoint keeps besides the units' states."""
+    texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
+    kept = _Kept(evaluator=evaluator.get_state(), parameters=texts, options=options, spent=spent)
+    return pack_state(kept, RECORDS)

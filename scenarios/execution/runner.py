@@ -36,7 +36,8 @@ def run_task(
     """Run a scenario to its end, its failure or its interruption and write its folder; or resume a run.
 
     Raises:
-        WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder: before anything
+        WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
+            InvalidCheckpoint: before anything
             was written.
         UnitHung: a unit does not return as it is loaded or initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
@@ -44,7 +45,7 @@ def run_task(
     """
     experiment, parameters = task.experiment, task.parameters
     spent = ElapsedTime() if resumption is None else resumption.spent
-    evaluator = experiment.evaluator(parameters) if resumption is None else resumption.evaluator
+    evaluator = experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
     failure: UnitFailure | None = None
     clock = spent.clock()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
@@ -124,7 +125,7 @@ def _checkpoints(
         return []
 
     def packed() -> bytes:
-        return pack(evaluator, task.parameters, task.options, clock())
+        return pack(task.experiment, evaluator, task.parameters, task.options, clock())
 
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, packed)]
 

@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from handover.cosim.blocks.declarations import declared_variables
+from handover.cosim.blocks.state import InvalidState, pack_state, unpack_state
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
@@ -44,7 +45,14 @@ class Outcome:
 
 
 class Evaluator(abc.ABC):
-    """Follows one run as the experimenter does, by ground truth: decides when the task is over and how it went."""
+    """Follows one run as the experimenter does, by ground truth: decides when the task is over and how it went.
+
+    A checkpoint keeps its attributes, which are plain data (see `handover.cosim.blocks.state`) or of the types in
+    `records`, but for `parameters`: an evaluator of the same parameters takes the others over.
+    """
+
+    records: ClassVar[tuple[type[Any], ...]] = ()
+    """Dataclasses, named tuples and enumerations of which its attributes are made, besides plain data."""
 
     @abc.abstractmethod
     def __call__(self, t: float, signals: Signals) -> None:
@@ -68,6 +76,28 @@ class Evaluator(abc.ABC):
     @abc.abstractmethod
     def outcome(self) -> Outcome:
         """Return the verdict on what was seen so far."""
+
+    def get_state(self) -> bytes:
+        """Return what it has seen: after `set_state` with it, another evaluator continues in the same way.
+
+        Raises:
+            NotPlainData: an attribute is neither plain data nor one of `records`.
+        """
+        return pack_state({n: value for n, value in vars(self).items() if n != _PARAMETERS}, self.records)
+
+    def set_state(self, state: bytes) -> None:
+        """Take over what another evaluator of the same parameters has seen.
+
+        Raises:
+            InvalidState: it is not the state of such an evaluator; nothing is changed.
+        """
+        attributes = unpack_state(state, self.records)
+        if not isinstance(attributes, dict) or {_PARAMETERS, *attributes} != {_PARAMETERS, *vars(self)}:
+            raise InvalidState(f"it is not the state of a {type(self).__name__}")
+        vars(self).update(cast(dict[str, Any], attributes))
+
+
+_PARAMETERS = "parameters"
 
 
 AnyEvaluator = TypeVar("AnyEvaluator", bound=Evaluator)

@@ -103,6 +103,8 @@ class HandoverEvaluator(Evaluator):
         transfers: those that the robot signalled for.
     """
 
+    records = (Metric, Transfer)
+
     def __init__(self, parameters: HandoverParameters, receivers: Sequence[str], failures: int = 0) -> None:
         self.parameters, self.receivers, self.failures = parameters, tuple(receivers), failures
         self.phases: list[tuple[str, float]] = []

@@ -157,6 +157,8 @@ class ImpedanceEvaluator(Evaluator):
         KeyError: `paper.toml` lacks the place of rest.
     """
 
+    records = (Metric,)
+
     def __init__(self, parameters: ImpedanceParameters) -> None:
         self.parameters = parameters
         self.p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])

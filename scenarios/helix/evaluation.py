@@ -136,6 +136,8 @@ class HandoverEvaluator(Evaluator):
         pictures: those that were kept, where a record is evaluated, which has no pictures; None: they are taken.
     """
 
+    records = (CameraPicture, Mark, ModelMismatch)
+
     def __init__(self, parameters: Parameters, pictures: Sequence[CameraPicture] | None = None) -> None:
         self.parameters = parameters
         self._pictures = list(pictures or ())

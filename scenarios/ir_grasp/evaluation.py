@@ -35,6 +35,8 @@ class GraspEvaluator(Evaluator):
         moments: times of `start`, `before closing`, `end`, in s, as far as the run reached them.
     """
 
+    records = (Metric,)
+
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.moments: dict[str, float] = {}

@@ -88,6 +88,8 @@ class PathEvaluator(Evaluator):
         completed: time at which the path was completed, s; None before.
     """
 
+    records = (PathPoint,)
+
     def __init__(self, parameters: Parameters, *, hybrid: bool) -> None:
         self.parameters, self.hybrid = parameters, hybrid
         self.points: list[PathPoint] = []

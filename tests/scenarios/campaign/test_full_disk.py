@@ -4,7 +4,6 @@ import contextlib
 import errno
 import io
 import os
-import pickle
 import tempfile
 from collections.abc import Generator, Sequence
 from pathlib import Path
@@ -19,7 +18,7 @@ from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.run_server import RunServer
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, read_message, write_message
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution import supervisor
 
@@ -98,12 +97,15 @@ def test_a_run_server_without_room_for_what_a_run_prints_answers(
 
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
     job = RunJob(name="r", scenario="none", parameters=(), seed=0, fmus={}, runs=str(here), options=MasterOptions())
-    jobs, results = io.BytesIO(pickle.dumps((job, here / ".r"))), io.BytesIO()
+    jobs, results = io.BytesIO(), io.BytesIO()
+    write_message(jobs, (job, str(here / ".r")))
+    jobs.seek(0)
     monkeypatch.setattr(supervisor, "can_supervise", lambda: False)
     RunServer(jobs, results).serve()
     said = os.strerror(number)
     text = JobResult(name="r", lost=f"{here} cannot be written: {said}", no_room=said if full else "")
-    assert pickle.loads(results.getvalue()) == text
+    results.seek(0)
+    assert read_message(results) == text
 
 
 def test_a_table_that_cannot_be_written_stops(monkeypatch: pytest.MonkeyPatch):

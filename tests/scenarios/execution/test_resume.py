@@ -1,20 +1,23 @@
 import json
-import pickle
 import shutil
 import signal
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner, Result
 from killed_run import end_between
+from planted import planted_pickle
 
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 from handover.scenarios.cli.run_summary import print_summary
+from handover.scenarios.execution import resumption
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
@@ -104,8 +107,9 @@ def test_a_run_of_an_ssp_goes_on(tmp_path: Path):
 def test_what_judges_a_run_can_be_kept(name: str):
     experiment = SCENARIOS[name]()
     evaluator = experiment.evaluator(parse_parameters(SCENARIOS[name], []))
-    kept = pickle.loads(pickle.dumps(evaluator))
-    assert vars(kept).keys() == vars(evaluator).keys()
+    other = experiment.evaluator(parse_parameters(SCENARIOS[name], []))
+    other.set_state(evaluator.get_state())
+    assert other.get_state() == evaluator.get_state()
 
 
 @pytest.fixture(scope="module")
@@ -253,3 +257,54 @@ def test_units_that_do_not_save_their_states_are_refused_at_the_start(tmp_path: 
     assert result.exit_code == 2, result.output
     assert "scene: unable.fmu lacks canSerializeFMUState" in result.output
     assert not out.exists()
+
+
+def with_part(copy: Path, part: str, content: bytes, kind: int = zipfile.ZIP_STORED) -> None:
+    """Put something else in the place of a part of the checkpoint."""
+    checkpoint = copy / "checkpoint.zip"
+    with zipfile.ZipFile(checkpoint) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    assert part in parts
+    with zipfile.ZipFile(checkpoint, "w", kind) as archive:
+        for name, whole in (parts | {part: content}).items():
+            archive.writestr(name, whole)
+
+
+@pytest.mark.parametrize("part", ["checkpoint.json", "0.state", "0.contents", "0.cpu", "kept"])
+def test_a_pickle_in_a_checkpoint_is_refused_and_not_executed(part: str, copy: Path, tmp_path: Path):
+    planted, mark = planted_pickle(tmp_path)
+    with_part(copy, part, planted + b"\0" * (-len(planted) % 8 + 1))
+    result = call("resume", copy)
+    assert result.exit_code in (2, 3), result.output
+    assert len(result.output.splitlines()) <= 2, result.output
+    assert not mark.exists()
+    assert not (copy / "report.html").exists()
+
+
+def kept_in(copy: Path) -> Any:
+    with zipfile.ZipFile(copy / "checkpoint.zip") as archive:
+        return unpack_state(archive.read("kept"), resumption.RECORDS)
+
+
+def test_a_pickle_in_the_evaluators_state_is_refused_and_not_executed(copy: Path, tmp_path: Path):
+    planted, mark = planted_pickle(tmp_path)
+    kept = kept_in(copy)
+    with_part(copy, "kept", pack_state(replace(kept, evaluator=planted), resumption.RECORDS))
+    assert_refused(copy, "what it keeps of the scenario cannot be read: ")
+    with_part(copy, "kept", pack_state(replace(kept, evaluator=pack_state({"a": 1})), resumption.RECORDS))
+    assert_refused(copy, "it is not the state of a GraspEvaluator")
+    with_part(
+        copy, "kept", pack_state(replace(kept, parameters={**kept.parameters, "standoff": "far"}), resumption.RECORDS)
+    )
+    assert_refused(copy, "standoff: 'far' is not a number")
+    with_part(copy, "kept", pack_state(replace(kept, parameters={}), resumption.RECORDS))
+    assert_refused(copy, "the parameters of ir_grasp are others")
+    with_part(copy, "kept", pack_state(kept.options, resumption.RECORDS))
+    assert_refused(copy, "what it keeps")
+    assert not mark.exists()
+
+
+def test_a_compressed_checkpoint_is_refused(copy: Path):
+    """It could be of any size once it is read."""
+    with_part(copy, "kept", b"\0" * 10_000_000, zipfile.ZIP_DEFLATED)
+    assert_refused(copy, "is compressed; checkpoints are written without")

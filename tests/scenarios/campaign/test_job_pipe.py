@@ -1,0 +1,84 @@
+"""What passes between a worker and its run server is plain data: a pickle in its place is refused and not executed."""
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from planted import planted_pickle
+from sample_jobs import job
+
+from handover.cosim.blocks.state import InvalidState
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
+from handover.scenarios.campaign.worker import ServerLost, ServerProcess
+from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
+
+
+def sent(message: bytes) -> io.BytesIO:
+    return io.BytesIO(len(message).to_bytes(8, "big") + message)
+
+
+def test_jobs_and_results_come_as_they_were_sent(tmp_path: Path):
+    options = MasterOptions(
+        algorithm=Algorithm.NEWTON,
+        extrapolation=Extrapolation.LINEAR,
+        adaptive=AdaptiveStep(uncontrolled=("a.y", "b.y")),
+        call_limit=3.0,
+    )
+    whole = RunJob(
+        name="r", scenario="s", parameters=("a=1",), seed=2**70, fmus={"u": "f"}, runs=str(tmp_path), options=options
+    )
+    pipe = io.BytesIO()
+    for message in ((whole, "folder"), JobResult(name="r", lost="é", no_room="x")):
+        write_message(pipe, message)
+    pipe.seek(0)
+    assert read_message(pipe) == (whole, "folder")
+    assert read_message(pipe) == JobResult(name="r", lost="é", no_room="x")
+    with pytest.raises(EOFError):
+        read_message(pipe)
+
+
+def test_a_message_that_ends_early_is_the_end_of_the_pipe():
+    pipe = io.BytesIO()
+    write_message(pipe, JobResult(name="r"))
+    for size in range(len(pipe.getvalue())):
+        with pytest.raises(EOFError):
+            read_message(io.BytesIO(pipe.getvalue()[:size]))
+
+
+def test_a_pickle_in_a_pipe_is_refused_and_not_executed(tmp_path: Path):
+    planted, mark = planted_pickle(tmp_path)
+    for pipe in (io.BytesIO(planted), sent(planted)):
+        with pytest.raises(InvalidState):
+            read_message(pipe)
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("framed", [True, False])
+def test_a_run_server_ends_at_a_pickle(framed: bool, tmp_path: Path):
+    planted, mark = planted_pickle(tmp_path)
+    server = subprocess.run(
+        [sys.executable, "-m", "handover.scenarios.campaign.run_server"],
+        input=sent(planted).getvalue() if framed else planted,
+        capture_output=True,
+    )
+    assert server.returncode == 1
+    assert server.stderr.decode().splitlines()[-1].startswith("handover.cosim.blocks.state.InvalidState: ")
+    assert not mark.exists()
+
+
+def test_a_worker_ends_a_server_that_answers_a_pickle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    planted, mark = planted_pickle(tmp_path)
+    answer = f"import sys; sys.stdin.buffer.read(8); sys.stdout.buffer.write({sent(planted).getvalue()!r})"
+    start = subprocess.Popen
+
+    def start_other(_command: list[str], **options: object) -> "subprocess.Popen[bytes]":
+        return start([sys.executable, "-c", answer], **options)  # pyright: ignore
+
+    monkeypatch.setattr(subprocess, "Popen", start_other)
+    server = ServerProcess()
+    with pytest.raises(ServerLost):
+        server.run_job(job(tmp_path, "run"), lambda: True)
+    assert not server.lives
+    assert not mark.exists()
