@@ -1,0 +1,34 @@
+"""Whatever a unit does, `handover run` says what, with its status, keeps the rows until then, and frees the others."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fault_table import FAULTS, Fault, faults_of, run_fault
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what a crash does depends on the system")
+
+
+def rows() -> list[Any]:
+    """Return the rows with their standards: of a fast one, one of the standards is in the fast tier, taking turns."""
+    found: list[Any] = []
+    for i, fault in enumerate(FAULTS):
+        first = fault.standards[i % len(fault.standards)]
+        for fmi in fault.standards:
+            marks = [] if fault.fast and fmi == first else [pytest.mark.slow]
+            if fault.wrong:
+                marks.append(pytest.mark.xfail(reason=fault.wrong, strict=True))
+            found.append(pytest.param(fault, fmi, marks=marks, id=f"{fault.name}-{fmi}"))
+    return found
+
+
+@pytest.mark.parametrize(("fault", "fmi"), rows())
+def test_a_fault_is_told_and_harms_nothing_else(fault: Fault, fmi: int, tmp_path: Path):
+    seen = run_fault(fault, fmi, tmp_path)
+    assert not faults_of(fault, fmi, seen), seen.output
+
+
+def test_every_fault_is_there_once():
+    names = [fault.name for fault in FAULTS]
+    assert len(set(names)) == len(names) >= 40
