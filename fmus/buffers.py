@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.ports import Floats, Raster
-from handover.cosim.blocks.state import InvalidState
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.fmus.layout import Buffer, Layout, Slot, capacity
 

@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from handover.cosim.blocks.block import InvalidAdvance
+from handover.cosim.blocks.block import InvalidAdvance, InvalidState
 from handover.cosim.blocks.description import describe
-from handover.cosim.blocks.state import InvalidState
 from handover.fmus.buffers import Buffers, join, split
 from handover.fmus.exchange import derivative_reader, input_reader, output_writer
 from handover.fmus.layout import Form, Layout

@@ -53,7 +53,7 @@ class Block(Protocol):
         """Restore a state that `get_state` returned.
 
         Raises:
-            InvalidState: it is not such a state (`handover.cosim.blocks.state.unpack_state` raises it).
+            InvalidState: it is not such a state.
         """
         ...
 
@@ -172,3 +172,16 @@ class InvalidParameters(ValueError):
     def __init__(self, faults: Sequence[str]) -> None:
         super().__init__(f"{self.block}: " + "; ".join(faults))
         self.faults = list(faults)
+
+
+class InvalidState(ValueError):
+    """A saved state cannot be restored: it is damaged, no plain data, or of another unit; nothing is changed.
+
+    Defined here and not beside `pack_state`, so that FMUs without states do not need its package. An FMU logs it
+    in one line, without a traceback.
+    """
+
+    is_refusal: ClassVar[bool] = True
+
+    def __init__(self, fault: str = "the state was saved by another unit, or by another version of this one") -> None:
+        super().__init__(fault)

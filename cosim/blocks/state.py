@@ -23,6 +23,8 @@ from typing import Any, cast
 import msgpack
 import numpy as np
 
+from handover.cosim.blocks.block import InvalidState
+
 _TUPLE, _RECORD, _INTEGER, _ARRAY, _NUMBER, _MEMBER, _FRACTION, _COMPLEX = range(1, 9)
 
 _KINDS = "biufcSU"
@@ -34,18 +36,6 @@ _TWO_FLOATS = struct.Struct("<2d")
 
 _BUFFER = 1024
 """Bytes with which packing begins; msgpack's own choice takes longer to allocate than a state to pack."""
-
-
-class InvalidState(ValueError):
-    """A saved state cannot be restored: it is damaged, no plain data, or of another unit; nothing is changed.
-
-    An FMU logs the message in one line, without a traceback.
-    """
-
-    is_refusal = True
-
-    def __init__(self, fault: str = "the state was saved by another unit, or by another version of this one") -> None:
-        super().__init__(fault)
 
 
 class NotPlainData(TypeError):

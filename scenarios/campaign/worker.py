@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, cast
 
 from distributed import get_worker
 
-from handover.cosim.blocks.state import InvalidState
+from handover.cosim.blocks.block import InvalidState
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
 from handover.scenarios.results.run_folder import version_differences, versions
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
-from handover.cosim.blocks.state import InvalidState, pack_state, unpack_state
+from handover.cosim.blocks.block import InvalidState
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.stepping.options import OPTION_RECORDS, MasterOptions
 
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.blocks.state import InvalidState, pack_state, unpack_state
+from handover.cosim.blocks.block import InvalidState
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.exceptions import one_line
 from handover.cosim.master.checkpoint import Checkpoint, InvalidCheckpoint, read_checkpoint
 from handover.cosim.stepping.options import OPTION_RECORDS, MasterOptions

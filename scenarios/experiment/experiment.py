@@ -11,8 +11,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
+from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.declarations import declared_variables
-from handover.cosim.blocks.state import InvalidState, pack_state, unpack_state
+from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals

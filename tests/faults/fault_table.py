@@ -106,10 +106,10 @@ def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
     out, notes = folder / "out", folder / "notes"
     notes.touch()
     saves = ("--repeat-discarded",) if fault.call == "save" else ()
+    options = ("--no-report", "--call-limit", str(LIMIT), *saves)
     command = ["-c", "from handover.scenarios.cli.entry import main; main()"]
     done = subprocess.run(
-        [sys.executable, *command, "run", ssp, "--stop", str(STOP), "--no-report", "--call-limit", str(LIMIT), *saves]
-        + ["--out", out],
+        [sys.executable, *command, "run", ssp, "--stop", str(STOP), *options, "--out", out],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         stdin=subprocess.DEVNULL,
@@ -120,9 +120,8 @@ def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
     )
     record = out / "signals.parquet"
     rows = len(Record(record).time) if record.is_file() else None
-    return Seen(
-        done.returncode, done.stdout.decode("utf-8", "replace"), rows, frozenset(notes.read_text().splitlines())
-    )
+    printed = done.stdout.decode("utf-8", "replace")
+    return Seen(done.returncode, printed, rows, frozenset(notes.read_text().splitlines()))
 
 
 def _crash(fault: str, call: str, how: str, rows: int | None, **more: Any) -> Fault:
@@ -131,6 +130,7 @@ def _crash(fault: str, call: str, how: str, rows: int | None, **more: Any) -> Fa
 
 SEGMENT = "segmentation fault"
 _HANG = "did not return within 2 s"
+_AT_0 = "what goes wrong in terminating and freeing is told with t = 0"
 
 FAULTS = [
     _crash("crash", "load", SEGMENT, None, fast=True),
@@ -142,9 +142,9 @@ FAULTS = [
     _crash("crash", "get", SEGMENT, UNTIL_OUTPUT),
     _crash("crash", "step", SEGMENT, UNTIL_FAULT, fast=True),
     _crash("crash", "save", SEGMENT, UNTIL_FAULT),
-    _crash("crash", "terminate", SEGMENT, WHOLE),
-    _crash("crash", "free", SEGMENT, WHOLE),
-    _crash("crash", "unload", SEGMENT, WHOLE),
+    _crash("crash", "terminate", f"at t = 1 s: {SEGMENT}", WHOLE, notes=frozenset({"c terminated"}), wrong=_AT_0),
+    _crash("crash", "free", f"at t = 1 s: {SEGMENT}", WHOLE, notes=ALL - {"a freed"}, wrong=_AT_0),
+    _crash("crash", "unload", SEGMENT, WHOLE, notes=ALL - {"a freed"}),
     _crash("divide", "step", "", UNTIL_FAULT),
     _crash("abort", "load", "aborted", None),
     _crash("abort", "step", "aborted", UNTIL_FAULT),

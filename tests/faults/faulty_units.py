@@ -1,4 +1,4 @@
-"""Units that do one thing wrong: FMUs of both standards from `units/faults.c`, by the name of the fault and the call."""
+"""Units that do one thing wrong: FMUs of both standards from `units/faults.c`, by the names of fault and call."""
 
 import functools
 import hashlib

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis.extra import numpy as arrays
 from planted import CodeThatRuns, planted_pickle
 
-from handover.cosim.blocks.state import InvalidState, NotPlainData, pack_state, unpack_state
+from handover.cosim.blocks.block import InvalidState
+from handover.cosim.blocks.state import NotPlainData, pack_state, unpack_state
 
 NUMBERS = st.one_of(
     st.none(),

@@ -9,7 +9,7 @@ import pytest
 from planted import planted_pickle
 from sample_jobs import job
 
-from handover.cosim.blocks.state import InvalidState
+from handover.cosim.blocks.block import InvalidState
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.scenarios.campaign.worker import ServerLost, ServerProcess
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
