@@ -8,7 +8,8 @@ Dataclasses, named tuples and enumerations come back only as one of the types th
 MessagePack has no such types of its own, so they are its extension types: 1 begins an array that is a tuple, 2 one that
 is a record (its type's name and its values by name); 3 is an integer beyond 64 bits (little endian, two's complement);
 4 an array of numbers or texts and 5 a single one (a header such as `<f8 C 3 3`, a zero byte, the values); 6 a member of
-an enumeration; 7 a fraction; 8 a complex number (two float64).
+an enumeration; 7 a fraction; 8 a complex number (two float64); 9 the state of numpy's PCG64, whose integers of 128
+bits would take longer than all else.
 """
 
 import enum
@@ -25,7 +26,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidState
 
-_TUPLE, _RECORD, _INTEGER, _ARRAY, _NUMBER, _MEMBER, _FRACTION, _COMPLEX = range(1, 9)
+_TUPLE, _RECORD, _INTEGER, _ARRAY, _NUMBER, _MEMBER, _FRACTION, _COMPLEX, _PCG64 = range(1, 10)
 
 _KINDS = "biufcSU"
 """Kinds of numpy's types that are plain data; objects are not."""
@@ -33,6 +34,7 @@ _KINDS = "biufcSU"
 _unpackb = cast(Callable[..., Any], msgpack.unpackb)
 
 _TWO_FLOATS = struct.Struct("<2d")
+_PCG64_STATE = struct.Struct("<16s16sBI")
 
 _BUFFER = 1024
 """Bytes with which packing begins; msgpack's own choice takes longer to allocate than a state to pack."""
@@ -105,6 +107,10 @@ def _of_special(value: Any) -> Any:
     kind = cast(type[Any], type(value))
     if kind is tuple:
         return [_TUPLE_ITEM, *value]
+    if kind is np.random.PCG64:
+        state = value.state
+        wide = (state["state"][name].to_bytes(16, "little") for name in ("state", "inc"))
+        return msgpack.ExtType(_PCG64, _PCG64_STATE.pack(*wide, state["has_uint32"], state["uinteger"]))
     if kind is np.ndarray and value.dtype.kind in _KINDS and value.dtype.itemsize:
         order = "F" if value.flags.fnc else "C"
         return msgpack.ExtType(_ARRAY, _header(value.dtype, order, value.shape) + value.tobytes(order))
@@ -117,18 +123,8 @@ def _of_special(value: Any) -> Any:
     if kind is Fraction:
         return msgpack.ExtType(_FRACTION, str(value).encode())
     if isinstance(value, np.random.BitGenerator):
-        return _generator_state(value.state)
+        return value.state
     raise NotPlainData(value)
-
-
-def _generator_state(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a bit generator's state with its long integers made ready, which msgpack would try and refuse first."""
-    numbers: Any = state["state"]
-    wide = {
-        name: _of_special(value) if type(value) is int and value.bit_length() > 63 else value
-        for name, value in numbers.items()
-    }
-    return {**state, "state": wide}
 
 
 def _list(items: list[Any]) -> Any:
@@ -158,9 +154,13 @@ def _extension(code: int, content: bytes) -> Any:
         return Fraction(int(top), int(bottom or "1"))
     if code == _COMPLEX:
         return complex(*_TWO_FLOATS.unpack(content))
+    if code == _PCG64:
+        state, increment, has_half, half = _PCG64_STATE.unpack(content)
+        wide = {"state": int.from_bytes(state, "little"), "inc": int.from_bytes(increment, "little")}
+        return {"bit_generator": "PCG64", "state": wide, "has_uint32": has_half, "uinteger": half}
     if code == _MEMBER:
         raise InvalidState(f"the state holds a {content.decode()!r}, and none is expected in it")
-    raise InvalidState(f"the state holds MessagePack's extension type {code}, and 1 to 8 are known")
+    raise InvalidState(f"the state holds MessagePack's extension type {code}, and 1 to 9 are known")
 
 
 @lru_cache(256)
