@@ -138,6 +138,7 @@ def _crash(fault: str, call: str, how: str, rows: int | None, **more: Any) -> Fa
 
 SEGMENT = "segmentation fault"
 _HANG = "did not return within 2 s"
+_NAMELESS = "a failed instantiation in an SSP is told by the file's name and not by the instance's"
 _AT_0 = "what goes wrong in terminating and freeing is told with t = 0"
 
 FAULTS = [
@@ -170,15 +171,23 @@ FAULTS = [
     Fault("hang", "terminate", 3, ("b: {call} at t = 1 s", _HANG), wrong=_AT_0),
     Fault("hang", "free", 3, ("b: {call} at t = 1 s", _HANG), wrong=_AT_0),
     Fault("hang", "unload", 3, ("b", _HANG), wrong="the limit of a call does not cover unloading"),
-    Fault("error", "instantiate", 2, ("b does not start", "the solver failed"), None, frozenset({"a freed"})),
-    Fault("error", "setup", 2, ("b does not start: the solver failed",), None),
-    Fault("error", "enter", 2, ("b does not start: the solver failed",), None, fast=True),
-    Fault("error", "exit", 2, ("b does not start: the solver failed",), None),
+    Fault(
+        "error",
+        "instantiate",
+        2,
+        ("b does not start", "the solver failed"),
+        None,
+        frozenset({"a freed"}),
+        wrong=_NAMELESS,
+    ),
+    Fault("error", "setup", 2, ("b does not start", "the solver failed"), None, FREED),
+    Fault("error", "enter", 2, ("b does not start", "the solver failed"), None, FREED, fast=True),
+    Fault("error", "exit", 2, ("b does not start", "the solver failed"), None, ALL - {"c terminated"}),
     Fault("error", "set", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_FAULT),
     Fault("error", "get", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_OUTPUT),
     Fault("error", "step", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_FAULT, fast=True),
-    Fault("error", "terminate", 3, ("b: {call} at t = 1 s", "the solver failed")),
-    Fault("fatal", "enter", 2, ("b does not start: memory is corrupt",), None),
+    Fault("error", "terminate", 3, ("b: {call} at t = 1 s", "the solver failed"), wrong=_AT_0),
+    Fault("fatal", "enter", 2, ("b does not start", "memory is corrupt"), None, FREED),
     Fault("fatal", "step", 3, ("b: {call} at t = 0.3 s", "memory is corrupt"), UNTIL_FAULT, fast=True),
     Fault("discard", "step", 3, ("b: {call} at t = 0.3 s", "Discard"), UNTIL_FAULT),
     Fault("unknown", "step", 3, ("b: {call} at t = 0.3 s", "77"), UNTIL_FAULT),
