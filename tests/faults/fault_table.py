@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -96,10 +97,12 @@ class Seen:
     output: str
     rows: int | None
     notes: frozenset[str]
+    values: bytes = b""
+    """Of the sound units' outputs."""
 
 
 def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
-    """Run a system with a faulty unit b between two sound ones."""
+    """Run a system with a faulty unit b between two sound ones, with relative paths, as people type them."""
     sound = faulty_fmu("sound", fmi, folder)
     faulty = faulty_fmu(fault.name, fmi, folder, blob=fault.call == "binary")
     ends = connectors(u="input", y="output")
@@ -116,7 +119,7 @@ def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
     options = ("--no-report", "--call-limit", str(LIMIT), *saves)
     command = ["-c", "from handover.scenarios.cli.entry import main; main()"]
     process = subprocess.Popen(
-        [sys.executable, *command, "run", ssp, "--stop", str(STOP), *options, "--out", out],
+        [sys.executable, *command, "run", ssp.name, "--stop", str(STOP), *options, "--out", out.name],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         stdin=subprocess.DEVNULL,
@@ -131,8 +134,20 @@ def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
             os.kill(pid, signal.SIGKILL)
         printed, _ = process.communicate()
     record = out / "signals.parquet"
-    rows = len(Record(record).time) if record.is_file() else None
-    return Seen(process.returncode, printed.decode("utf-8", "replace"), rows, frozenset(notes.read_text().splitlines()))
+    rows, values = None, b""
+    if record.is_file():
+        read = Record(record)
+        rows, values = len(read.time), read["a.y"].tobytes() + read["c.y"].tobytes()
+    return Seen(
+        process.returncode, printed.decode("utf-8", "replace"), rows, frozenset(notes.read_text().splitlines()), values
+    )
+
+
+@cache
+def sound_values(fmi: int) -> bytes:
+    """Return the outputs of a and c where b is sound, too."""
+    with tempfile.TemporaryDirectory() as folder:
+        return run_fault(Fault("nothing", "step", 0), fmi, Path(folder)).values
 
 
 def _crash(fault: str, call: str, how: str, rows: int | None, **more: Any) -> Fault:
@@ -143,6 +158,7 @@ SEGMENT = "segmentation fault"
 _ONLY_A = frozenset({"a freed"})
 _HANG = "did not return within 2 s"
 _NAMELESS = "a failed instantiation in an SSP is told by the file's name and not by the instance's"
+_CLOSED = "descriptors that a unit closes are not put back"
 _AT_0 = "what goes wrong in terminating and freeing is told with t = 0"
 
 FAULTS = [
@@ -197,9 +213,9 @@ FAULTS = [
     Fault("log_huge", "step", 0),
     Fault("chdir", "load", 0),
     Fault("chdir", "step", 0, fast=True),
-    Fault("close_output", "step", 0),
-    Fault("close_all", "load", 0),
-    Fault("close_all", "step", 0),
+    Fault("close_output", "step", 0, wrong=_CLOSED),
+    Fault("close_all", "load", 0, wrong=_CLOSED),
+    Fault("close_all", "step", 0, wrong=_CLOSED),
     Fault("handlers", "load", 0),
     Fault("handlers", "step", 0),
     Fault("rounding", "load", 0),
@@ -219,6 +235,8 @@ def faults_of(fault: Fault, fmi: int, seen: Seen) -> list[str]:
     ):
         if wanted != was:
             found.append(f"{what} {was}, not {wanted}")
+    if fault.status == 0 and seen.values != sound_values(fmi):
+        found.append("the sound units' outputs are others than without the fault")
     if "Traceback" in seen.output:
         found.append("a traceback is told")
     return found
