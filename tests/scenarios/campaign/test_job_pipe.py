@@ -64,7 +64,7 @@ def test_a_run_server_ends_at_a_pickle(framed: bool, tmp_path: Path):
         capture_output=True,
     )
     assert server.returncode == 1
-    assert server.stderr.decode().splitlines()[-1].startswith("handover.cosim.blocks.state.InvalidState: ")
+    assert server.stderr.decode().splitlines()[-1].startswith("handover.cosim.blocks.block.InvalidState: ")
     assert not mark.exists()
 
 
