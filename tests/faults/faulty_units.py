@@ -1,4 +1,4 @@
-"""Units that do one thing wrong: FMUs of both standards from `units/faults.c`, by the names of fault and call."""
+"""Units that do one thing wrong: FMUs of both standards from `units/by_name`, by the names of fault and call."""
 
 import functools
 import hashlib
@@ -15,7 +15,7 @@ from native_units import HEADERS, SOURCES
 from handover.cosim.fmu.fmpy_edge import library_path
 from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 
-_SOURCE = Path(__file__).with_name("units") / "faults.c"
+_SOURCE = Path(__file__).with_name("units") / "by_name" / "faults.c"
 _FRAME = [SOURCES / "frame" / name for name in ("unit.c", "fmi3_refused.c", "unit.h", "fmi2.c", "fmi3.c")]
 
 
