@@ -1,7 +1,7 @@
 """The table of faults: what `handover run` makes of an SSP in which one unit does one thing wrong.
 
-Each row names the fault and the call that `units/by_name/faults.c` knows, and what is right: exit status, what is told, rows
-recorded, and what the two sound units beside it note of their end. `python fault_table.py` prints what is.
+Each row names the fault and the call, as `units/by_name/faults.c` knows them, and what is right: exit status, what is
+told, rows recorded, and what the two sound units beside it note of their end. `python fault_table.py` prints what is.
 """
 
 import os
