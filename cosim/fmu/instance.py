@@ -6,7 +6,7 @@ heartbeat and is checked: a status above Warning raises the `UnitFailure` of tha
 
 import collections
 import ctypes
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -30,6 +30,10 @@ from handover.cosim.fmu.loading import load_fmi2, load_fmi3
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
+
+
+def _nothing() -> None:
+    pass
 
 
 class Instance:
@@ -66,6 +70,8 @@ class Instance:
             self._returned()
         self._component = self._fmu.component
         self._failed: int | None = None
+        self.on_fatal: Callable[[], object] = _nothing
+        """Is called when a call returns Fatal, after which no instance of the FMU may be called."""
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
@@ -390,6 +396,8 @@ class Instance:
 
     def _fail(self, call: str, status: int) -> None:
         self._failed = status
+        if self.fatal:
+            self.on_fatal()
         raise failure_of(self.name, call, self.time, status, tuple(self.log))
 
     def _take_log_line(self, status: int, message: str) -> None:

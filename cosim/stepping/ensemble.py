@@ -114,6 +114,8 @@ class Ensemble:
         self._feedings: dict[str, Feeding] = {}
         self._finite: dict[str, FiniteCheck] = {}
         self._cleanups = cleanups or CleanupStack()
+        self._corrupt: set[Path] = set()
+        """FMUs of which an instance returned Fatal."""
         try:
             self._load()
             self._feedings = feedings(system, self.instances)
@@ -272,9 +274,8 @@ class Ensemble:
 
     def forget(self, states: Mapping[str, State]) -> None:
         """Free saved states, except those of units that must not be called any more."""
-        corrupt = self._corrupt()
         for name, state in states.items():
-            if self.system.units[name].description.path not in corrupt:
+            if not self.is_corrupt(self.instances[name]):
                 self.instances[name].free_state(state)
 
     def finite_check(self, unit: str) -> FiniteCheck:
@@ -312,6 +313,7 @@ class Ensemble:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
             instance = self._make(name, unpacked[d.path])
+            instance.on_fatal = functools.partial(self._corrupt.add, d.path)
             self._cleanups.add(functools.partial(self._free, instance))
             self.instances[name] = instance
 
@@ -333,7 +335,4 @@ class Ensemble:
 
     def is_corrupt(self, instance: Instance) -> bool:
         """Return whether an instance of the same FMU returned Fatal: the standards then forbid calls of all of them."""
-        return instance.description.path in self._corrupt()
-
-    def _corrupt(self) -> set[Path]:
-        return {i.description.path for i in self.instances.values() if i.fatal}
+        return instance.description.path in self._corrupt

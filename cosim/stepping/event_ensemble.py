@@ -34,7 +34,8 @@ class EventEnsemble(Ensemble):
         self.ends: dict[str, StepEnd] = {}
         self._begun: dict[str, tuple[float, State]] = {}
         super().__init__(system, heartbeat, cleanups)
-        self._staying = [u.name for u in system.units.values() if not u.sampled and not can_roll_back(u)]
+        staying = (u.name for u in system.units.values() if not u.sampled and not can_roll_back(u))
+        self._staying = dict.fromkeys(staying)
         self._warned: set[str] = set()
 
     def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:

@@ -93,7 +93,8 @@ def _presumed_initially(d: FmuDescription) -> Mapping[str, tuple[str, ...]]:
 def _feeding(
     system: System, units: Collection[str], feedthrough: Callable[[FmuDescription], Mapping[str, tuple[str, ...]]]
 ) -> dict[PortName, list[Connection]]:
-    by_target = {c.target: c for c in system.connections if c.source.unit in units}
+    inside = set(units)
+    by_target = {c.target: c for c in system.connections if c.source.unit in inside}
     feeding: dict[PortName, list[Connection]] = {}
     for name in units:
         d = system.units[name].description

@@ -1,0 +1,70 @@
+"""Large systems and large FMUs, written as files: SSPs of many components, and an FMU of many variables."""
+
+import random
+import re
+import zipfile
+from pathlib import Path
+
+from native_units import native_fmu
+
+_NAMESPACES = (
+    'xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription" '
+    'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"'
+)
+_UNITS = (("late_blend", 2), ("blend", 3))
+_INPUTS = ("u1", "u2", "u3")
+
+
+def write_large_ssp(path: Path, n: int, *, seed: int = 1) -> Path:
+    """Write an SSP of n components with 3 n connections, of FMI 2 and 3 in turn, each fed by three others at random.
+
+    Outputs of FMI 2 units follow their inputs a step later, those of FMI 3 units at once: these are fed by such as come
+    before them, so there are chains and cycles but no algebraic loops.
+    """
+    draw = random.Random(seed)
+    connectors = "".join(
+        f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+        for name, kind in (*((u, "input") for u in _INPUTS), ("y", "output"))
+    )
+    components = (
+        f'<ssd:Component name="unit{i}" type="application/x-fmu-sharedlibrary" source="resources/{_UNITS[i % 2][0]}.fmu">'
+        f"<ssd:Connectors>{connectors}</ssd:Connectors></ssd:Component>\n"
+        for i in range(n)
+    )
+    connections = (
+        f'<ssd:Connection startElement="unit{draw.randrange(i if i % 2 else n)}" startConnector="y" '
+        f'endElement="unit{i}" endConnector="{u}"/>\n'
+        for i in range(n)
+        for u in _INPUTS
+    )
+    description = (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        f'<ssd:SystemStructureDescription {_NAMESPACES} version="1.0" name="large">\n'
+        f'<ssd:System name="large"><ssd:Elements>\n{"".join(components)}</ssd:Elements>\n'
+        f"<ssd:Connections>\n{''.join(connections)}</ssd:Connections></ssd:System>\n"
+        '<ssd:DefaultExperiment startTime="0" stopTime="1"/>\n</ssd:SystemStructureDescription>\n'
+    )
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SystemStructure.ssd", description)
+        for name, fmi in _UNITS:
+            archive.write(native_fmu(name, fmi), f"resources/{name}.fmu")
+    return path
+
+
+def write_large_fmu(path: Path, n: int, fmi: int) -> Path:
+    """Write a unit whose description has n local variables more."""
+    with zipfile.ZipFile(native_fmu("blend", fmi)) as unit:
+        members = {name: unit.read(name) for name in unit.namelist()}
+    description = members["modelDescription.xml"].decode()
+    local = 'causality="local" variability="continuous"'
+    rows = [
+        f'<ScalarVariable name="part{i // 100}.x{i % 100}" valueReference="{i + 1000}" {local}><Real/></ScalarVariable>'
+        if fmi == 2
+        else f'<Float64 name="part{i // 100}.x{i % 100}" valueReference="{i + 1000}" {local}/>'
+        for i in range(n)
+    ]
+    members["modelDescription.xml"] = re.sub("</ModelVariables>", "\n".join([*rows, "</ModelVariables>"]), description).encode()
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return path
