@@ -22,8 +22,9 @@ _STRETCH = 0.05
 """Seconds of wall time after which the loop returns to Python, where a signal such as Ctrl-C is handled."""
 _MAX_STEPS = 4096
 """Limit of communication points until then."""
-_ROOM = 2 * _MAX_STEPS
-"""CPU times of a unit that the loop can hold before `publish_cpu_times` fetches them."""
+_MAX_ROOM, _LEAST_ROOM, _MAX_SPENT = 2 * _MAX_STEPS, 64, 2**20
+"""CPU times that the loop can hold before `publish_cpu_times` fetches them: of a unit, at most and at least, and of all
+units where these are many."""
 _LAST_REACHED, _PAUSED, _RECORD_FULL, _STOPPED, _ABANDONED = range(5)
 _MAX_TICKS = 2**62
 
@@ -53,7 +54,8 @@ class PlanStepper:
         self._depart = (memory.Segment * len(plan.depart))(*plan.depart)
         self._depart_from = min((segment.first for segment in plan.depart), default=len(plan.packed))
         self._times = (ctypes.c_double * n)()
-        self._spent = (ctypes.c_double * (n * _ROOM if self._clock else 0))()
+        self._room = min(_MAX_ROOM, max(_LEAST_ROOM, _MAX_SPENT // max(n, 1)))
+        self._spent = (ctypes.c_double * (n * self._room if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
         self._unpublished = 0  # communication points whose CPU times the ensemble does not have yet
         self._plan = memory.Plan(
@@ -69,7 +71,7 @@ class PlanStepper:
             unit_times=self._times,
             spent=self._spent,
             n_spent=self._n_spent,
-            spent_capacity=_ROOM,
+            spent_capacity=self._room,
             heartbeat=ensemble.heartbeat.address,
         )
         self._read_times()
@@ -126,12 +128,14 @@ class PlanStepper:
                 raise Abandoned
             leave = True
             if not watched:
-                points = min(2 * points, _MAX_STEPS) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
+                points = min(2 * points, _MAX_STEPS, self._room) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
 
     def publish_cpu_times(self) -> None:
         """Hand over to the ensemble the CPU times that the loop has measured."""
+        if not self._unpublished:
+            return
         for i, unit in enumerate(self._units):
-            spent = array.array("d", self._spent[i * _ROOM : i * _ROOM + self._n_spent[i]])
+            spent = array.array("d", self._spent[i * self._room : i * self._room + self._n_spent[i]])
             self._ensemble.cpu[unit].extend(spent)
             self._n_spent[i] = 0
         self._unpublished = 0
@@ -163,7 +167,7 @@ class PlanStepper:
     def _make_room(self, points: int) -> None:
         """Make sure that the CPU times of so many further communication points can be held."""
         if self._clock:
-            if self._unpublished + points > _ROOM:
+            if self._unpublished + points > self._room:
                 self.publish_cpu_times()
             self._unpublished += points
 

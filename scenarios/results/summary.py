@@ -347,6 +347,7 @@ def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
 
 
 def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) -> RunData:
+    hashes = {path: sha256_of(path) for path in dict.fromkeys(fmus.values())}
     return RunData(
         **configuration(task),
         source=dict(task.source),
@@ -357,15 +358,16 @@ def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) ->
         headline=list(task.experiment.headline),
         told_parameters=[*parameter_rows(task), *_given_rows(task)],
         **of_this_run,
-        units={name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
+        units={name: {"fmu": path.name, "sha256": hashes[path]} for name, path in fmus.items()},
         versions={"platform": platform.platform(), **versions()},
     )
 
 
 def _units(master: Master) -> list[UnitData]:
     units: list[UnitData] = []
+    cpu = master.cpu
     for name, unit in master.system.units.items():
-        model, spent = f"{unit.description.name} (FMI {unit.description.fmi})", master.cpu[name]
+        model, spent = f"{unit.description.name} (FMI {unit.description.fmi})", cpu[name]
         period = own_period(unit, adaptive=master.steps is not None)
         step = "varies" if period is None else f"{period * 1000:.4g} ms"
         units.append(UnitData(name=name, model=model, step=step, steps=len(spent), cpu_seconds=sum(spent)))
