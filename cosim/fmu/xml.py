@@ -5,7 +5,6 @@ defusedxml decides whether a document is safe; lxml, which knows the line of eac
 
 import importlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
@@ -19,26 +18,47 @@ class UnsafeXml(ValueError):
     """XML that is malformed or unsafe to read; the message says what is wrong and where."""
 
 
-@dataclass(frozen=True)
 class XmlElement:
-    """An element with the line at which it begins; `tag` has its namespace before it, as in `{urn:x}name`."""
+    """An element with the line at which it begins; `tag` has its namespace before it, as in `{urn:x}name`.
 
-    tag: str
-    attributes: Mapping[str, str]
-    line: int
-    children: tuple["XmlElement", ...]
+    It is a view of lxml's: of a large document only what is looked at becomes Python objects.
+    """
+
+    __slots__ = ("_element",)
+
+    def __init__(self, element: Any) -> None:
+        self._element = element
+
+    @property
+    def tag(self) -> str:
+        """Its full name."""
+        return self._element.tag
+
+    @property
+    def attributes(self) -> Mapping[str, str]:
+        """Its attributes' values by name."""
+        return dict(self._element.attrib)
+
+    @property
+    def line(self) -> int:
+        """The line at which it begins, counted from 1."""
+        return int(self._element.sourceline)
+
+    @property
+    def children(self) -> tuple["XmlElement", ...]:
+        """The elements in it, without processing instructions."""
+        return tuple(map(XmlElement, self._element.iterchildren("*")))
 
     def get(self, name: str, default: str = "") -> str:
         """Return an attribute's value."""
-        return self.attributes.get(name, default)
+        return self._element.get(name, default)
 
     def named(self, *path: str) -> Iterator["XmlElement"]:
         """Yield the elements that are reached by a path of tags."""
         if not path:
             yield self
-        for child in self.children if path else ():
-            if child.tag == path[0]:
-                yield from child.named(*path[1:])
+        for child in self._element.iterchildren(path[0]) if path else ():
+            yield from XmlElement(child).named(*path[1:])
 
 
 def parse_xml(content: bytes) -> XmlElement:
@@ -50,9 +70,16 @@ def parse_xml(content: bytes) -> XmlElement:
     check_xml(content)
     try:
         parser = _etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
-        return _converted(_etree.fromstring(content, parser))
+        return XmlElement(_etree.fromstring(content, parser))
     except SyntaxError as e:  # the base class of lxml's errors
         raise UnsafeXml(f"it is not well-formed: {' '.join(str(e).split())}") from e
+
+
+class _Nothing:
+    """What a check makes of a document."""
+
+    def close(self) -> None:
+        """End the document."""
 
 
 def check_xml(content: bytes) -> None:
@@ -62,7 +89,9 @@ def check_xml(content: bytes) -> None:
         UnsafeXml: as `parse_xml`.
     """
     try:
-        defusedxml.ElementTree.fromstring(content, forbid_dtd=True)
+        parser = defusedxml.ElementTree.XMLParser(target=_Nothing(), forbid_dtd=True)
+        parser.feed(content)
+        parser.close()
     except ParseError as e:
         raise UnsafeXml(f"it is not well-formed: {e}") from e
     except defusedxml.DTDForbidden as e:
@@ -74,15 +103,3 @@ def check_xml(content: bytes) -> None:
         raise UnsafeXml(f"it refers to what lies outside of it: {' '.join(str(e).split())}") from e
     except (LookupError, ValueError) as e:  # an encoding that is unknown or of several bytes per character
         raise UnsafeXml(f"its encoding cannot be read: {e}; use UTF-8") from e
-
-
-def _converted(root: Any) -> XmlElement:
-    """Convert lxml's tree, from its leaves up."""
-    converted: dict[Any, list[XmlElement]] = {}  # by parent, its children so far
-    for _, element in _etree.iterwalk(root, events=("end",)):
-        if isinstance(element.tag, str):  # else a processing instruction
-            attributes = {str(k): str(v) for k, v in element.attrib.items()}
-            children = tuple(converted.pop(element, ()))
-            one = XmlElement(element.tag, attributes, int(element.sourceline), children)
-            converted.setdefault(element.getparent(), []).append(one)
-    return converted[None][0]

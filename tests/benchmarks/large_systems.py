@@ -52,19 +52,36 @@ def write_large_ssp(path: Path, n: int, *, seed: int = 1) -> Path:
 
 
 def write_large_fmu(path: Path, n: int, fmi: int) -> Path:
-    """Write a unit whose description has n local variables more."""
+    """Write a unit whose description has n variables more: half are local, the others parameters, inputs, outputs."""
     with zipfile.ZipFile(native_fmu("blend", fmi)) as unit:
         members = {name: unit.read(name) for name in unit.namelist()}
     description = members["modelDescription.xml"].decode()
-    local = 'causality="local" variability="continuous"'
-    rows = [
-        f'<ScalarVariable name="part{i // 100}.x{i % 100}" valueReference="{i + 1000}" {local}><Real/></ScalarVariable>'
-        if fmi == 2
-        else f'<Float64 name="part{i // 100}.x{i % 100}" valueReference="{i + 1000}" {local}/>'
-        for i in range(n)
-    ]
-    members["modelDescription.xml"] = re.sub("</ModelVariables>", "\n".join([*rows, "</ModelVariables>"]), description).encode()
+    first = len(re.findall("<ScalarVariable ", description)) + 1 if fmi == 2 else 1000
+    variables = "\n".join(_variable(i, first + i, fmi) for i in range(n))
+    description = description.replace("</ModelVariables>", f"{variables}\n</ModelVariables>")
+    numbers = [first + i for i in range(n) if _causality(i) == "output"]
+    if fmi == 2:
+        rows = "\n".join(f'<Unknown index="{number}" dependencies=""/>' for number in numbers)
+        description = re.sub("(</Outputs>|</InitialUnknowns>)", rf"{rows}\n\1", description)
+    else:
+        for kind in ("Output", "InitialUnknown"):
+            rows = "\n".join(f'<{kind} valueReference="{number}" dependencies=""/>' for number in numbers)
+            description = description.replace(f"<{kind} ", f"{rows}\n<{kind} ", 1)
+    members["modelDescription.xml"] = description.encode()
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in members.items():
             archive.writestr(name, content)
     return path
+
+
+def _causality(i: int) -> str:
+    return ("local", "parameter", "local", "output", "local", "input")[i % 6]
+
+
+def _variable(i: int, number: int, fmi: int) -> str:
+    causality = _causality(i)
+    variability = "fixed" if causality == "parameter" else "continuous"
+    about = f'name="part{i // 100}.x{i % 100}" valueReference="{number}" description="Variable {i} of a large unit"'
+    about += f' causality="{causality}" variability="{variability}"'
+    start = ' start="0.5"' if causality in ("parameter", "input") else ""
+    return f"<ScalarVariable {about}><Real{start}/></ScalarVariable>" if fmi == 2 else f"<Float64 {about}{start}/>"
