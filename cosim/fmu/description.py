@@ -5,10 +5,12 @@ FMI 2 has no arrays, and some tools do not use those of FMI 3: scalar variables 
 and both forms are interchangeable.
 """
 
+import gc
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -166,6 +168,19 @@ class FmuDescription:
     clocks: Mapping[str, FmuClock] = field(default_factory=dict[str, FmuClock])
 
 
+@contextmanager
+def _collection_paused() -> Generator[None, None, None]:
+    """Pause the collection of garbage: a description is all that is made, and searching it for some takes a third."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+@_collection_paused()
 def describe_fmu(path: Path) -> FmuDescription:
     """Read an FMU's model description (FMI 2.0 or 3.0, co-simulation).
 
@@ -284,11 +299,15 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
     """Return the ports, with scalars that are elements of an array grouped to one array port."""
     groups: dict[str, list[tuple[tuple[int, ...], FmuPort]]] = defaultdict(list)
     for p in ports:
-        match = None if p.shape or p.kind is Kind.BINARY else _ELEMENT.match(p.name)
+        is_entry = p.name.endswith("]") and not p.shape and p.kind is not Kind.BINARY
+        match = _ELEMENT.match(p.name) if is_entry else None
         indices = tuple(int(i) for i in match["indices"].split(",")) if match else ()
         groups[match["base"] if match else p.name].append((indices, p))
     grouped: list[FmuPort] = []
     for base, members in groups.items():
+        if len(members) == 1 and not members[0][0]:
+            grouped.append(members[0][1])
+            continue
         members.sort(key=lambda m: m[0])
         first = members[0][1]
         shape = members[-1][0]
@@ -314,12 +333,13 @@ def _feedthrough(
     """Return the declared and the presumed dependencies of unknowns on inputs."""
     declared: dict[str, set[str]] = defaultdict(set)
     presumed: dict[str, tuple[str, ...]] = {}
+    everything = tuple(sorted(inputs))
     for unknown in unknowns:
         name = owner.get(unknown.variable.valueReference)
         if name is None:
             continue
         if unknown.dependencies is None:
-            presumed[name] = tuple(sorted(inputs))
+            presumed[name] = everything
         else:
             sources = {owner.get(d.valueReference) for d in unknown.dependencies}
             declared[name].update(s for s in sources if s is not None and s in inputs)

@@ -90,6 +90,7 @@ def check_xml(content: bytes) -> None:
     """
     try:
         parser = defusedxml.ElementTree.XMLParser(target=_Nothing(), forbid_dtd=True)
+        parser.parser.DefaultHandlerExpand = None  # is called for each blank and text, and has nothing to do here
         parser.feed(content)
         parser.close()
     except ParseError as e:
