@@ -6,7 +6,7 @@ FMUs that a process may instantiate only once, and connections whose ports do no
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
@@ -125,6 +125,14 @@ class System:
         unit = PlacedUnit(name, description, start, period, description.sampled if sampled is None else sampled)
         self.units[name] = unit
         return unit
+
+    def set_step(self, period: Fraction) -> None:
+        """Give all units one communication step in seconds; sampled FMUs tick by themselves at their own period.
+
+        Raises:
+            TypeError: it is not exact.
+        """
+        self.units = {n: replace(u, period=self._period(n, period)) for n, u in self.units.items()}
 
     def connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
         """Let an output feed an input.

@@ -8,6 +8,7 @@ from handover.cosim.fmu.failures import UnitHung, UnitTerminated
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
+from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
@@ -49,6 +50,8 @@ def run_task(
     failure: UnitFailure | None = None
     clock = spent.clock()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
+    if task.options.algorithm is Algorithm.JACOBI and experiment.parallel_step is not None:
+        system.set_step(experiment.parallel_step)
     if task.every is not None:
         check_states(system)
     master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())

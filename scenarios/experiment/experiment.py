@@ -119,6 +119,9 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     """Names of the metrics that summaries list first, in this order; a run need not have all of them."""
     is_seeded: ClassVar[bool] = True
     """Whether it draws random numbers, which follow from the seed."""
+    parallel_step: ClassVar[Fraction | None] = None
+    """Communication step, s, of all units where they step in parallel (Jacobi): each then hands on its results a step
+    late, which the loop must bear. None where it bears the steps that the units propose."""
 
     @classmethod
     def parameters(cls) -> tuple[Variable, ...]:

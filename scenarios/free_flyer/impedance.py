@@ -31,6 +31,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         "push": "Push",
         "robot": "FreeFlyer",
     }
+    parallel_step: ClassVar[Fraction | None] = Fraction(1, 500)
     headline: ClassVar[tuple[str, ...]] = (
         "greatest_position_error",
         "greatest_orientation_error",

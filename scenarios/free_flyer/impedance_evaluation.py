@@ -29,7 +29,8 @@ MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.
 class Motion:
     """The motion and the push at communication points, one row each, in W and SI units; quaternions scalar first.
 
-    The wrench `f_G`, `tau_G` of a row acted on the gripper from the row before until this one.
+    The wrench `f_G`, `tau_G` of a row is the mean since the row before. It acted on the gripper in that step, or where
+    units step in parallel, a step later.
     """
 
     t: Floats
@@ -86,8 +87,16 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     Velocities are twists, so B_x x'' + C_x x' - f_ext is the propulsion's wrench, taken at the gripper: what changes
     the body's momentum, less the push. It is computed as the mean over a step, with the push's impulse. All else
     is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
-    the mean is turned back by half the step's turn.
+    the mean is turned back by half the step's turn. Whether the push acted at once or a step later is seen in the
+    motion: where it begins, the wrong one is off by the whole push.
     """
+    at_once = _errors(motion, motion.f_G[1:], motion.tau_G[1:], p_WG_goal, behaviour)
+    later = _errors(motion, motion.f_G[:-1], motion.tau_G[:-1], p_WG_goal, behaviour)
+    return min(at_once, later, key=lambda errors: sum(errors.disagreement))
+
+
+def _errors(motion: Motion, f_G: Floats, tau_G: Floats, p_WG_goal: Floats, behaviour: Behaviour) -> Errors:
+    """Return the errors where this push acted, one row a step."""
     from scipy.spatial.transform import Rotation
 
     body = paper_values("free_flyer", "robot")
@@ -96,7 +105,7 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     I_B: Floats = np.array(body["I_B"])
     R_WB = Rotation.from_quat(motion.q_WB, scalar_first=True)
     r_W: Floats = R_WB.apply(np.array(body["p_BG"]))
-    force, torque = _propulsion(motion, R_WB, r_W, m, I_B)
+    force, torque = _propulsion(motion, f_G, tau_G, R_WB, r_W, m, I_B)
     v, w = motion.v_WG[:-1], motion.w_WB[:-1]
     torque_G: Floats = torque - np.cross(r_W[:-1], force) + gains["k_B_rotational"] * w
     softness_R: Floats = np.linalg.inv(I_B) / gains["k_D_rotational"]
@@ -109,7 +118,9 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     )
 
 
-def _propulsion(motion: Motion, R_WB: "Rotation", r_W: Floats, m: float, I_B: Floats) -> tuple[Floats, Floats]:
+def _propulsion(
+    motion: Motion, f_G: Floats, tau_G: Floats, R_WB: "Rotation", r_W: Floats, m: float, I_B: Floats
+) -> tuple[Floats, Floats]:
     """Return force, and torque about B, of the propulsion in W at the beginning of each step."""
     from scipy.spatial.transform import Rotation
 
@@ -117,9 +128,8 @@ def _propulsion(motion: Motion, R_WB: "Rotation", r_W: Floats, m: float, I_B: Fl
     v_WB = motion.v_WG - np.cross(motion.w_WB, r_W)
     w_B: Floats = R_WB.apply(motion.w_WB, inverse=True)
     L_W: Floats = R_WB.apply(_times(I_B, w_B))
-    f_G = motion.f_G[1:]
     force: Floats = m * np.diff(v_WB, axis=0) / dt - f_G
-    torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - motion.tau_G[1:]
+    torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - tau_G
     half_turn = Rotation.from_rotvec((motion.w_WB[:-1] + motion.w_WB[1:]) * dt / 4)
     return half_turn.apply(force, inverse=True), half_turn.apply(torque, inverse=True)
 
