@@ -4,6 +4,7 @@ An archive from elsewhere is checked before anything is unpacked: no member may 
 or be unreadable (`archive_faults`). Archives that are written have the same bytes for the same files (`write_archive`).
 """
 
+import contextlib
 import io
 import os
 import re
@@ -11,8 +12,8 @@ import stat
 import uuid
 import zipfile
 import zlib
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import ClassVar
 
@@ -27,15 +28,19 @@ _MAX_FILES = 100_000
 _MAX_BYTES = 16 << 30
 _SUSPECT_BYTES, _SUSPECT_RATIO = 256 * _MIB, 200  # libraries and tables shrink to a tenth, rarely to a hundredth
 _MAX_REPORTED = 5
+_TOP = "./"
+"""The folder itself, which some tools pack."""
 
 
 def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
-    """Return why an archive of `size` bytes must not be unpacked, a line for each kind of fault."""
+    """Return why an archive of `size` bytes must not be unpacked, as far as its list of members shows.
+
+    There is a line for each kind of fault.
+    """
     names = [m.orig_filename for m in members]
     plain = {n for n in names if not n.endswith("/")}
     kinds: tuple[tuple[str, Iterable[str]], ...] = (
         ("paths that lead out of it; they must be relative, with slashes", filter(_escapes_root, names)),
-        ("the same path twice", (n for n, count in Counter(names).items() if count > 1)),
         ("symbolic links or devices; store the files themselves", (m.orig_filename for m in members if _special(m))),
         ("encrypted files; store them without a password", (m.orig_filename for m in members if m.flag_bits & 0x1)),
         (
@@ -64,8 +69,9 @@ def _size_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
 
 
 def _escapes_root(name: str) -> bool:
+    is_nameless = name != _TOP and not name.strip("./")
     windows = "\\" in name or ":" in name  # ordinary characters elsewhere; on Windows they lead to other folders
-    return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or not name.strip("./")
+    return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or is_nameless
 
 
 def _special(member: zipfile.ZipInfo) -> bool:
@@ -117,12 +123,41 @@ class FmuArchive:
         faults = archive_faults(self._members, path.stat().st_size)
         if faults:
             raise InvalidFmu(path, "; ".join(faults))
-        self.names = tuple(m.orig_filename for m in self._members)
+        self._check_copies()
+        self.names = tuple(dict.fromkeys(m.orig_filename for m in self._members if m.orig_filename != _TOP))
+        self._by_name = {m.orig_filename: m for m in self._members}
+        self._opened: zipfile.ZipFile | None = None
 
     @property
     def outdated_methods(self) -> tuple[str, ...]:
         """Members in a compression that the standards do not allow: they must be stored or deflated."""
         return tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
+
+    def _check_copies(self) -> None:
+        """Check that members of one path have one content."""
+        by_name: dict[str, list[zipfile.ZipInfo]] = defaultdict(list)
+        for member in self._members:
+            by_name[member.orig_filename].append(member)
+        different = [n for n, copies in by_name.items() if len(copies) > 1 and not self._are_alike(copies)]
+        if different:
+            raise InvalidFmu(
+                self.path,
+                f"the archive holds the same path twice, with different contents: {listed(sorted(different))}",
+            )
+
+    def _are_alike(self, copies: Sequence[zipfile.ZipInfo]) -> bool:
+        first, *others = copies
+        return all(self._same(first, other) for other in others)
+
+    def _same(self, one: zipfile.ZipInfo, other: zipfile.ZipInfo) -> bool:
+        try:
+            with zipfile.ZipFile(self.path) as z, z.open(one) as a, z.open(other) as b:
+                while block := a.read(_MIB):
+                    if block != b.read(_MIB):
+                        return False
+                return not b.read(1)
+        except _DAMAGE as e:
+            raise InvalidFmu(self.path, f"the archive is damaged: {one.filename}: {one_line(e)}") from e
 
     def description(self) -> bytes:
         """Return the content of modelDescription.xml, or of another kind of archive's description.
@@ -143,6 +178,23 @@ class FmuArchive:
             reason = f"the archive holds {listed(self.names) or 'nothing'}"
         raise InvalidFmu(self.path, f"no {expected} at the top of the archive: {reason}")
 
+    @contextlib.contextmanager
+    def opened(self) -> Generator[None, None, None]:
+        """Keep the file open for many calls of `read`, as opening it reads its list of members each time.
+
+        Raises:
+            InvalidFmu: it is damaged.
+        """
+        try:
+            self._opened = zipfile.ZipFile(self.path)
+        except _DAMAGE as e:
+            raise InvalidFmu(self.path, f"the archive is damaged: {one_line(e)}") from e
+        try:
+            yield
+        finally:
+            self._opened.close()
+            self._opened = None
+
     def read(self, name: str) -> bytes:
         """Return a text member's content.
 
@@ -150,7 +202,7 @@ class FmuArchive:
             InvalidFmu: it is damaged, or longer than 512 MiB.
         """
         try:
-            with zipfile.ZipFile(self.path) as z:
+            with contextlib.nullcontext(self._opened) if self._opened else zipfile.ZipFile(self.path) as z:
                 size = z.getinfo(name).file_size
                 if size > _MAX_TEXT:
                     raise InvalidFmu(self.path, f"{name} has {size / _MIB:.0f} MiB; at most 512 MiB are read")
@@ -160,7 +212,7 @@ class FmuArchive:
 
     def size(self, name: str) -> int:
         """Return a member's unpacked size in bytes."""
-        return next(m.file_size for m in self._members if m.orig_filename == name)
+        return self._by_name[name].file_size
 
     def head(self, name: str, size: int) -> bytes:
         """Return the first bytes of a member.

@@ -28,6 +28,17 @@ class SspArchive:
         self.path = path
         with _ssp_errors(path):
             self._packed = _Packed(path)
+        self._files = frozenset(n for n in self._packed.names if not n.endswith("/"))
+
+    @contextmanager
+    def opened(self) -> Generator[None, None, None]:
+        """Keep the file open while many members are read.
+
+        Raises:
+            InvalidSsp: it is damaged.
+        """
+        with _ssp_errors(self.path), self._packed.opened():
+            yield
 
     def structure(self) -> bytes:
         """Return SystemStructure.ssd.
@@ -70,9 +81,8 @@ class SspArchive:
         member = posixpath.normpath(unquote(parts.path))
         if member.split("/")[0] == "..":
             raise ValueError(f"{uri!r} leads out of the SSP")
-        files = [n for n in self._packed.names if not n.endswith("/")]
-        if member not in files:
-            raise ValueError(f"there is no {member!r} in the SSP; {nearest(member, files)}")
+        if member not in self._files:
+            raise ValueError(f"there is no {member!r} in the SSP; {nearest(member, self._files)}")
         return member
 
 

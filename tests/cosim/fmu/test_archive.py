@@ -4,6 +4,7 @@ import os
 import struct
 import tracemalloc
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,10 +64,45 @@ def test_links_are_refused(tmp_path: Path):
     assert "symbolic links" in refusal(tmp_path, packed("binaries/x", adjust=link))
 
 
-def test_one_path_twice_is_refused(tmp_path: Path):
-    with pytest.warns(UserWarning, match="Duplicate name"):
-        content = packed("resources/a", "resources/a")
-    assert "the same path twice: resources/a" in refusal(tmp_path, content)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+@pytest.mark.parametrize(("first", "second"), [(b"x", b"y"), (b"x", b"xx"), (b"x" * 10, b"y" * 10)])
+def test_one_path_twice_with_different_contents_is_refused(tmp_path: Path, first: bytes, second: bytes):
+    assert "the same path twice, with different contents: resources/a" in refusal(tmp_path, doubled(first, second))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_contents_of_one_length_and_checksum_are_compared_byte_by_byte(tmp_path: Path):
+    """Whoever makes two such contents must not be able to show one and unpack the other."""
+    assert zlib.crc32(b"plumless") == zlib.crc32(b"buckeroo")
+    content = doubled(b"plumless", b"buckeroo")
+    assert "the same path twice, with different contents: resources/a" in refusal(tmp_path, content)
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_one_path_twice_with_the_same_content_is_unpacked_once(tmp_path: Path):
+    file = tmp_path / "a.fmu"
+    file.write_bytes(doubled(b"same", b"same"))
+    archive = FmuArchive(file)
+    archive.unpack(tmp_path / "target")
+    assert archive.names.count("resources/a") == 1
+    assert (tmp_path / "target" / "resources" / "a").read_bytes() == b"same"
+
+
+def doubled(*contents: bytes) -> bytes:
+    made = io.BytesIO(packed())
+    with zipfile.ZipFile(made, "a", zipfile.ZIP_DEFLATED) as archive:
+        for content in contents:
+            archive.writestr("resources/a", content)
+    return made.getvalue()
+
+
+def test_an_entry_of_the_folder_itself_is_harmless(tmp_path: Path):
+    file = tmp_path / "a.fmu"
+    file.write_bytes(packed("./"))
+    archive = FmuArchive(file)
+    archive.unpack(tmp_path / "target")
+    assert "./" not in archive.names
+    assert (tmp_path / "target" / "resources" / "table.csv").is_file()
 
 
 def test_a_file_that_is_also_a_folder_is_refused(tmp_path: Path):
