@@ -128,7 +128,11 @@ class PlanStepper:
                 raise Abandoned
             leave = True
             if not watched:
-                points = min(2 * points, _MAX_STEPS, self._room) if time.perf_counter() - began < _STRETCH else max(points // 2, 1)
+                points = (
+                    min(2 * points, _MAX_STEPS, self._room)
+                    if time.perf_counter() - began < _STRETCH
+                    else max(points // 2, 1)
+                )
 
     def publish_cpu_times(self) -> None:
         """Hand over to the ensemble the CPU times that the loop has measured."""

@@ -1,10 +1,11 @@
 """Reads SystemStructure.ssd and the parameter files that it refers to."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
+from handover.cosim.fmu.default_experiment import proposed_step
 from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.parameter_set import (
@@ -24,7 +25,15 @@ from handover.cosim.ssp.structure import (
     SspNestedSystem,
     SspStructure,
 )
-from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, SspPart, local, short_name
+from handover.cosim.ssp.xml import (
+    OMS_ANNOTATION,
+    OSP_ANNOTATION,
+    STEP_ANNOTATION,
+    STRUCTURE,
+    SspPart,
+    local,
+    short_name,
+)
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 SET_TYPE = "application/x-ssp-parameter-set"
@@ -32,6 +41,12 @@ MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
 _PERIOD = re.compile(r"[1-9]\d{0,11}(/[1-9]\d{0,11})?")
 """Seconds as `write_ssp` writes them; limited in length, as longer fractions could take long to compute with."""
+
+_MAX_NAME = 255
+"""Characters of an element's name: units keep it in fixed buffers, and files may be called by it."""
+
+_SHORTEST = 1e-12
+"""Seconds; a shorter step would be lost in the rounding of times."""
 
 _NO_TYPES = ("ConnectorGeometry", "Annotations", "Dimension", "MetaData", "Signature")
 """Children of a connector that are not its type."""
@@ -43,13 +58,20 @@ def read_structure(archive: SspArchive) -> SspStructure:
     Raises:
         InvalidSsp: it is malformed, or refers to what is missing or not supported.
     """
-    part = SspPart(archive.path, STRUCTURE, archive.structure(), "ssd:SystemStructureDescription")
-    systems = list(part.children(part.root, "ssd:System"))
-    if len(systems) != 1:
-        raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")
-    reader = _Reader(archive, part, read_units(part, part.root, "ssd"))
-    system = reader.system(systems[0])
-    return SspStructure(part.text(part.root, "name"), system, _stop(part))
+    with archive.opened():
+        part = SspPart(archive.path, STRUCTURE, archive.structure(), "ssd:SystemStructureDescription")
+        systems = list(part.children(part.root, "ssd:System"))
+        if len(systems) != 1:
+            raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")
+        reader = _Reader(archive, part, read_units(part, part.root, "ssd"))
+        system = reader.system(systems[0])
+        return SspStructure(
+            part.text(part.root, "name"),
+            system,
+            _stop(part),
+            _annotated_period(part, systems[0], "parallel"),
+            _step_of_others(part, systems[0]),
+        )
 
 
 def _stop(part: SspPart) -> float | None:
@@ -63,6 +85,47 @@ def _stop(part: SspPart) -> float | None:
                 raise part.fault(experiment, f"the default experiment ends at {stop:g} s; above 0 s is right")
             return stop
     return None
+
+
+def _annotated_period(part: SspPart, e: XmlElement, name: str) -> Fraction | None:
+    """Return an attribute of the annotation in which `write_ssp` keeps a communication step."""
+    for child in _annotated(part, e, STEP_ANNOTATION):
+        given = child.get(name)
+        if not _PERIOD.fullmatch(given):
+            raise part.fault(child, f"{name}={given[:80]!r} is not a number of seconds such as 1/30")
+        return Fraction(given)
+    return None
+
+
+def _annotated(part: SspPart, e: XmlElement, kind: str) -> Iterator[XmlElement]:
+    """Yield what the annotations of one kind hold of an element."""
+    for annotation in part.children(e, "ssd:Annotations", "ssc:Annotation"):
+        if annotation.get("type") == kind:
+            yield from annotation.children
+
+
+def _step_of_others(part: SspPart, system: XmlElement) -> Fraction | None:
+    """Return the communication step that is annotated for OMSimulator, or else for libcosim."""
+    holders = [*_annotated(part, system, OMS_ANNOTATION)]
+    for experiment in part.children(part.root, "ssd:DefaultExperiment"):
+        holders += _annotated(part, experiment, OSP_ANNOTATION)
+        if "stepSize" in experiment.attributes:
+            holders.append(experiment)
+    steps = [step for holder in holders for step in _steps(part, holder)]
+    return next(iter(steps), None)
+
+
+def _steps(part: SspPart, e: XmlElement) -> Iterator[Fraction | None]:
+    for name in ("stepSize", "baseStepSize"):
+        if name in e.attributes:
+            given, step = e.attributes[name], part.number(e, name)
+            if not step >= _SHORTEST:
+                raise part.fault(
+                    e, f"{name}={given[:80]!r} is no communication step; a number from 1e-12 s on is right"
+                )
+            yield proposed_step(step)
+    for child in e.children:
+        yield from _steps(part, child)
 
 
 class _Reader:
@@ -84,7 +147,10 @@ class _Reader:
         )
 
     def _element(self, e: XmlElement) -> SspComponent | SspNestedSystem:
-        name = local(e.tag)
+        name, called = local(e.tag), e.get("name")
+        if len(called) > _MAX_NAME:
+            text = f"a name of {len(called)} characters, {called[:20]!r}...; at most {_MAX_NAME} are taken"
+            raise self._part.fault(e, text)
         if name == "System":
             return self.system(e)
         if name == "Component":
@@ -110,15 +176,9 @@ class _Reader:
 
     def _annotated_step(self, e: XmlElement) -> tuple[Fraction | None, bool | None]:
         """Return the communication step of a component, and whether it is sampled, as `write_ssp` annotates them."""
-        for annotation in self._part.children(e, "ssd:Annotations", "ssc:Annotation"):
-            if annotation.get("type") != STEP_ANNOTATION:
-                continue
-            for c in annotation.children:
-                given = c.get("period")
-                if not _PERIOD.fullmatch(given):
-                    raise self._part.fault(c, f"period={given[:80]!r} is not a number of seconds such as 1/30")
-                return Fraction(given), self._part.flag(c, "sampled")
-        return None, None
+        period = _annotated_period(self._part, e, "period")
+        sampled = [self._part.flag(child, "sampled") for child in _annotated(self._part, e, STEP_ANNOTATION)]
+        return period, sampled[0] if sampled else None
 
     def _connectors(self, e: XmlElement) -> dict[str, SspConnector]:
         part = self._part
@@ -139,8 +199,8 @@ class _Reader:
             if indices in e.attributes:
                 raise part.fault(e, f"{indices} is not supported; whole connectors can be connected")
         return SspConnection(
-            SspEnd(e.attributes.get("startElement"), part.text(e, "startConnector")),
-            SspEnd(e.attributes.get("endElement"), part.text(e, "endConnector")),
+            SspEnd(e.get("startElement") or None, part.text(e, "startConnector")),
+            SspEnd(e.get("endElement") or None, part.text(e, "endConnector")),
             read_linear(part, e),
             part.flag(e, "suppressUnitConversion"),
             part.where(e, ""),

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
-from handover.cosim.fmu.default_experiment import exact_seconds
+from handover.cosim.fmu.default_experiment import exact_seconds, proposed_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.connected_ports import entry_names, find_entry, split_arrays
@@ -145,12 +145,13 @@ class SspFile:
     Args:
         path: the file.
         step: communication step of all units, s; without it each has the one of an annotation by `write_ssp`, or
-            else the one that its FMU proposes.
+            else the one that its FMU proposes, or that is annotated for OMSimulator or libcosim.
 
     Attributes:
         name: the system's name.
         system: the system, checked.
         stop: the stop time of its default experiment, s, if it has one.
+        parallel_step: communication step of all units where they step in parallel, s, if `write_ssp` annotated one.
 
     Raises:
         InvalidSsp: with all that is wrong with it.
@@ -161,11 +162,17 @@ class SspFile:
         structure = read_structure(archive)
         self.path, self.name = path, structure.name
         self.stop = None if structure.stop is None else exact_seconds(structure.stop)
+        self.parallel_step = structure.parallel_step
         self._folder = tempfile.TemporaryDirectory(prefix="handover-ssp-", ignore_cleanup_errors=True)
         try:
             archive.unpack(Path(self._folder.name))
             descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
-            self.system = self._build(flatten(structure.system, descriptions), descriptions, step)
+            flat = flatten(structure.system, descriptions)
+            steps = {
+                n: step or c.period or (None if proposed_step(descriptions[n].step) else structure.step)
+                for n, c in flat.components.items()
+            }
+            self.system = self._build(flat, descriptions, steps)
         except BaseException:
             self.close()
             raise
@@ -198,7 +205,9 @@ class SspFile:
                 raise InvalidSsp(self.path, [f"{member}: {e.fault}"]) from e
         return {name: described[member] for name, member in members.items()}
 
-    def _build(self, flat: FlatSystem, descriptions: dict[str, FmuDescription], step: Fraction | None) -> System:
+    def _build(
+        self, flat: FlatSystem, descriptions: dict[str, FmuDescription], steps: Mapping[str, Fraction | None]
+    ) -> System:
         faults = list(flat.faults)
         starts, partly = dict[str, dict[str, object]](), dict[str, set[str]]()
         for unit, given in flat.given.items():
@@ -213,7 +222,7 @@ class SspFile:
         system = System()
         for name, component in flat.components.items():
             path = Path(self._folder.name) / component.member
-            unit = system.add(name, path, period=step or component.period, sampled=component.sampled)
+            unit = system.add(name, path, period=steps[name], sampled=component.sampled)
             description = split_arrays(descriptions[name], grouping.apart.get(name, ()))
             system.units[name] = replace(unit, description=description, start=starts.get(name, {}))
         for source, target, linear in grouping.wires:

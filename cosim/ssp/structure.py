@@ -74,8 +74,14 @@ class SspNestedSystem(SspElement):
 
 @dataclass(frozen=True)
 class SspStructure:
-    """The whole: its name, its outermost system, and the stop time of its default experiment, s."""
+    """The whole: its name, its outermost system, and the stop time of its default experiment, s.
+
+    `parallel_step` is the communication step of all units where they step in parallel, if `write_ssp` annotated one.
+    `step` is the one that OMSimulator or libcosim would take, if it is annotated for them. Both are in seconds.
+    """
 
     name: str
     system: SspNestedSystem
     stop: float | None
+    parallel_step: Fraction | None = None
+    step: Fraction | None = None

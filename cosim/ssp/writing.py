@@ -15,8 +15,18 @@ from handover.cosim.fmu.archive import write_archive
 from handover.cosim.fmu.default_experiment import proposed_step
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names, ports_of
-from handover.cosim.ssp.xml import STEP_ANNOTATION, STRUCTURE, document, root_element
+from handover.cosim.ssp.xml import (
+    OMS_ANNOTATION,
+    OMS_NAMESPACE,
+    OSP_ANNOTATION,
+    OSP_NAMESPACE,
+    STEP_ANNOTATION,
+    STRUCTURE,
+    document,
+    root_element,
+)
 from handover.cosim.system.conversion import LinearTransformation
+from handover.cosim.system.schedule import common_divisor
 from handover.cosim.system.system import Connection, PlacedUnit, System
 
 Items = tuple[tuple[str, int], ...]
@@ -125,11 +135,14 @@ def _texts(port: FmuPort, value: Any) -> list[str]:
     return [repr(float(x)) if port.kind is Kind.REAL else str(int(x)) for x in numbers]
 
 
-def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = None) -> Path:
+def write_ssp(
+    system: System, path: Path, name: str, stop: Fraction | None = None, parallel_step: Fraction | None = None
+) -> Path:
     """Write a system with its FMUs and start values as an SSP; it appears complete or not at all.
 
     It is of version 1.0 if all units are of FMI 2, else of 2.0. A communication step other than the one that an FMU
-    proposes is written to an annotation, which other tools may ignore. A conversion of units is written as a linear
+    proposes is written to an annotation, which other tools may ignore; the steps for tools that step all units in
+    parallel are annotated as OMSimulator, libcosim and Ecos read them. A conversion of units is written as a linear
     transformation, as not every tool converts.
 
     Args:
@@ -137,6 +150,7 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
         path: the file.
         name: the system's name.
         stop: the stop time of its default experiment, s.
+        parallel_step: communication step of all units where they step in parallel, s; each keeps its own without.
 
     Raises:
         WiringError: the system has faults.
@@ -153,7 +167,7 @@ def write_ssp(system: System, path: Path, name: str, stop: Fraction | None = Non
     bound = {n: u for n, u in system.units.items() if bound_values(u)}
     sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
     contents |= {sets[n]: parameter_set(u, version, name) for n, u in bound.items()}
-    contents[STRUCTURE] = _Structure(system, version, files, sets).content(name, stop)
+    contents[STRUCTURE] = _Structure(system, version, files, sets, parallel_step).content(name, stop)
     return write_archive(path, contents)
 
 
@@ -173,8 +187,13 @@ def _plain(name: str) -> str:
 
 
 class _Structure:
-    def __init__(self, system: System, version: str, files: Mapping[Path, str], sets: Mapping[str, str]) -> None:
+    def __init__(
+        self, system: System, version: str, files: Mapping[Path, str], sets: Mapping[str, str],
+        parallel_step: Fraction | None,
+    ) -> None:  # fmt: skip
         self._system, self._version, self._files, self._sets = system, version, files, sets
+        self._parallel_step = parallel_step
+        self._base = parallel_step or common_divisor([u.period for u in system.units.values()])
         self._connected = {end for c in system.connections for end in (c.source, c.target)}
         self._types = DescribedTypes(p for u in system.units.values() for p in self._shown(u))
 
@@ -186,11 +205,25 @@ class _Structure:
         for unit in self._system.units.values():
             self._add_component(elements, unit)
         self._add_connections(system)
+        self._add_master(system)
         self._types.add_enumerations(root, "ssd")
         self._types.add_units(root, "ssd")
-        if stop is not None:
-            ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(stop)))
+        until = {} if stop is None else {"stopTime": repr(float(stop))}
+        experiment = ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", **until)
+        annotation = _annotation(ET.SubElement(experiment, "ssd:Annotations"), OSP_ANNOTATION)
+        algorithm = ET.SubElement(annotation, "osp:Algorithm", {"xmlns:osp": OSP_NAMESPACE})
+        ET.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(float(self._base)))
         return document(root)
+
+    def _add_master(self, system: ET.Element) -> None:
+        """Add the step of a master that steps all units in parallel: OMSimulator imports no system without."""
+        annotations = ET.SubElement(system, "ssd:Annotations")
+        oms = ET.SubElement(_annotation(annotations, OMS_ANNOTATION), "oms:Annotations", {"xmlns:oms": OMS_NAMESPACE})
+        step = {"description": "oms-ma", "stepSize": repr(float(self._base))}
+        tolerances = {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}
+        ET.SubElement(ET.SubElement(oms, "oms:SimulationInformation"), "oms:FixedStepMaster", {**step, **tolerances})
+        if self._parallel_step is not None:
+            _add_step(annotations, parallel=str(self._parallel_step))
 
     def _shown(self, unit: PlacedUnit) -> list[FmuPort]:
         """Return a unit's inputs and outputs, of the enumerations only what is connected: see `bound_values`."""
@@ -217,11 +250,11 @@ class _Structure:
         if unit.name in self._sets:
             bindings = ET.SubElement(component, "ssd:ParameterBindings")
             ET.SubElement(bindings, "ssd:ParameterBinding", source=self._sets[unit.name])
+        annotations = ET.SubElement(component, "ssd:Annotations")
         if (unit.period, unit.sampled) != (proposed_step(d.step), d.sampled):
-            annotations = ET.SubElement(component, "ssd:Annotations")
-            annotation = ET.SubElement(annotations, "ssc:Annotation", type=STEP_ANNOTATION)
-            step = {"period": str(unit.period), "sampled": str(unit.sampled).lower()}
-            ET.SubElement(annotation, "Step", {"xmlns": "urn:handover:communication", **step})
+            _add_step(annotations, period=str(unit.period), sampled=str(unit.sampled).lower())
+        hint = {"xmlns:osp": OSP_NAMESPACE, "value": repr(float(self._parallel_step or unit.period))}
+        ET.SubElement(_annotation(annotations, OSP_ANNOTATION), "osp:StepSizeHint", hint)
 
     def _add_connections(self, system: ET.Element) -> None:
         connections, clocks = self._system.connections, self._system.clock_connections()
@@ -251,6 +284,16 @@ class _Structure:
         units = self._system.units
         a, b = units[c.source.unit].description, units[c.target.unit].description
         return a.outputs[c.source.port], b.inputs[c.target.port]
+
+
+def _annotation(annotations: ET.Element, kind: str) -> ET.Element:
+    return ET.SubElement(annotations, "ssc:Annotation", type=kind)
+
+
+def _add_step(annotations: ET.Element, **step: str) -> None:
+    """Add this package's own annotation of a communication step."""
+    annotation = _annotation(annotations, STEP_ANNOTATION)
+    ET.SubElement(annotation, "Step", {"xmlns": "urn:handover:communication", **step})
 
 
 def _add_connection(parent: ET.Element, ends: dict[str, str], linear: LinearTransformation | None) -> None:

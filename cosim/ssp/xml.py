@@ -29,7 +29,20 @@ STRUCTURE = "SystemStructure.ssd"
 """The file at the top of an SSP's archive."""
 
 STEP_ANNOTATION = "handover.communication"
-"""Type of the annotation of a component whose communication step is not the one that its FMU proposes."""
+"""Type of the annotation of a component whose communication step is not the one that its FMU proposes, and of a system
+whose units take another one where they step in parallel."""
+
+OMS_ANNOTATION, OMS_NAMESPACE = (
+    "org.openmodelica",
+    "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
+)
+"""Type of the annotations of OMSimulator, which imports no system without one, and their namespace."""
+
+OSP_ANNOTATION, OSP_NAMESPACE = (
+    "com.opensimulationplatform",
+    "http://opensimulationplatform.com/SSP/OSPAnnotations",
+)
+"""Type of the annotations that libcosim and Ecos read, and their namespace."""
 
 VERSIONS = ("1.0", "2.0")
 """Versions of SSP that can be read."""

@@ -45,7 +45,7 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
         instance = experiment()
         system = instance.build(values, seed, lambda unit: fmus[unit])
         try:
-            write_ssp(system, file, experiment.name, instance.stop_time(values))
+            write_ssp(system, file, experiment.name, instance.stop_time(values), experiment.parallel_step)
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
     click.echo(file)

@@ -58,8 +58,10 @@ def is_ssp(name: str) -> bool:
     return Path(name).suffix.lower() == ".ssp"
 
 
-def system_experiment(file_name: str, heading: str, system: System, stop: Fraction) -> Experiment[UntilStop]:
-    """Return a system from a file as an experiment that ends at a time, s."""
+def system_experiment(
+    file_name: str, heading: str, system: System, stop: Fraction, step: Fraction | None = None
+) -> Experiment[UntilStop]:
+    """Return a system from a file as an experiment that ends at a time, s; `step` is its `parallel_step`, s."""
 
     class SystemExperiment(Experiment[UntilStop]):
         """Runs the system as it is."""
@@ -70,6 +72,7 @@ def system_experiment(file_name: str, heading: str, system: System, stop: Fracti
         units: ClassVar[Mapping[str, str]] = {}
         headline: ClassVar[tuple[str, ...]] = ()
         is_seeded: ClassVar[bool] = False
+        parallel_step: ClassVar[Fraction | None] = step
 
         def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:  # noqa: ARG002
             return system
@@ -108,7 +111,8 @@ def open_experiment(
     until = stop or ssp.stop
     if until is None:
         raise UsageError(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
-    return system_experiment(path.name, f"{ssp.name}, a system from {path.name}", ssp.system, until)
+    heading = f"{ssp.name}, a system from {path.name}"
+    return system_experiment(path.name, heading, ssp.system, until, None if step else ssp.parallel_step)
 
 
 def naming_step(faults: Sequence[str]) -> list[str]:

@@ -27,7 +27,7 @@ def write_large_ssp(path: Path, n: int, *, seed: int = 1) -> Path:
         for name, kind in (*((u, "input") for u in _INPUTS), ("y", "output"))
     )
     components = (
-        f'<ssd:Component name="unit{i}" type="application/x-fmu-sharedlibrary" source="resources/{_UNITS[i % 2][0]}.fmu">'
+        f'<ssd:Component name="unit{i}" source="resources/{_UNITS[i % 2][0]}.fmu">'
         f"<ssd:Connectors>{connectors}</ssd:Connectors></ssd:Component>\n"
         for i in range(n)
     )

@@ -127,6 +127,7 @@ def test_what_is_wrong_with_an_fmu_is_reported_with_its_place_in_the_ssp(tmp_pat
             "<ssd:SignalDictionaryReference> is not supported",
         ),
         (component("a") * 2, "two elements are called 'a'"),
+        (component("a" * 5000), "line 3: a name of 5000 characters, 'aaaaaaaaaaaaaaaaaaaa'...; at most 255 are taken"),
         ('<ssd:System name="inner"/>', "there is no component"),
         (
             '<ssd:Component name="a"/>',
@@ -146,3 +147,27 @@ def test_whatever_a_description_holds_it_is_refused_or_read(tmp_path: Path, data
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     with contextlib.suppress(InvalidSsp):
         SspFile(pack_ssp(tmp_path / "a.ssp", None, {"SystemStructure.ssd": bytes(content)}))
+
+
+@pytest.mark.parametrize("given", ["NaN", "1e-300", "0", "-0.1", "INF", "1e999", "soon", ""])
+@pytest.mark.parametrize("name", ["stepSize", "baseStepSize", "attribute"])
+def test_a_step_that_is_none_is_refused_with_its_place(tmp_path: Path, name: str, given: str):
+    oms = f'<o:Master xmlns:o="urn:o" stepSize="{given}"/>'
+    osp = f'<p:Algorithm xmlns:p="urn:p"><p:Fixed baseStepSize="{given}"/></p:Algorithm>'
+    annotated = f"<ssd:Annotations>{annotation('org.openmodelica', oms)}</ssd:Annotations>"
+    more = f"<ssd:Annotations>{annotation('com.opensimulationplatform', osp)}</ssd:Annotations>"
+    whole = system(component("a"))
+    description = {
+        "stepSize": described(whole.replace("</ssd:System>", f"{annotated}</ssd:System>")),
+        "baseStepSize": described(whole, f"<ssd:DefaultExperiment>{more}</ssd:DefaultExperiment>"),
+        "attribute": described(whole, f'<ssd:DefaultExperiment stepSize="{given}"/>', version="2.0"),
+    }[name]
+    told = refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
+    assert told.startswith(f"SystemStructure.ssd, line {4 if name != 'stepSize' else 3}: ")
+    which = "stepSize" if name == "attribute" else name
+    assert f"{which}={given!r} is " in told
+    assert told.endswith(("is not a finite number", "is no communication step; a number from 1e-12 s on is right"))
+
+
+def annotation(kind: str, inside: str) -> str:
+    return f'<ssc:Annotation type="{kind}">{inside}</ssc:Annotation>'

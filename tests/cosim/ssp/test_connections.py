@@ -126,6 +126,19 @@ def test_systems_within_systems_are_taken_apart(opened: Open):
     assert wires(ssp) == {"b.y -> outer.inner.a.u": None, "outer.inner.a.y -> b.u": None}
 
 
+def test_an_empty_element_is_the_system_itself(opened: Open):
+    ends = connection("u", "a.u") + connection("a.y", "y")
+    empty = ends.replace('startConnector="u"', 'startElement="" startConnector="u"')
+    empty = empty.replace('endConnector="y"', 'endElement="" endConnector="y"')
+    assert empty.count('Element=""') == 2
+    found = [
+        wires(opened(system(component("a", PLAIN), each, name="inner", before=PLAIN) + component("b", PLAIN), outside))
+        for each in (ends, empty)
+        for outside in [connection("b.y", "inner.u") + connection("inner.y", "b.u")]
+    ]
+    assert found[0] == found[1] == {"b.y -> inner.a.u": None, "inner.a.y -> b.u": None}
+
+
 TWO = component("a", PLAIN) + component("b", PLAIN)
 
 

@@ -101,9 +101,31 @@ def test_a_step_that_is_not_the_fmu_s_own_is_kept_in_an_annotation(fmu: FmuOf, t
             "own": (STEP, False),
         }
     with zipfile.ZipFile(file) as archive:
-        assert archive.read("SystemStructure.ssd").count(b"ssc:Annotation ") == 1
+        assert archive.read("SystemStructure.ssd").count(b'ssc:Annotation type="handover.communication"') == 1
     with SspFile(file, Fraction(1, 5)) as ssp:
         assert {u.period for u in ssp.system.units.values()} == {Fraction(1, 5)}
+
+
+def test_other_tools_find_the_step_where_they_look_for_it(fmu: FmuOf, tmp_path: Path):
+    """OMSimulator at the system, libcosim and Ecos at the experiment and the components; by prefix."""
+    s = System()
+    s.add("slow", fmu("Mass", 2), period=Fraction(1, 4))
+    s.add("own", fmu("Spring", 2))
+    for parallel, base, hints in ((None, "0.05", ["0.25", "0.1"]), (Fraction(1, 50), "0.02", ["0.02", "0.02"])):
+        file = write_ssp(s, tmp_path / f"{base}.ssp", "a", parallel_step=parallel)
+        expect_valid(file, "1.0")
+        with zipfile.ZipFile(file) as archive:
+            written = " ".join(archive.read("SystemStructure.ssd").decode().split())
+        uri = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+        assert (
+            f'<ssc:Annotation type="org.openmodelica"> <oms:Annotations xmlns:oms="{uri}"> <oms:SimulationInformation> '
+            f'<oms:FixedStepMaster description="oms-ma" stepSize="{base}" absoluteTolerance="0.0001"'
+        ) in written
+        assert f'<osp:FixedStepAlgorithm baseStepSize="{base}" />' in written
+        assert re.findall('<osp:StepSizeHint [^>]* value="([^"]*)"', written) == hints
+        with SspFile(file) as ssp:
+            assert ssp.parallel_step == parallel
+            assert {n: u.period for n, u in ssp.system.units.items()} == {"slow": Fraction(1, 4), "own": STEP}
 
 
 def test_transformations_and_conversions_are_written_out(tmp_path: Path):
