@@ -200,6 +200,7 @@ class _Structure:
     def content(self, name: str, stop: Fraction | None) -> bytes:
         """Return SystemStructure.ssd."""
         root = root_element("ssd:SystemStructureDescription", self._version, name)
+        root.attrib.update({"xmlns:oms": OMS_NAMESPACE, "xmlns:osp": OSP_NAMESPACE})
         system = ET.SubElement(root, "ssd:System", name=name)
         elements = ET.SubElement(system, "ssd:Elements")
         for unit in self._system.units.values():
@@ -211,14 +212,14 @@ class _Structure:
         until = {} if stop is None else {"stopTime": repr(float(stop))}
         experiment = ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", **until)
         annotation = _annotation(ET.SubElement(experiment, "ssd:Annotations"), OSP_ANNOTATION)
-        algorithm = ET.SubElement(annotation, "osp:Algorithm", {"xmlns:osp": OSP_NAMESPACE})
+        algorithm = ET.SubElement(annotation, "osp:Algorithm")  # in which libcosim takes even an xmlns for one
         ET.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(float(self._base)))
         return document(root)
 
     def _add_master(self, system: ET.Element) -> None:
         """Add the step of a master that steps all units in parallel: OMSimulator imports no system without."""
         annotations = ET.SubElement(system, "ssd:Annotations")
-        oms = ET.SubElement(_annotation(annotations, OMS_ANNOTATION), "oms:Annotations", {"xmlns:oms": OMS_NAMESPACE})
+        oms = ET.SubElement(_annotation(annotations, OMS_ANNOTATION), "oms:Annotations")
         step = {"description": "oms-ma", "stepSize": repr(float(self._base))}
         tolerances = {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}
         ET.SubElement(ET.SubElement(oms, "oms:SimulationInformation"), "oms:FixedStepMaster", {**step, **tolerances})
@@ -253,8 +254,8 @@ class _Structure:
         annotations = ET.SubElement(component, "ssd:Annotations")
         if (unit.period, unit.sampled) != (proposed_step(d.step), d.sampled):
             _add_step(annotations, period=str(unit.period), sampled=str(unit.sampled).lower())
-        hint = {"xmlns:osp": OSP_NAMESPACE, "value": repr(float(self._parallel_step or unit.period))}
-        ET.SubElement(_annotation(annotations, OSP_ANNOTATION), "osp:StepSizeHint", hint)
+        hint = repr(float(self._parallel_step or unit.period))
+        ET.SubElement(_annotation(annotations, OSP_ANNOTATION), "osp:StepSizeHint", value=hint)
 
     def _add_connections(self, system: ET.Element) -> None:
         connections, clocks = self._system.connections, self._system.clock_connections()

@@ -29,11 +29,11 @@ Row = dict[str, float]
 class Job:
     """Units by name, how they are connected, how far to go, and by unit the values that are set before each step.
 
-    With an SSP, which has the units inside, start values and connections are those in it.
+    With an SSP, which has the units inside, start values and connections are those in it, and without a step that too.
     """
 
     units: Mapping[str, Placed]
-    step: Fraction
+    step: Fraction | None
     steps: int
     connections: Connections = ()
     driven: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict[str, Any])
@@ -67,7 +67,7 @@ class Job:
             for r, s in zip(output.references, input_.references, strict=True):
                 connections.append((KINDS[output.fmi_type], numbers[a], r, numbers[b], s))
         return {
-            "step": round(self.step * 10**9),
+            "step": None if self.step is None else round(self.step * 10**9),
             "steps": self.steps,
             "ssp": str(self.ssp) if self.ssp else "",
             "units": [self._unit(name, placed) for name, placed in self.units.items()],
