@@ -176,7 +176,8 @@ class Instance:
             UnitFailure: the status is above Warning.
         """
         if status == _DISCARD:
-            raise self.discarded(self._reached(dt), "steps are repeated shorter only with repeat_discarded")
+            how = "--repeat-discarded (repeat_discarded of MasterOptions)"
+            raise self.discarded(self._reached(dt), f"steps are repeated shorter only with {how}")
         if status == _PENDING:  # FMI 2: an asynchronous step, which is not supported
             self._function("CancelStep")(self._component)
         self.judge(self._step_call, status)

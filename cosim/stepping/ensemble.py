@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from handover.cosim.exceptions import CosimError
+from handover.cosim.exceptions import CosimError, InvalidFmu
 from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.failures import StartValuesLost, UnitTerminated
 from handover.cosim.fmu.fmpy_edge import unpack
@@ -312,7 +312,10 @@ class Ensemble:
             if d.path not in unpacked:
                 unpacked[d.path] = folder / str(len(unpacked))
                 unpack(d.path, unpacked[d.path], d.fmi, d.identifier)
-            instance = self._make(name, unpacked[d.path])
+            try:
+                instance = self._make(name, unpacked[d.path])
+            except InvalidFmu as e:
+                raise InvalidFmu(e.path, f"{name}: {e.fault}", e.log) from e
             instance.on_fatal = functools.partial(self._corrupt.add, d.path)
             self._cleanups.add(functools.partial(self._free, instance))
             self.instances[name] = instance

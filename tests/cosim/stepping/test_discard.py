@@ -48,7 +48,7 @@ def test_without_repetition_a_discarded_step_ends_the_run(fmi: int, came: str):
     assert failure.value.reached == pytest.approx(float(came))
     assert failure.value.headline == (
         f"short: fmi{fmi}DoStep at t = 0 s answered Discard, having reached t = {came} s; "
-        "steps are repeated shorter only with repeat_discarded"
+        "steps are repeated shorter only with --repeat-discarded (repeat_discarded of MasterOptions)"
     )
     assert failure.value.message.startswith("[Discard] a step of 0.1 s is longer than 0.04 s (steps are repeated")
 

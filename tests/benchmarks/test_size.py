@@ -1,0 +1,98 @@
+"""CPU time and memory of large systems and FMUs: an SSP read, checked, loaded and stepped 100 times, an FMU read.
+
+`pytest tests/benchmarks/test_size.py --benchmark-enable -s` prints them, and by what power of the size they grow.
+"""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from large_systems import write_large_fmu, write_large_ssp
+from pytest_benchmark.fixture import BenchmarkFixture
+
+pytest.importorskip("resource", reason="memory is told on Linux and macOS only")
+
+SIZES = (1_000, 3_000, 10_000)
+SECONDS, BYTES = 60.0, 2 << 30
+"""What 10,000 components may take."""
+
+_MEASURED = """
+import json, resource, sys, time
+from fractions import Fraction
+from pathlib import Path
+from handover.cosim.fmu import fmpy_edge
+from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.master.master import Master
+from handover.cosim.ssp.ssp_file import SspFile
+
+path, times = Path(sys.argv[1]), [time.process_time()]
+def lap():
+    times.append(time.process_time())
+if path.suffix == ".fmu":
+    describe_fmu(path)
+    lap()
+else:
+    with SspFile(path) as ssp:
+        lap()
+        master = Master(ssp.system)
+        lap()
+        with master:
+            lap()
+            master.run(Fraction(1))
+            lap()
+        lap()
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+print(json.dumps({"laps": [b - a for a, b in zip(times, times[1:])], "bytes": peak}))
+"""
+
+
+def measured(path: Path) -> tuple[list[float], int]:
+    """Return the CPU seconds of each part, and the peak memory, in a process of its own."""
+    done = subprocess.run([sys.executable, "-c", _MEASURED, str(path)], check=True, capture_output=True, text=True)
+    found = json.loads(done.stdout)
+    return found["laps"], found["bytes"]
+
+
+def growth(small: float, large: float) -> float:
+    """Return the power of the size by which a time grows from the least to the greatest size."""
+    return math.log(large / small) / math.log(SIZES[-1] / SIZES[0])
+
+
+@pytest.mark.slow
+def test_cpu_time_and_memory_of_large_systems(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
+    found: dict[int, tuple[list[float], int]] = {}
+
+    def measure() -> None:
+        for n in SIZES:
+            found[n] = measured(write_large_ssp(tmp_path / f"{n}.ssp", n))
+
+    benchmark.pedantic(measure, rounds=1)
+    print("\ncomponents  connections    read   check    load    step    free   CPU s      MB")
+    for n, (laps, peak) in found.items():
+        parts = "".join(f"{s:8.2f}" for s in laps)
+        print(f"{n:10}{3 * n:13}{parts}{sum(laps):8.2f}{peak / 2**20:8.0f}")
+    least, most = (sum(found[n][0]) for n in (SIZES[0], SIZES[-1]))
+    power = growth(least, most)
+    print(f"grows with the size to the power of {power:.2f}")
+    assert power < 1.5
+    assert most < SECONDS
+    assert found[SIZES[-1]][1] < BYTES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_cpu_time_and_memory_of_a_large_fmu(benchmark: BenchmarkFixture, tmp_path: Path, fmi: int) -> None:
+    found: dict[int, tuple[list[float], int]] = {}
+
+    def measure() -> None:
+        for n in (10 * size for size in SIZES):
+            found[n] = measured(write_large_fmu(tmp_path / f"{n}.fmu", n, fmi))
+
+    benchmark.pedantic(measure, rounds=1)
+    print(f"\nvariables, FMI {fmi}   CPU s      MB")
+    for n, (laps, peak) in found.items():
+        print(f"{n:16}{sum(laps):8.2f}{peak / 2**20:8.0f}")
+    assert growth(*(sum(found[10 * n][0]) for n in (SIZES[0], SIZES[-1]))) < 1.5
