@@ -132,7 +132,9 @@ class System:
         Raises:
             TypeError: it is not exact.
         """
-        self.units = {n: replace(u, period=self._period(n, period)) for n, u in self.units.items()}
+        self.units = {
+            n: replace(u, period=self._period(n, u.description.experiment, period)) for n, u in self.units.items()
+        }
 
     def connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
         """Let an output feed an input.

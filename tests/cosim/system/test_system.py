@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from native_units import native_fmu
 
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
@@ -168,3 +169,12 @@ def test_a_period_must_be_exact_and_above_0(fmu: FmuOf):
         s.add("mass", fmu("Mass"), period=inexact)
     s.add("mass", fmu("Mass"), period=Fraction(0))
     assert faults_of(s) == ("mass: its communication step is 0 s; give one that is above 0 s",)
+
+
+def test_all_units_get_one_step():
+    s = System()
+    s.add("slow", native_fmu("gain", 2), period=Fraction(1, 3))
+    s.add("own", native_fmu("gain", 3))
+    s.set_step(Fraction(1, 500))
+    assert {u.period for u in s.units.values()} == {Fraction(1, 500)}
+    s.check()
