@@ -176,8 +176,8 @@ def test_a_missing_checkpoint_is_reported(tmp_path: Path):
 def test_a_checkpoint_of_another_version_is_reported(tmp_path: Path):
     file = tmp_path / "checkpoint.zip"
     with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr("checkpoint.json", '{"format": 2}')
-    with pytest.raises(InvalidCheckpoint, match="of format 2; format 1 can be read"):
+        archive.writestr("checkpoint.json", '{"format": 1}')
+    with pytest.raises(InvalidCheckpoint, match="of format 1; format 2 can be read"):
         read_checkpoint(file)
 
 
