@@ -108,6 +108,8 @@ class RunServer:
         if heartbeat.status is not None:
             return _result(job, heartbeat, "")
         crash = Crash(heartbeat, end, time.monotonic() - began)
+        if crash.concluded is not None:
+            return JobResult(name=job.name)
         if crash.was_killed or end.signal in supervisor.TERMINATION_SIGNALS:
             return JobResult(name=job.name, lost=crash.message)
         run_folder, failure, spent = crash.folder, crash.failure, ElapsedTime(time.monotonic() - began, end.cpu)

@@ -59,6 +59,6 @@ def _write_of_run(run: RunFolder, page: Path, figures: bool) -> None:
     with run.held():
         RunFacts.read(run)  # before anything is completed: it may be no run's folder at all
         complete_signals(run)
-        if figures:
-            draw_run(run)
-        write_run_page(run, page)
+        faults = draw_run(run) if figures else []
+        for line in [*faults, *write_run_page(run, page)]:
+            click.echo(line, err=True)

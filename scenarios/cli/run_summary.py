@@ -12,11 +12,12 @@ from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.execution.crash import Crash
-from handover.scenarios.execution.exit_status import TASK_FAILED, UNIT_FAILED
+from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
 from handover.scenarios.results.summary import RunResult
 from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows
 from handover.scenarios.results.task import Task
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _MAX_CONVERSIONS = 8
 """Conversions of physical units that are listed at the end of a run."""
@@ -35,10 +36,11 @@ def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder)
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)
     print_rows(console, rows)
-    place = f"report: {folder.report}" if folder.report.exists() else f"results: {folder.path}"
+    shown = folder.shown
+    place = f"report: {shown / folder.report.name}" if folder.report.exists() else f"results: {shown}"
     console.print(place, markup=False, soft_wrap=True)
     if folder.checkpoint.exists():
-        console.print(f"to resume: handover resume {shlex.quote(str(folder.path))}", markup=False, soft_wrap=True)
+        console.print(f"to resume: handover resume {shlex.quote(str(shown))}", markup=False, soft_wrap=True)
 
 
 def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
@@ -52,8 +54,10 @@ def exit_with(result: RunResult, task: Task) -> NoReturn:
     """Print how a run ended, and exit with the status for that."""
     if result.failure:
         click.echo(str(result.failure), err=True)
+    for line in result.left_out:
+        click.echo(line, err=True)
     print_summary(result, task.experiment.headline, task.folder)
-    sys.exit(UNIT_FAILED if result.failure else 0 if result.outcome.success else TASK_FAILED)
+    sys.exit(status_of_run(unit_failed=result.failure is not None, succeeded=result.outcome.success))
 
 
 _SIGNAL_STATUS = 128  # shells add it to a signal's number
@@ -65,16 +69,28 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
     For the arguments see `Crash`.
     """
     crash = Crash(heartbeat, end, wall)
+    if crash.concluded is not None:
+        sys.stderr.write(f"{crash.message}; the run had ended before, and stays as it is\n")
+        return crash.concluded
     sys.stderr.write(f"{crash.message}\n")
     if crash.folder is None:
         return UNIT_FAILED if crash.failure is not None else _SIGNAL_STATUS + (end.signal or 0)
     try:
         result = crash.complete(crash.folder)
-        from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
-
-        with disk_errors_reported(crash.folder.path):
-            write_run_page(crash.folder)
+        if crash.presented:
+            _write_page(crash.folder)
         print_summary(result, (), crash.folder)
     except RecordNotWritten as e:
         sys.stderr.write(f"{e}\n")
     return UNIT_FAILED
+
+
+def _write_page(folder: RunFolder) -> None:
+    """Write the page of a run that crashed, and print what could not be shown in it."""
+    from handover.scenarios.reporting.run_page import write_run_page  # its plots take long to load
+
+    faults = ToleratedFaults()
+    with disk_errors_reported(folder.path), faults.tolerated("the report could not be written"):
+        faults.lines += write_run_page(folder)
+    for line in faults.lines:
+        sys.stderr.write(f"{line}\n")

@@ -38,7 +38,19 @@ class Crash:
         self._end, self._wall, self._time, self._call = end, wall, heartbeat.time, heartbeat.under_way
         self.failure = _failure(heartbeat, self._call, end)
         self.message = _crash_message(self._call, self._time, end) if self.failure is None else str(self.failure)
-        self.folder = RunFolder.of_run(Path(self.facts["folder"])) if "folder" in self.facts else None
+        self.folder = None
+        if "folder" in self.facts:
+            self.folder = RunFolder.of_run(Path(self.facts["folder"]), Path(self.facts["shown"]))
+
+    @property
+    def presented(self) -> bool:
+        """Whether the run was to have figures and a report."""
+        return bool(self.facts.get("presented", False))
+
+    @property
+    def concluded(self) -> int | None:
+        """The exit status of the run if it had ended and written its summary before the crash; else None."""
+        return self.facts.get("concluded")
 
     @property
     def was_killed(self) -> bool:

@@ -12,6 +12,11 @@ ABORTED = 130
 """Aborted by Ctrl-C: 128 + SIGINT, as shells have it."""
 
 
+def status_of_run(*, unit_failed: bool, succeeded: bool) -> int:
+    """Return the exit status of a run that came to its end, or whose unit failed."""
+    return UNIT_FAILED if unit_failed else 0 if succeeded else TASK_FAILED
+
+
 def abort() -> NoReturn:
     """End the process as Ctrl-C does it before a run has begun: a line, and the status of shells."""
     sys.stderr.write("Aborted!\n")

@@ -10,6 +10,7 @@ from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
+from handover.scenarios.execution.exit_status import status_of_run
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run
@@ -20,12 +21,14 @@ from handover.scenarios.results.run_folder import disk_errors_reported
 from handover.scenarios.results.summary import (
     ElapsedTime,
     RunResult,
+    Summary,
     begun_run,
     crash_facts,
     failure_reason,
     finished_summary,
 )
 from handover.scenarios.results.task import Task
+from handover.scenarios.results.tolerated_faults import GuardedEvaluator, ToleratedFaults
 
 Progress = Callable[[float, float], None]
 """Is called with the simulated time and the time at which the run ends at the latest, in seconds."""
@@ -46,7 +49,9 @@ def run_task(
     """
     experiment, parameters = task.experiment, task.parameters
     spent = ElapsedTime() if resumption is None else resumption.spent
-    evaluator = experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
+    evaluator = GuardedEvaluator(
+        experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
+    )
     failure: UnitFailure | None = None
     clock = spent.clock()
     system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
@@ -89,12 +94,14 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     task.folder.write_run(begun_run(task, master))
     if not task.presented:
         task.folder.figures.rmdir()
-    master.heartbeat.record_facts(folder=str(task.folder.path), **crash_facts(task, master))
+    places = {"folder": str(task.folder.path), "shown": str(task.folder.shown)}
+    master.heartbeat.record_facts(**places, presented=task.presented, **crash_facts(task, master))
 
 
 def _run(
-    task: Task, master: Master, evaluator: Evaluator, resumption: Resumption | None, around: _Surroundings
-) -> UnitFailure | None:
+    task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator], resumption: Resumption | None,
+    around: _Surroundings,
+) -> UnitFailure | None:  # fmt: skip
     """Step until the end, and record; return the failure that it ended with, if any."""
     stop, interruption = task.experiment.stop_time(task.parameters), around.interruption
     rows = 0 if resumption is None else resumption.checkpoint.rows
@@ -104,14 +111,19 @@ def _run(
         def report_progress(t: float, _signals: Signals) -> None:
             around.progress(t, float(stop))
 
-        observers: list[Observer] = [recorder, evaluator, *checkpoints]
+        def write_due_checkpoints(t: float, signals: Signals) -> None:
+            for checkpointer in checkpoints:
+                if not evaluator.fault:  # else what is resumed from it would be judged by a part of the run
+                    checkpointer(t, signals)
+
+        observers: list[Observer] = [recorder, evaluator, write_due_checkpoints]
         if resumption is not None:
             observers = [ObserveAfter(resumption.checkpoint.time, observe) for observe in observers]
         try:
             master.run(stop, [*observers, report_progress], until=lambda: evaluator.over or interruption.asked)
             if master.ended is not None:
                 evaluator.note_end(master.ended.unit, master.ended.reached)
-            elif interruption.asked and not evaluator.over:
+            elif interruption.asked and not evaluator.over and not evaluator.fault:
                 for checkpointer in checkpoints:
                     master.call_units(checkpointer.write)
             evaluator.finish(master.signals)
@@ -122,35 +134,43 @@ def _run(
 
 
 def _checkpoints(
-    task: Task, master: Master, recorder: Recorder, evaluator: Evaluator, clock: Callable[[], ElapsedTime]
-) -> list[Checkpointer]:
+    task: Task, master: Master, recorder: Recorder, evaluator: GuardedEvaluator[Evaluator],
+    clock: Callable[[], ElapsedTime],
+) -> list[Checkpointer]:  # fmt: skip
     if task.every is None:
         return []
 
     def packed() -> bytes:
-        return pack(task.experiment, evaluator, task.parameters, task.options, clock())
+        return pack(task.experiment, evaluator.evaluator, task.parameters, task.options, clock())
 
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, packed)]
 
 
 def _conclude(
-    task: Task, master: Master, evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, spent: ElapsedTime
-) -> RunResult:
+    task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator], failure: UnitFailure | None, interrupted: bool,
+    spent: ElapsedTime,
+) -> RunResult:  # fmt: skip
     """Write the summary of a run at its end, its pictures and its report."""
     interrupted = interrupted and master.ended is None
     outcome = _outcome(evaluator, failure, interrupted, master.ended)
     complete = failure is None and (evaluator.over or not interrupted)
     summary = finished_summary(task, outcome, master, spent, failure, complete)
     task.folder.write_summary(summary)
+    status = status_of_run(unit_failed=failure is not None, succeeded=outcome.success)
+    master.heartbeat.record_facts(concluded=status)  # whatever crashes from here on, this is how it ended
     if failure is not None:
         task.folder.add_to_run(failure=summary["failure"])
-    write_picture_files(task.folder.pictures, evaluator.pictures())
+    faults = ToleratedFaults()
+    with faults.tolerated("the cameras' pictures could not be kept"):
+        write_picture_files(task.folder.pictures, evaluator.pictures())
     if complete:
         remove_checkpoint(task.folder.checkpoint)
     if task.presented:
         with disk_errors_reported(task.folder.path):
-            _present(task, evaluator)
-    return RunResult(outcome=outcome, summary=summary, failure=failure)
+            _present(task, evaluator, summary, faults)
+    if faults.lines:
+        task.folder.write_summary({**summary, "left_out": faults.lines})
+    return RunResult(outcome=outcome, summary=summary, failure=failure, left_out=tuple(faults.lines))
 
 
 def _outcome(
@@ -166,11 +186,17 @@ def _outcome(
     return seen
 
 
-def _present(task: Task, evaluator: Evaluator) -> None:
+def _present(task: Task, evaluator: GuardedEvaluator[Evaluator], summary: Summary, faults: ToleratedFaults) -> None:
+    """Draw figures and write the page; what fails of them is left out, with a line in the page that says so."""
     from handover.scenarios.reporting.run_figures import draw_figures  # plots take long to load
     from handover.scenarios.reporting.run_page import write_run_page
 
-    record = record_of(task.folder)
-    if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
-        draw_figures(task.experiment, task.parameters, evaluator, record, task.folder.figures)
-    write_run_page(task.folder)
+    with faults.tolerated("the figures could not be drawn"):
+        record = record_of(task.folder)
+        if record is not None and len(record.time) > 1:  # of one instant there is nothing to see over time
+            of_run = task.experiment, task.parameters, evaluator.evaluator, record
+            draw_figures(*of_run, task.folder.figures, faults)
+    if faults.lines:
+        task.folder.write_summary({**summary, "left_out": faults.lines})
+    with faults.tolerated("the report could not be written"):
+        faults.lines += write_run_page(task.folder)

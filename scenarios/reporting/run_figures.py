@@ -19,21 +19,34 @@ from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, 
 from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _MAX_SIGNALS = 6
 """Ports of a unit in its figure."""
 
 
 def draw_figures(
-    experiment: Experiment[Any], parameters: Any, evaluator: Evaluator, record: Record, folder: Path
-) -> Sequence[Figure]:
-    """Draw a scenario's figures of a run into a folder: those of `draw`, such as the scene, then those over time."""
-    scenes = experiment.draw(parameters, evaluator, record, folder)
-    return [*scenes, *draw_time_figures(experiment.time_figures(parameters, record), record.time, folder)]
+    experiment: Experiment[Any], parameters: Any, evaluator: Evaluator, record: Record, folder: Path,
+    faults: ToleratedFaults,
+) -> Sequence[Figure]:  # fmt: skip
+    """Draw a scenario's figures of a run into a folder: those of `draw`, such as the scene, then those over time.
+
+    What cannot be drawn is noted in `faults`; the other figures are drawn.
+    """
+    drawn: list[Figure] = []
+    with faults.tolerated("the figures of the scene could not be drawn"):
+        drawn += experiment.draw(parameters, evaluator, record, folder)
+    figures: Sequence[TimeFigure] = ()
+    with faults.tolerated("the figures over time could not be drawn"):
+        figures = experiment.time_figures(parameters, record)
+    for spec in figures:
+        with faults.tolerated(f"figure {spec.name} could not be drawn"):
+            drawn += draw_time_figures([spec], record.time, folder)
+    return drawn
 
 
-def draw_run(folder: RunFolder) -> Sequence[Figure]:
-    """Draw a run's figures into `figures/`, replacing those of the same names; all of them or none.
+def draw_run(folder: RunFolder) -> list[str]:
+    """Draw a run's figures into `figures/`, replacing those of the same names; return what failed, a line each.
 
     Raises:
         InvalidRunFolder: it is not the folder of a run, it is damaged, or it has nothing to draw.
@@ -42,28 +55,31 @@ def draw_run(folder: RunFolder) -> Sequence[Figure]:
     facts, record = RunFacts.read(folder), record_of(folder)
     if record is None:
         raise InvalidRunFolder(folder.path, "there is nothing to draw: its record has less than two rows")
-    unfinished = folder.path / "figures.part"
+    unfinished, faults = folder.path / "figures.part", ToleratedFaults(InvalidParameter, KeyError)
     with disk_errors_reported(folder.figures):
         try:
             unfinished.mkdir(exist_ok=True)
-            figures = _draw_record(facts, record, unfinished)
+            _draw_record(facts, record, unfinished, faults)
             folder.figures.mkdir(exist_ok=True)
             for file in unfinished.iterdir():
                 os.replace(file, folder.figures / file.name)
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)
-    return figures
+    return faults.lines
 
 
-def _draw_record(facts: RunFacts, record: Record, to: Path) -> Sequence[Figure]:
+def _draw_record(facts: RunFacts, record: Record, to: Path, faults: ToleratedFaults) -> None:
     experiment = facts.experiment
     if experiment is None:
-        return draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
+        with faults.tolerated("the outputs could not be drawn"):
+            draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
+        return
     try:
         parameters = parameters_of(type(experiment), facts.run["parameters"])
         evaluator = experiment.evaluator_of_record(parameters, read_picture_files(facts.folder.pictures))
-        _evaluate(record, evaluator)
-        return draw_figures(experiment, parameters, evaluator, record, to)
+        with faults.tolerated("the record could not be evaluated again"):
+            _evaluate(record, evaluator)
+        draw_figures(experiment, parameters, evaluator, record, to, faults)
     except (InvalidParameter, KeyError) as e:
         raise InvalidRunFolder(
             facts.folder.path, f"the run is of another version of {facts.scenario}: {e.args[0]}"

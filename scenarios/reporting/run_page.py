@@ -23,10 +23,11 @@ from handover.scenarios.reporting.time_plots import explorer_section, time_plots
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import format_conversion, format_metric, master_rows
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 
-def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
-    """Write the page of a run, with all that its folder has of it.
+def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
+    """Write the page of a run, with all that its folder has of it; return what could not be shown, a line each.
 
     Args:
         folder: the run's.
@@ -37,37 +38,50 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> None:
         RecordNotWritten: the page cannot be written.
     """
     facts = RunFacts.read(folder)
-    record = record_of(folder)
+    record, faults = record_of(folder), ToleratedFaults()
     sections = [
         metrics_section(facts),
         published_section(facts),
-        *_sections_of_scenario(facts, record),
+        *_sections_of_scenario(facts, record, faults),
         pictures_section(folder),
-        None if record is None else explorer_section(record),
+        _explorer(record, faults),
         *_sections_of_units(facts),
         parameters_section(facts),
         master_section(facts),
         files_section(facts),
     ]
     heading = f"{facts.scenario}: {'succeeded' if facts.summary['success'] else 'failed'}"
-    write_page(file or folder.report, heading, run_header(facts), [s for s in sections if s is not None])
+    left_out = list(dict.fromkeys([*facts.summary.get("left_out", ()), *faults.lines]))
+    write_page(file or folder.report, heading, run_header(facts, left_out), [s for s in sections if s is not None])
+    return faults.lines
 
 
-def _sections_of_scenario(facts: RunFacts, record: Record | None) -> Sequence[Section | None]:
+def _sections_of_scenario(facts: RunFacts, record: Record | None, faults: ToleratedFaults) -> Sequence[Section | None]:
     """Return the scenario's plots and replay of the record; a section that says why where they cannot be made."""
-    if facts.experiment is None or record is None:
+    experiment = facts.experiment
+    if experiment is None or record is None:
         return ()
+    guarded = ToleratedFaults(InvalidParameter, KeyError)
+    sections: list[Section | None] = []
     try:
-        parameters: Any = parameters_of(type(facts.experiment), facts.run["parameters"])
-        plots, replay = facts.experiment.plots(parameters, record), facts.experiment.replay(parameters, record)
-        return [
-            time_plots_section(plots, record.time),
-            None if replay is None else replay_section(replay, record),
-        ]
+        parameters: Any = parameters_of(type(experiment), facts.run["parameters"])
+        with guarded.tolerated("the plots over time could not be drawn"):
+            sections.append(time_plots_section(experiment.plots(parameters, record), record.time))
+        with guarded.tolerated("the replay could not be drawn"):
+            replay = experiment.replay(parameters, record)
+            sections.append(None if replay is None else replay_section(replay, record))
     except (InvalidParameter, KeyError) as e:
         why = e.args[0] if e.args else e
         html = Markup("<p>The run is of another version of {}, so its plots and its replay are left out: {}.</p>")
         return [Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))]
+    faults.lines += guarded.lines
+    return sections
+
+
+def _explorer(record: Record | None, faults: ToleratedFaults) -> Section | None:
+    with faults.tolerated("the signals could not be drawn"):
+        return None if record is None else explorer_section(record)
+    return None
 
 
 def _sections_of_units(facts: RunFacts) -> Sequence[Section | None]:
@@ -81,8 +95,8 @@ def _sections_of_units(facts: RunFacts) -> Sequence[Section | None]:
 _VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
 
 
-def run_header(facts: RunFacts) -> Markup:
-    """Return the verdict, what ran with which seed and versions, and the log of a failure."""
+def run_header(facts: RunFacts, left_out: Sequence[str] = ()) -> Markup:
+    """Return the verdict, what ran with which seed and versions, what is left out, and the log of a failure."""
     summary, versions = facts.summary, facts.run.get("versions", {})
     entries = [facts.title] if facts.title else []
     if facts.run.get("seed") is not None:
@@ -96,6 +110,7 @@ def run_header(facts: RunFacts) -> Markup:
             good=summary["success"],
             reason=summary["reason"],
             resumable=facts.folder.checkpoint.exists(),
+            left_out=left_out,
             failure={"log": (), "instance": None, **(summary.get("failure") or summary.get("ended") or {})},
         )
     )

@@ -48,12 +48,16 @@ class RunFolder:
 
     During the run there are also the files of a `Recorder`, and `checkpoint.zip` if checkpoints were requested.
 
+    Attributes:
+        path: absolute, so that a unit which changes the working directory does not move it.
+        shown: as the user named it.
+
     Raises:
         InvalidRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self.shown = path.absolute(), path
         if path.exists():
             if not path.is_dir():
                 raise InvalidRunFolder(path, "there is a file of that name; name a new or an empty folder")
@@ -62,10 +66,10 @@ class RunFolder:
         check_place(path)
 
     @classmethod
-    def of_run(cls, path: Path) -> "RunFolder":
+    def of_run(cls, path: Path, shown: Path | None = None) -> "RunFolder":
         """Return the existing folder of a run, which is not checked."""
         folder = cls.__new__(cls)
-        folder.path = path
+        folder.path, folder.shown = path.absolute(), shown or path
         return folder
 
     @property

@@ -130,13 +130,15 @@ class _OfSomeSummaries(TypedDict, total=False):
     steps: dict[str, Any]
     pace: dict[str, Any]
     ended: dict[str, Any]
+    left_out: list[str]
 
 
 class Summary(Configuration, _OfSomeSummaries):
     """How a run went: one that is not `complete` can be resumed; `failure` is as `UnitFailure.as_data`, or None.
 
     Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`;
-    those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`.
+    those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`. `left_out` says, a line each,
+    which figures, pictures or parts of the report could not be made.
     """
 
     complete: bool
@@ -152,11 +154,15 @@ class Summary(Configuration, _OfSomeSummaries):
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """A run after its end. `failure` is set if a unit failed; the record then ends at the failure."""
+    """A run after its end. `failure` is set if a unit failed; the record then ends at the failure.
+
+    `left_out` says, a line each, what of its presentation could not be made.
+    """
 
     outcome: Outcome
     summary: Summary
     failure: UnitFailure | None = None
+    left_out: tuple[str, ...] = ()
 
 
 class _OfSomeRuns(TypedDict, total=False):

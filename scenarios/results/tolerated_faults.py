@@ -1,0 +1,116 @@
+"""Faults of a run's evaluation and presentation: each becomes a line, and never takes the run's end with it.
+
+A unit may give outputs of which nobody thought: all zero, constant, NaN. What is made of them by scenarios (verdict,
+figures, replay, pictures) may then raise anything. The run, its record and the rest of its report are kept.
+"""
+
+import traceback
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Generic
+
+from handover.cosim.exceptions import CosimError, one_line
+from handover.cosim.system.signals import Signals
+from handover.scenarios.experiment.experiment import AnyEvaluator, Evaluator, Outcome
+from handover.scenarios.experiment.pictures import CameraPicture
+
+_MAX_MESSAGE = 200  # characters
+
+
+def fault_line(e: BaseException) -> str:
+    """Return what was raised, and where, in one line: `ValueError: ... (replay.py, line 67)`."""
+    frames = traceback.extract_tb(e.__traceback__)
+    ours = [f for f in frames if f"{__name__.partition('.')[0]}/" in f.filename.replace("\\", "/")] or frames
+    place = f" ({Path(ours[-1].filename).name}, line {ours[-1].lineno})" if ours else ""
+    message = one_line(e)
+    if len(message) > _MAX_MESSAGE:  # of libraries such as Qhull: a page of advice
+        message = f"{message[:_MAX_MESSAGE]}..."
+    name = type(e).__name__
+    return f"{name}{place}" if message == name else f"{name}: {message}{place}"
+
+
+class ToleratedFaults:
+    """Collects what failed, a line each, in `lines`.
+
+    Args:
+        passing: exceptions that are raised nevertheless, besides those of the disk and of the engine.
+    """
+
+    def __init__(self, *passing: type[Exception]) -> None:
+        self.lines: list[str] = []
+        self._passing = (OSError, CosimError, *passing)
+
+    @contextmanager
+    def tolerated(self, what: str) -> Generator[None, None, None]:
+        """Take an exception as a line that begins with `what`, as in "the replay could not be drawn"."""
+        try:
+            yield
+        except self._passing:
+            raise
+        except Exception as e:  # scenarios draw what they like, of outputs that may be anything
+            self.lines.append(f"{what}: {fault_line(e)}")
+
+
+class GuardedEvaluator(Evaluator, Generic[AnyEvaluator]):
+    """Follows a run by a scenario's evaluator until that fails; the run then goes on and is not judged.
+
+    Failures of units and of the disk, which an evaluator may meet as it reads signals, are raised as ever.
+
+    Attributes:
+        evaluator: the scenario's.
+        fault: how it failed; "" if it did not.
+    """
+
+    def __init__(self, evaluator: AnyEvaluator) -> None:
+        self.evaluator = evaluator
+        self.fault = ""
+        self._t = 0.0
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Let the evaluator see the signals at time t, unless it has failed."""
+        self._t = t
+        with self._guarded(f"the evaluation failed at t = {t:.6g} s"):
+            if not self.fault:
+                self.evaluator(t, signals)
+
+    @property
+    def over(self) -> bool:
+        """Whether the task has ended; never, once the evaluator has failed."""
+        with self._guarded(f"the evaluation failed at t = {self._t:.6g} s"):
+            return not self.fault and self.evaluator.over
+        return False
+
+    def finish(self, signals: Signals) -> None:
+        """Let the evaluator see the signals at the end of the run, unless it has failed."""
+        with self._guarded(f"the evaluation failed at its end, t = {self._t:.6g} s"):
+            if not self.fault:
+                self.evaluator.finish(signals)
+
+    def note_end(self, unit: str, t: float) -> None:
+        """Let the evaluator know that a unit has ended the simulation at t, unless it has failed."""
+        with self._guarded(f"the evaluation failed at its end, t = {t:.6g} s"):
+            if not self.fault:
+                self.evaluator.note_end(unit, t)
+
+    def pictures(self) -> Sequence[CameraPicture]:
+        """Return what cameras saw until now; an evaluator that failed may still have some.
+
+        Raises:
+            Exception: whatever the evaluator raises.
+        """
+        return self.evaluator.pictures()
+
+    def outcome(self) -> Outcome:
+        """Return the evaluator's verdict, or that there is none."""
+        with self._guarded("the verdict failed"):
+            if not self.fault:
+                return self.evaluator.outcome()
+        return Outcome(success=False, reason=f"not judged: {self.fault}")
+
+    @contextmanager
+    def _guarded(self, what: str) -> Generator[None, None, None]:
+        faults = ToleratedFaults()
+        with faults.tolerated(what):
+            yield
+        self.fault = self.fault or "".join(faults.lines)

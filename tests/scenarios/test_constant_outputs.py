@@ -1,0 +1,119 @@
+"""Outputs of which nobody thought, such as all zero or NaN: what is made of them fails by a line, the rest is made."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from constant_records import constant_record
+from flyer_runs import run
+
+from handover.cosim.record.reader import RecordedSignals
+from handover.fmus.build import build_block, cached
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.cli.command import main
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.reporting.run_figures import draw_figures
+from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.tolerated_faults import GuardedEvaluator, ToleratedFaults, fault_line
+
+KINDS = {"zero": 0.0, "one": 1.0, "nan": np.nan, "infinite": np.inf}
+FIRST = ("flyer_impedance", "ir_grasp")
+
+
+@pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
+@pytest.mark.parametrize("rows", [1, 2, 40])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
+def test_verdict_figures_and_page_are_made_of_any_outputs(name: str, kind: str, rows: int, tmp_path: Path):
+    experiment = SCENARIOS[name]()
+    parameters = parse_parameters(SCENARIOS[name], ())
+    system = experiment.build(parameters, 0, lambda unit: cached(experiment.units[unit], 3))
+    folder = RunFolder(tmp_path / "run")
+    folder.make()
+    record = constant_record(system, KINDS[kind], rows, folder.signals)
+    evaluator = GuardedEvaluator(experiment.evaluator_of_record(parameters, []))
+    signals = RecordedSignals(record)
+    for row, t in enumerate(record.time.tolist()):
+        signals.row = row
+        evaluator(t, signals)
+    evaluator.finish(signals)
+    outcome = evaluator.outcome()
+    assert outcome.reason.startswith("not judged: ") == bool(evaluator.fault)
+    assert not (evaluator.fault and outcome.success)
+    faults = ToleratedFaults()
+    if rows > 1:
+        drawn = draw_figures(experiment, parameters, evaluator.evaluator, record, folder.figures, faults)
+        assert {p.stem for p in folder.figures.iterdir()} >= {f.name for f in drawn}
+    given = {v.name: _plain(getattr(parameters, v.name)) for v in experiment.parameters()}
+    folder.write_run({"scenario": name, "parameters": given})
+    folder.write_summary(
+        {"success": outcome.success, "reason": outcome.reason, "metrics": {}, "left_out": faults.lines}
+    )
+    faults.lines += write_run_page(folder)
+    page = folder.report.read_text(encoding="utf-8")
+    assert page.count("Left out: ") == len(set(faults.lines))
+    assert all(len(line) < 400 and "\n" not in line for line in faults.lines)
+    assert rows == 1 or 'id="signals"' in page
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return value.tolist()  # pyright: ignore
+    name = getattr(value, "name", None)
+    return value if name is None else str(name).lower()
+
+
+def test_an_arm_whose_outputs_are_all_zero_costs_neither_verdict_nor_page(tmp_path: Path):
+    arm = build_block("zero_arm:ZeroArm", 3, tmp_path)
+    out = tmp_path / "r"
+    given = ["--unit", f"arm={arm}", "-p", "points=3", "-p", "settle=0.2", "--out", str(out)]
+    done = CliRunner().invoke(main, ["run", "vsl_model_based", *given])
+    assert done.exit_code == 1, done.output
+    lines = [line for line in done.output.splitlines() if line.startswith("the replay could not be drawn: ")]
+    assert len(lines) == 1
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["left_out"] == lines
+    assert summary["complete"]
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Left out: the replay could not be drawn" in page
+    assert 'id="time"' in page
+    assert 'id="signals"' in page
+
+
+@pytest.mark.parametrize("where", ["__call__", "over", "finish", "outcome", "pictures"])
+def test_an_evaluator_that_fails_leaves_a_whole_run_that_is_not_judged(
+    where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    scenario = SCENARIOS["flyer_impedance"]
+    evaluator = type(scenario().evaluator(parse_parameters(scenario, ())))
+
+    def fail(*_: object) -> object:
+        raise ZeroDivisionError("no time has passed")
+
+    monkeypatch.setattr(evaluator, where, property(fail) if where == "over" else fail)
+    ended = run(scenario, tmp_path / "r")
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert (tmp_path / "r" / "signals.parquet").is_file()
+    if where == "pictures":
+        assert summary["left_out"] == list(ended.left_out)
+        assert "the cameras' pictures could not be kept: ZeroDivisionError: no time has passed" in ended.left_out[0]
+        return
+    assert not ended.outcome.success
+    assert ended.failure is None
+    assert summary["complete"]
+    assert summary["reason"].startswith("not judged: ")
+    assert "ZeroDivisionError: no time has passed" in summary["reason"]
+
+
+def test_a_fault_is_one_short_line_with_its_place():
+    try:
+        raise ValueError("a long\nmessage " * 100)
+    except ValueError as e:
+        line = fault_line(e)
+    assert line.startswith("ValueError: a long message a long")
+    assert line.endswith(")")
+    assert len(line) < 300
+    assert "test_constant_outputs.py, line" in line
