@@ -195,25 +195,48 @@ class _Lines:
         struct.pack_into("<q", self._memory, self._at, 0)
 
 
+def own_page_reads() -> int:
+    """Return how often this process has waited for a page of memory from the disk; 0 where that is unknown."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_majflt
+
+
 class StallTimer:
     """Measures, by polling a heartbeat, for how long the same call has been under way.
 
     Of the time between two polls at most `max_gap` seconds count: if more has passed, the whole process or the machine
-    was suspended.
+    was suspended. Time in which the process read its memory from the disk, as where it was swapped out, does not count.
+
+    Args:
+        heartbeat: of the process that makes the calls.
+        max_gap: seconds.
+        clock: returns the wall time in seconds.
+        page_reads: counts what that process has read of its memory from the disk.
     """
 
-    def __init__(self, heartbeat: Heartbeat, max_gap: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self._heartbeat, self._max_gap, self._clock = heartbeat, max_gap, clock
+    def __init__(
+        self, heartbeat: Heartbeat, max_gap: float, clock: Callable[[], float] = time.monotonic,
+        page_reads: Callable[[], int] = own_page_reads,
+    ) -> None:  # fmt: skip
+        self._heartbeat, self._max_gap, self._clock, self._page_reads = heartbeat, max_gap, clock, page_reads
         self.beat: tuple[int, int] | None = None
         """The call that was under way at the last poll."""
-        self._seconds, self._checked_at = 0.0, clock()
+        self._seconds, self._checked_at, self._reads = 0.0, clock(), page_reads()
 
-    def poll(self) -> float:
-        """Return the seconds for which the present call has been under way, 0 where there is none."""
-        now, beat = self._clock(), self._heartbeat.beat
+    def poll(self, *, suspended: bool = False) -> float:
+        """Return the seconds for which the present call has been under way, 0 where there is none.
+
+        Args:
+            suspended: whether the process that makes the calls is known to have been stopped since the last poll.
+        """
+        now, beat, reads = self._clock(), self._heartbeat.beat, self._page_reads()
         passed, self._checked_at = now - self._checked_at, now
+        swapped, self._reads = reads != self._reads, reads
         if beat is None or beat != self.beat:
             self.beat, self._seconds = beat, 0.0
-        else:
+        elif not suspended and not swapped:
             self._seconds += min(passed, self._max_gap)
         return self._seconds

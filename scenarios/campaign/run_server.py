@@ -40,6 +40,9 @@ from handover.scenarios.results.summary import ElapsedTime
 IDLE = 60.0
 """Seconds without a job after which it ends by itself: a cluster may outlive the campaign."""
 
+STOP_LIMIT = 60.0
+"""Seconds after which a run that was stopped (SIGSTOP) is given up; the next call of the campaign tries it again."""
+
 
 class RunServer:
     """Runs jobs.
@@ -139,7 +142,7 @@ class RunServer:
             supervisor.leave(1 if result.lost else 0)
 
         child = ForkedChild(begin, heartbeat)
-        end = child.wait(self._jobs.fileno())
+        end = child.wait(self._jobs.fileno(), stop_limit=STOP_LIMIT)
         if end is None:  # jobs come one by one: what can be read now is the end of the stream
             child.kill()
             for scratch in heartbeat.facts.get("scratch", []):

@@ -4,11 +4,15 @@ Only where processes can be forked, thus not on Windows. What is imported here i
 """
 
 import contextlib
+import ctypes
 import os
 import select
 import signal
+import sys
 import threading
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
@@ -20,6 +24,9 @@ _GRACE = 5.0
 The child watches its calls too and reports what hung; the parent kills it only where it cannot act any more.
 """
 
+_EXIT_INTERVAL, _EXIT_PATIENCE = 0.002, 0.25
+"""How often a child that has closed its pipe is asked whether it has ended, and for how long, s."""
+
 
 class ChildEnd(NamedTuple):
     """How a child ended.
@@ -29,18 +36,21 @@ class ChildEnd(NamedTuple):
         status: its exit status where it exited, else 0.
         cpu: seconds of CPU that it took.
         hung: whether it was killed because a unit's call did not return.
+        stopped: whether it was killed because it was stopped (SIGSTOP) for too long.
     """
 
     signal: int | None
     status: int
     cpu: float
     hung: bool
+    stopped: bool = False
 
 
 class ForkedChild:
     """Runs a command in the main thread of a process group of its own, which is killed when this process ends.
 
-    Two pipes, over which nothing is sent, tell each process of the other's end: their read ends become ready.
+    Two pipes, over which nothing is sent, tell each process of the other's end: their read ends become ready. On Linux
+    the kernel, too, kills the child when this thread ends, whatever a unit did to the pipes or to Python's threads.
 
     Args:
         command: what the child does; it has to end the process.
@@ -51,8 +61,10 @@ class ForkedChild:
         self._heartbeat = heartbeat
         self._alive, child_lives = os.pipe()
         parent_alive, self._parent_lives = os.pipe()
+        parent = os.getpid()
         self.pid = os.fork()
         if self.pid == 0:
+            _die_at_once_with(parent)
             os.close(self._alive)
             os.close(self._parent_lives)
             os.setpgid(0, 0)
@@ -63,29 +75,50 @@ class ForkedChild:
         with contextlib.suppress(OSError):  # it has done so itself, or is gone
             os.setpgid(self.pid, self.pid)
 
-    def wait(self, watched: int | None = None) -> ChildEnd | None:
+    def wait(self, watched: int | None = None, *, stop_limit: float | None = None) -> ChildEnd | None:
         """Return how it ended, or None if it still runs when the file descriptor `watched` becomes readable.
 
-        If a unit's call does not return in time, the child is killed.
+        If a unit's call does not return in time, the child is killed; also if it does not end in that time after it
+        has reported its exit status, as where a unit's library holds it. Time in which the child is stopped (SIGSTOP,
+        Ctrl-Z) or waits for memory that was swapped out does not count.
+
+        Args:
+            watched: a file descriptor.
+            stop_limit: seconds after which a child that stays stopped is killed; None: it may stay so for ever.
         """
-        stall_timer = StallTimer(self._heartbeat, 2 * _POLL_INTERVAL)
+        calls = StallTimer(self._heartbeat, 2 * _POLL_INTERVAL, page_reads=lambda: _page_reads(self.pid))
         files = [self._alive] if watched is None else [self._alive, watched]
-        hung = False
+        suspended, stopped, ending, since_closed = _Clock(), False, _Clock(), _Clock()
+        closed = hung = given_up = False
         while True:
-            ready, _, _ = select.select(files, [], [], _POLL_INTERVAL)
-            gone = self._alive in ready
-            pid, status, spent = os.wait4(self.pid, 0 if gone else os.WNOHANG)
-            if pid:
+            ready, _, _ = select.select(files, [], [], _EXIT_INTERVAL if closed else _POLL_INTERVAL)
+            if self._alive in ready:  # it is about to end, or a unit has closed the pipe: see below
+                files.remove(self._alive)
+                closed, since_closed = True, _Clock()
+            pid, status, spent = os.wait4(self.pid, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
+            if pid and (os.WIFSTOPPED(status) or os.WIFCONTINUED(status)):
+                stopped, suspended = os.WIFSTOPPED(status), _Clock()
+            elif pid:
                 self._close()
                 exited = os.WIFEXITED(status)
                 number = None if exited else os.WTERMSIG(status)
                 code = os.WEXITSTATUS(status) if exited else 0
-                return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, hung)
-            if ready:
+                return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, hung, given_up)
+            if watched is not None and watched in ready:
                 return None
-            if self._heartbeat.limit and stall_timer.poll() >= self._heartbeat.limit + _GRACE:
-                hung = True
+            if stopped:
+                calls.poll(suspended=True)
+                if stop_limit is not None and suspended.tick() >= stop_limit:
+                    given_up = True
+                    os.kill(self.pid, signal.SIGKILL)
+                continue
+            limit = self._heartbeat.limit + _GRACE if self._heartbeat.limit else float("inf")
+            if self._heartbeat.status is None:
+                hung = calls.poll() >= limit
+                ending = _Clock()
+            if hung or ending.tick() >= limit:
                 os.kill(self.pid, signal.SIGKILL)
+            closed = closed and since_closed.tick() < _EXIT_PATIENCE
 
     def kill(self) -> None:
         """Kill it and what it started, and wait until it is gone."""
@@ -97,6 +130,39 @@ class ForkedChild:
     def _close(self) -> None:
         os.close(self._alive)
         os.close(self._parent_lives)
+
+
+class _Clock:
+    """Adds up the wall time between its ticks, of which at most two polls count: else this process was suspended."""
+
+    def __init__(self) -> None:
+        self.seconds, self._at = 0.0, time.monotonic()
+
+    def tick(self) -> float:
+        now = time.monotonic()
+        self.seconds += min(now - self._at, 2 * _POLL_INTERVAL)
+        self._at = now
+        return self.seconds
+
+
+def _page_reads(pid: int) -> int:
+    """Return how often a process has waited for a page of memory from the disk; 0 where that is unknown."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
+        return int(fields[9])  # majflt
+    except (OSError, ValueError, IndexError):
+        return 0
+
+
+_PR_SET_PDEATHSIG = 1
+
+
+def _die_at_once_with(parent: int) -> None:
+    """Let the kernel kill this process when the thread that forked it ends (Linux); at once if that has happened."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:
+            os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _die_with_parent(parent_alive: int) -> None:

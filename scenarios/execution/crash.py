@@ -93,6 +93,8 @@ def _signal_name(number: int) -> str:
 
 def _crash_message(call: Call | None, t: float, end: ChildEnd) -> str:
     within = f", in {call.call} of {call.unit}" if call is not None else ", outside of its units"
+    if end.stopped:
+        return f"the run was stopped at t = {t:.6g} s{within} (SIGSTOP), did not continue and was given up"
     if end.signal == signal.SIGKILL:
         return f"the run was killed at t = {t:.6g} s{within}: by someone, or by the system for want of memory"
     how = f"ended with status {end.status}" if end.signal is None else _signal_name(end.signal)

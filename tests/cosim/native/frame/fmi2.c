@@ -64,7 +64,8 @@ fmi2Status fmi2Terminate(fmi2Component c) {
     if (!allowed(c, STEP, "fmi2Terminate"))
         return fmi2Error;
     ((Unit *)c)->kept->mode = TERMINATED;
-    return fmi2OK;
+    const Model *model = ((Unit *)c)->model;
+    return model->terminate ? (fmi2Status)model->terminate(c) : fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {

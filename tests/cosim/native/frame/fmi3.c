@@ -68,7 +68,11 @@ fmi3Status fmi3EnterEventMode(fmi3Instance c) {
     return enter(c, ((Unit *)c)->event_mode ? STEP : 0, EVENT, "fmi3EnterEventMode");
 }
 fmi3Status fmi3EnterStepMode(fmi3Instance c) { return enter(c, EVENT, STEP, "fmi3EnterStepMode"); }
-fmi3Status fmi3Terminate(fmi3Instance c) { return enter(c, STEP | EVENT, TERMINATED, "fmi3Terminate"); }
+fmi3Status fmi3Terminate(fmi3Instance c) {
+    fmi3Status status = enter(c, STEP | EVENT, TERMINATED, "fmi3Terminate");
+    const Model *model = ((Unit *)c)->model;
+    return status == fmi3OK && model->terminate ? (fmi3Status)model->terminate(c) : status;
+}
 fmi3Status fmi3Reset(fmi3Instance c) {
     begin(c);
     return fmi3OK;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const Model *native_models[128];
+const Model *native_models[512];
 size_t n_native_models;
 
 void add_model(const Model *model) { native_models[n_native_models++] = model; }
@@ -38,6 +38,8 @@ Unit *new_unit(const char *token, const char *name) {
 }
 
 void free_unit(Unit *unit) {
+    if (unit->model->freed)
+        unit->model->freed(unit);
     free(unit->kept);
     free(unit);
 }

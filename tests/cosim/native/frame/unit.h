@@ -66,6 +66,8 @@ typedef struct {
     void (*update)(Unit *, Update *);                            /* discrete states, at an event */
     int (*interval)(Unit *, double *);                           /* of its clock that has a `timing`: what
                                                                     fmi3IntervalQualifier it is */
+    enum status (*terminate)(Unit *);                            /* what Terminate answers */
+    void (*freed)(Unit *);                                       /* the instance is about to be freed */
 } Model;
 
 /* All of it that a saved state holds lies in one block, `kept`. */
