@@ -36,7 +36,8 @@ def lock_file(file: IO[bytes]) -> None:
 def unlock_file(file: IO[bytes]) -> None:
     """Unlock it, also for a child process that has inherited it."""
     if fcntl is not None:
-        fcntl.flock(file, fcntl.LOCK_UN)
+        with contextlib.suppress(OSError):  # a unit has closed it, which has unlocked it
+            fcntl.flock(file, fcntl.LOCK_UN)
 
 
 def holder_of(path: Path) -> int | None:

@@ -21,7 +21,8 @@ from handover.cosim.record.tail import DamagedTail, RecordBlock
 class RecordStream:
     """Appends record batches to a file in Arrow's streaming format, which other tools can read as it grows.
 
-    A batch that cannot be written whole leaves nothing behind.
+    A batch that cannot be written whole leaves nothing behind. If a unit has closed the file's descriptor, or opened
+    another file under its number, the file is opened again.
     """
 
     def __init__(self, path: Path, schema: pa.Schema, size: int = 0) -> None:
@@ -32,6 +33,8 @@ class RecordStream:
         """
         self.path = path
         self._file = open(path, "r+b" if size else "wb", buffering=0)  # noqa: SIM115 (kept open)
+        self._lost: list[Any] = []  # files whose descriptors belong to somebody else: not to be closed
+        self._is = _identity(self._file)
         self.size = size
         """Bytes written."""
         if size:
@@ -50,13 +53,22 @@ class RecordStream:
 
     def sync(self) -> None:
         """Wait until all is on the disk, so that it survives a crash of the machine."""
+        self._reopen_if_lost()
         os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """Close the file."""
+        self._reopen_if_lost()
         self._file.close()
 
+    def _reopen_if_lost(self) -> None:
+        if _identity(self._file) != self._is:
+            self._lost.append(self._file)
+            self._file = open(self.path, "r+b", buffering=0)  # noqa: SIM115 (kept open)
+            self._file.seek(self.size)
+
     def _append(self, data: Any) -> None:
+        self._reopen_if_lost()
         left = memoryview(data)
         try:
             while left.nbytes:
@@ -66,6 +78,15 @@ class RecordStream:
             self._file.seek(self.size)
             raise
         self.size = self._file.tell()
+
+
+def _identity(file: Any) -> tuple[int, int] | None:
+    """Return which file on the disk an open file's descriptor stands for; None where it is closed."""
+    try:
+        found = os.fstat(file.fileno())
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def stream_schema(path: Path) -> "pa.Schema":

@@ -145,7 +145,8 @@ class RecordBlock:
     def close(self) -> None:
         """Close the file. Memory of arrays that are still held elsewhere stays."""
         unlock_file(self._handle)
-        self._handle.close()
+        with contextlib.suppress(OSError):  # a unit has closed its descriptor; what is mapped stays
+            self._handle.close()
         # The mapping can be closed only when no array refers to it any more.
         self.counters, self.time, self.parts = np.zeros(2, dtype=np.int64), np.zeros(0), []
         with contextlib.suppress(BufferError):  # an array of it is held elsewhere

@@ -49,6 +49,8 @@ class ChildEnd(NamedTuple):
 class ForkedChild:
     """Runs a command in the main thread of a process group of its own, which is killed when this process ends.
 
+    What is left of the group when the child ends, such as processes that a unit has forked, is killed too.
+
     Two pipes, over which nothing is sent, tell each process of the other's end: their read ends become ready. On Linux
     the kernel, too, kills the child when this thread ends, whatever a unit did to the pipes or to Python's threads.
 
@@ -99,6 +101,8 @@ class ForkedChild:
             if pid and (os.WIFSTOPPED(status) or os.WIFCONTINUED(status)):
                 stopped, suspended = os.WIFSTOPPED(status), _Clock()
             elif pid:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.killpg(self.pid, signal.SIGKILL)  # what a unit has forked and left
                 self._close()
                 exited = os.WIFEXITED(status)
                 number = None if exited else os.WTERMSIG(status)

@@ -72,9 +72,9 @@ class Interruption:
             lambda: signal.signal(signal.SIGINT, self._before),
             *(functools.partial(signal.signal, number, handler) for number, handler in ending.items()),
             lambda: signal.set_wakeup_fd(wakeup_before),
-            pythons.close,  # which ends the listener
-            listener.join,
-            ours.close,
+            _closing(pythons),  # which ends the listener
+            lambda: listener.join(_GRACE),
+            _closing(ours),
         ]
         return self
 
@@ -115,6 +115,27 @@ class Interruption:
             elif not self._handled.wait(_GRACE):
                 _say("Aborted! A unit did not return.")
                 leave(ABORTED)
+
+
+def _closing(end: socket.socket) -> Callable[[], None]:
+    """Return a function that closes a socket, unless a unit has closed it and maybe opened a file under its number."""
+    made = _inode(end)
+
+    def close() -> None:
+        if _inode(end) == made:
+            end.close()
+        else:
+            end.detach()
+
+    return close
+
+
+def _inode(end: socket.socket) -> tuple[int, int] | None:
+    try:
+        found = os.fstat(end.fileno())
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _say(line: str) -> None:
