@@ -17,7 +17,7 @@ SIZE = 2**20
 """Bytes of a heartbeat; the system allocates only the pages that are used."""
 
 _NONE = -1  # no call is under way
-_CODE, _COUNT, _TIME, _STOP, _LIMIT, _STATUS = range(6)  # cells
+_CODE, _COUNT, _TIME, _STOP, _LIMIT, _STATUS, _CRASHED, _WHERE = range(8)  # cells
 _UNITS, _CALLS, _LOG, _FACTS = (64, 2**18), (2**18, 2**14), (2**18 + 2**14, 2**16), (2**19, 2**19)  # offset, size
 _MAX_CALLS = 256  # different calls in a run; further ones share the last number
 
@@ -134,6 +134,17 @@ class Heartbeat:
     @status.setter
     def status(self, status: int) -> None:
         self._cells[_STATUS] = status + 1
+
+    @property
+    def crash(self) -> tuple[int, int] | None:
+        """The thread that crashed the process and the address of its instruction; None where that is not known."""
+        thread, address = self._cells[_CRASHED], self._cells[_WHERE]
+        return (thread, address) if thread else None
+
+    @property
+    def crash_address(self) -> int:
+        """Address of the two cells of `crash`, for C code."""
+        return self.address + 8 * _CRASHED
 
     def record_facts(self, **facts: Any) -> None:
         """Keep facts, in addition to those kept before, for the report if this process crashes; JSON must hold them."""

@@ -12,6 +12,7 @@ from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitHung, UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
+from handover.cosim.fmu.host_process import claim
 from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.master.watchdog import Watchdog
@@ -53,6 +54,7 @@ class Master:
     """Co-simulates a system of FMUs, each unit at its own rate. Use as a context manager.
 
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
+    If that fails where nothing else did, leaving raises the failure, after all units are freed.
 
     Raises:
         WiringError: the system has faults. InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
@@ -84,6 +86,7 @@ class Master:
             raise RuntimeError("the master is entered already: leave it first, or make another one")
         self._is_left = False
         self.ended = None
+        claim()
         try:
             self._watchdog.run_job(self._start)
         except UnitHung:
@@ -100,9 +103,9 @@ class Master:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        hung = self._end()
-        if hung is not None and error is None:
-            raise hung
+        failure = self._end()
+        if failure is not None and error is None:
+            raise failure
 
     @property
     def has_events(self) -> bool:
@@ -183,7 +186,10 @@ class Master:
             RuntimeError: the master is left, a unit failed before, or one has ended the simulation.
         """
         self._check_can_run(stop)
-        self.call_units(lambda: self._run(stop, observers, until))
+        try:
+            self.call_units(lambda: self._run(stop, observers, until))
+        finally:
+            self.ensemble.host.restore(handlers_set_here=False)
 
     def call_units(self, job: Callable[[], T]) -> T:
         """Run another job with the units in the thread that they are called in, with the same time limit.
@@ -191,26 +197,33 @@ class Master:
         Raises:
             UnitHung: a unit does not return. Whatever else the job raises.
         """
+        claim()
         return self._watchdog.run_job(job)
 
     def _start(self) -> None:
         ensemble = self._factory.load(self.heartbeat, self._cleanups)
         self._factory.initialize(ensemble)
+        ensemble.host.restore()
         self._coupling = self._factory.couple(ensemble)
         self._stepper = self._factory.stepper(ensemble, self._coupling)
         self._ensemble = ensemble
 
-    def _end(self) -> UnitHung | None:
-        """Terminate and free all units but those that do not return; return the first of these as a failure."""
+    def _end(self) -> UnitFailure | None:
+        """Terminate and free all units but those that do not return; return the first failure of that."""
         self._is_left = True
-        first: UnitHung | None = None
+        if isinstance(self._stepper, PlanStepper):
+            self._stepper.publish_unit_times()  # failures are told with the time that the unit has reached
+        if self._ensemble is not None:
+            self._ensemble.host.note()
+        first: UnitFailure | None = None
         while True:
             try:
                 self._watchdog.run_job(self._cleanups.close)
-            except UnitHung as e:
+            except UnitFailure as e:
                 first = first or e
-            else:
-                break
+                if isinstance(e, UnitHung):
+                    continue  # with what is left of the cleanups
+            break
         self._watchdog.close()
         return first
 
@@ -227,9 +240,12 @@ class Master:
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals
+        self.ensemble.host.note()
         if self.pacer is not None:
             self.pacer.start(self.time)
         last, arriving = self.schedule.ticks(stop), True
+        if len(observers) > 1:  # a recorder alone does not bring the plan back to Python at each point
+            observers = [*observers, lambda _t, _signals: self.ensemble.host.restore_now_and_then()]
         try:
             if isinstance(self.stepper, PlanStepper):
                 pause = None if self.pacer is None else self._pause(until)
@@ -242,6 +258,7 @@ class Master:
                     raise Abandoned
                 if self.pacer is not None:
                     self._pause(until)()
+                self.ensemble.host.settle()
                 for observe in observers:
                     observe(self.stepper.time, signals)
                 if ended or until():

@@ -8,7 +8,7 @@ from pathlib import Path
 from handover.cosim.native_libraries import TARGETS, NativeLibraries, has_compiler, host_platform, zig_cc
 
 FOLDER = Path(__file__).parent
-SOURCES = ("carry_out.c", "cpu_clock.c", "exact_time.c", "plan.c")
+SOURCES = ("carry_out.c", "cpu_clock.c", "crash_note.c", "exact_time.c", "plan.c")
 
 
 def compile_plan() -> None:

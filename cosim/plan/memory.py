@@ -6,6 +6,7 @@ import logging
 import weakref
 from pathlib import Path
 
+from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.native_libraries import CompilationError
 from handover.cosim.plan.compile import plan_library
 
@@ -71,6 +72,9 @@ class Plan(ctypes.Structure):
         ("heartbeat", ctypes.c_void_p),
         ("stopped_at", ctypes.c_int64),
         ("status", ctypes.c_int64),
+        ("identity", ctypes.c_void_p),
+        ("float_control", ctypes.c_uint64),
+        ("watches_float_control", ctypes.c_int64),
     )
 
 
@@ -83,6 +87,13 @@ def loop() -> "ctypes.CDLL | None":
         _log.warning("%s", e)
         return None
     return None if file is None else _loaded(file)
+
+
+def note_crashes(heartbeat: Heartbeat) -> None:
+    """Let this process note in a heartbeat, if it crashes, which thread did so and where; see `Heartbeat.crash`."""
+    library = loop()
+    if library is not None:
+        library.plan_note_crash(heartbeat.crash_address)
 
 
 class KeptMemory:
@@ -104,5 +115,7 @@ def _loaded(file: Path) -> ctypes.CDLL:
     library.plan_arrive.argtypes = (plan, ctypes.c_int64)
     library.plan_depart.argtypes = (plan,)
     library.plan_carry_out.argtypes = (plan, ctypes.c_int64, ctypes.c_int64)
+    library.plan_note_crash.argtypes = (ctypes.c_void_p,)
+    library.plan_note_crash.restype = None
     library.plan_run.argtypes = (plan, ctypes.c_int64, ctypes.c_int64, ctypes.c_bool, ctypes.POINTER(Rows))
     return library

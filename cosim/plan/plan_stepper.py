@@ -9,6 +9,7 @@ from typing import Any
 
 from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned
+from handover.cosim.fmu.host_process import identity_address
 from handover.cosim.plan import memory
 from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.record.recorder import Recorder
@@ -73,6 +74,7 @@ class PlanStepper:
             n_spent=self._n_spent,
             spent_capacity=self._room,
             heartbeat=ensemble.heartbeat.address,
+            identity=identity_address(),
         )
         self._read_times()
 
@@ -144,9 +146,14 @@ class PlanStepper:
             self._n_spent[i] = 0
         self._unpublished = 0
 
+    def publish_unit_times(self) -> None:
+        """Hand over to the units' instances the times that they have reached."""
+        for instance, t in zip(self._ensemble.instances.values(), self._times, strict=True):
+            instance.time = t
+
     def get_state(self) -> Mapping[str, Any]:
         """Return the ticks; see `Stepper`."""
-        self._publish_times()
+        self.publish_unit_times()
         grouped = list(zip(self._members, self._groups, strict=True))
         due = {unit: group.due for units, group in grouped for unit in units}
         acted = {unit: group.acted for units, group in grouped for unit in units if group.sampled}
@@ -182,14 +189,14 @@ class PlanStepper:
         if outcome == _STOPPED:
             stopped_at = self._plan.stopped_at
             self.arriving = stopped_at < self._depart_from
-            self._publish_times()
+            self.publish_unit_times()
             try:
                 self._judges[stopped_at](self._plan.status, self.time)
             except UnitTerminated as e:
                 self._read_times()
                 if e.completed:
                     self._complete(stopped_at)
-                    self._publish_times()
+                    self.publish_unit_times()
                 raise
             raise RuntimeError(f"operation {stopped_at} of the plan stopped it without a reason")
         return outcome
@@ -213,10 +220,6 @@ class PlanStepper:
                 if not e.completed:
                     raise
                 return  # that one has completed what was left
-
-    def _publish_times(self) -> None:
-        for instance, t in zip(self._ensemble.instances.values(), self._times, strict=True):
-            instance.time = t
 
     def _read_times(self) -> None:
         for i, instance in enumerate(self._ensemble.instances.values()):

@@ -18,7 +18,9 @@ from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.failures import StartValuesLost, UnitTerminated
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
+from handover.cosim.fmu.host_process import HostProcess
 from handover.cosim.fmu.instance import Instance
+from handover.cosim.fmu.loaded_libraries import note_libraries
 from handover.cosim.fmu.start_values import LostValue, keep_start
 from handover.cosim.stepping.extrapolation import LinearExtrapolation, Memory
 from handover.cosim.stepping.transfers import Feeding, FiniteCheck, feedings, finite_checks
@@ -104,6 +106,8 @@ class Ensemble:
         """Load the units; where `cleanups` is given, the caller closes it, also if this fails."""
         self.system = system
         self.heartbeat = heartbeat or Heartbeat()
+        self.host = HostProcess()
+        """How this process was before units were loaded; it is put back after each."""
         self.instances: dict[str, Instance] = {}
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
@@ -126,7 +130,11 @@ class Ensemble:
             raise
 
     def close(self) -> None:
-        """Terminate and free all units."""
+        """Terminate and free all units.
+
+        Raises:
+            UnitFailure: one did not terminate properly; all are freed.
+        """
         self._cleanups.close()
 
     def signals(self) -> Signals:
@@ -305,8 +313,10 @@ class Ensemble:
         temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
         self._cleanups.add(temporary.cleanup)
         folder = Path(temporary.name)
+        self._cleanups.add(self.host.close)
         self.heartbeat.record_scratch_folder(temporary.name)
         unpacked: dict[Path, Path] = {}
+        named: dict[Path, list[str]] = collections.defaultdict(list)
         for name, unit in self.system.units.items():
             d = unit.description
             if d.path not in unpacked:
@@ -317,18 +327,20 @@ class Ensemble:
             except InvalidFmu as e:
                 raise InvalidFmu(e.path, f"{name}: {e.fault}", e.log) from e
             instance.on_fatal = functools.partial(self._corrupt.add, d.path)
+            named[unpacked[d.path]].append(name)
             self._cleanups.add(functools.partial(self._free, instance))
             self.instances[name] = instance
+        note_libraries(self.heartbeat, named)
 
     def _make(self, name: str, folder: Path) -> Instance:
         d = self.system.units[name].description
         return Instance(name, d, folder, self.system.fed_inputs(name), self.heartbeat)
+            named[unpacked[d.path]].append(name)
 
     def _end_at_close(self, instance: Instance) -> None:
-        def end() -> None:
-            with contextlib.suppress(CosimError):  # the unit is freed next, whether or not it terminates properly
-                if not self.is_corrupt(instance):
-                    instance.end()
+        def end() -> None:  # the unit is freed next, whether or not it terminates properly
+            if not self.is_corrupt(instance):
+                instance.end()
 
         self._cleanups.add(end)
 

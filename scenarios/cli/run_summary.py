@@ -74,7 +74,7 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
         return crash.concluded
     sys.stderr.write(f"{crash.message}\n")
     if crash.folder is None:
-        return UNIT_FAILED if crash.failure is not None else _SIGNAL_STATUS + (end.signal or 0)
+        return UNIT_FAILED if crash.failure is not None or crash.in_own_thread else _SIGNAL_STATUS + (end.signal or 0)
     try:
         result = crash.complete(crash.folder)
         if crash.presented:

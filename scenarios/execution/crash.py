@@ -8,6 +8,7 @@ from typing import Any
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung
 from handover.cosim.fmu.heartbeat import Call, Heartbeat
+from handover.cosim.fmu.loaded_libraries import is_own_thread, units_at
 from handover.cosim.record.reader import Record
 from handover.cosim.record.stream import complete_record
 from handover.scenarios.execution.child_process import ChildEnd
@@ -26,6 +27,7 @@ class Crash:
 
     Attributes:
         failure: how the unit failed in whose call the process ended; None where it was not in a unit's call.
+        in_own_thread: whether a thread crashed that a unit's library has started.
         message: what happened, in a line.
         facts: what the run left in its heartbeat for this case: its folder, configuration and units.
         folder: of the run, None if there was none yet.
@@ -37,7 +39,8 @@ class Crash:
             shutil.rmtree(folder, ignore_errors=True)
         self._end, self._wall, self._time, self._call = end, wall, heartbeat.time, heartbeat.under_way
         self.failure = _failure(heartbeat, self._call, end)
-        self.message = _crash_message(self._call, self._time, end) if self.failure is None else str(self.failure)
+        self.in_own_thread = _crashed_in_own_thread(heartbeat)
+        self.message = str(self.failure or "") or _crash_message(self._call, self._time, end, self.in_own_thread)
         self.folder = None
         if "folder" in self.facts:
             self.folder = RunFolder.of_run(Path(self.facts["folder"]), Path(self.facts["shown"]))
@@ -64,7 +67,8 @@ class Crash:
             RecordNotWritten: there is no room for it.
         """
         failure = self.failure
-        data = _data(self._call, self._time, self._end) if failure is None else failure.as_data()
+        call = None if self.in_own_thread else self._call
+        data = _data(call, self._time, self._end) if failure is None else failure.as_data()
         reason = self.message if failure is None else failure_reason(failure)
         with disk_errors_reported(folder.path):
             known = self.facts["configuration"], self.facts["units"]
@@ -75,7 +79,20 @@ class Crash:
         return RunResult(outcome=Outcome(success=False, reason=reason), summary=summary, failure=failure)
 
 
+_OWN_THREAD = "a thread of its own"
+
+
+def _crashed_in_own_thread(heartbeat: Heartbeat) -> bool:
+    return heartbeat.crash is not None and is_own_thread(heartbeat.crash[0], heartbeat.facts)
+
+
 def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFailure | None:
+    if heartbeat.crash is not None and end.signal is not None and _crashed_in_own_thread(heartbeat):
+        units = units_at(heartbeat.crash[1], heartbeat.facts)
+        if not units:
+            return None
+        log = heartbeat.log_of(units[0])
+        return UnitCrashed(" or ".join(units), _OWN_THREAD, heartbeat.time, _signal_name(end.signal), log)
     if call is None:
         return None
     log = heartbeat.log_of(call.unit)
@@ -91,7 +108,10 @@ def _signal_name(number: int) -> str:
     return (signal.strsignal(number) or f"signal {number}").lower()
 
 
-def _crash_message(call: Call | None, t: float, end: ChildEnd) -> str:
+def _crash_message(call: Call | None, t: float, end: ChildEnd, in_own_thread: bool) -> str:
+    if in_own_thread and end.signal is not None:
+        meanwhile = f" (meanwhile {call.call} of {call.unit})" if call is not None else ""
+        return f"a thread of one of the units crashed at t = {t:.6g} s{meanwhile}: {_signal_name(end.signal)}"
     within = f", in {call.call} of {call.unit}" if call is not None else ", outside of its units"
     if end.stopped:
         return f"the run was stopped at t = {t:.6g} s{within} (SIGSTOP), did not continue and was given up"

@@ -7,13 +7,14 @@ from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitHung, UnitTerminated
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
+from handover.cosim.plan.memory import note_crashes
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.scenarios.execution.exit_status import status_of_run
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
-from handover.scenarios.execution.supervisor import heartbeat_of_run
+from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.experiment.experiment import Evaluator, Outcome
 from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of
@@ -60,6 +61,8 @@ def run_task(
     if task.every is not None:
         check_states(system)
     master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())
+    if is_supervised():
+        note_crashes(master.heartbeat)
     began = False
     try:
         with master:
@@ -69,7 +72,7 @@ def run_task(
             began = True
             _begin_folder(task, master, resumption)
             failure = _run(task, master, evaluator, resumption, _Surroundings(progress, interruption, clock))
-    except UnitHung as e:  # as units were loaded, or terminated
+    except UnitFailure as e:  # as units were loaded, terminated or freed
         if not began:
             raise
         failure = failure or e

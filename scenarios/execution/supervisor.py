@@ -40,6 +40,11 @@ def begin_child() -> None:
     _in_child = True
 
 
+def is_supervised() -> bool:
+    """Return whether this process is a child whose parent reports how it crashes."""
+    return _in_child
+
+
 def renew_heartbeat() -> Heartbeat:
     """Return a new heartbeat, for the next run in a child of this process."""
     global heartbeat

@@ -8,6 +8,9 @@ from fmpy.validation import validate_fmu
 from native_declaration import BINARY
 from native_units import declarations, native_fmu
 
+HARM_HERE = ("_in_load", "_in_unload", "_in_instantiate", "_in_free")
+"""Ends of the names of units that would harm this process, as the validation loads and instantiates them."""
+
 
 def units_of(fmi: int) -> list[str]:
     return [d.name for d in declarations().values() if fmi == 3 or not d.needs_fmi3]
@@ -15,7 +18,8 @@ def units_of(fmi: int) -> list[str]:
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_all_units_are_valid(fmi: int) -> None:
-    problems = {name: validate_fmu(str(native_fmu(name, fmi))) for name in units_of(fmi)}
+    units = [name for name in units_of(fmi) if not name.endswith(HARM_HERE)]
+    problems = {name: validate_fmu(str(native_fmu(name, fmi))) for name in units}
     assert {name: found for name, found in problems.items() if found} == {}
     assert len(problems) > 20
 

@@ -1,0 +1,178 @@
+"""What units share with their host: its directory, standard streams, signal handlers, arithmetic, and its identity.
+
+A unit's library may change any of these as it is loaded or called, and then every other unit, and the host itself, runs
+with that. `HostProcess` notes how they were and puts them back. `is_copy` tells a process that a unit has forked, and
+which returns from the unit's call beside the host, from the host.
+"""
+
+import contextlib
+import ctypes
+import ctypes.util
+import mmap
+import os
+import signal
+import sys
+import time
+from typing import Any
+
+_POSIX = sys.platform != "win32"
+_MADV_WIPEONFORK = 18  # Linux 4.14
+_SIZE = 256  # bytes, more than a `struct sigaction` or a `fenv_t` has on any system
+_SIGNALS = [n for n in range(1, 32) if _POSIX and n not in (signal.SIGKILL, signal.SIGSTOP)]
+_STREAMS = (0, 1, 2)
+_OUT_OF_THE_WAY = 200
+"""Descriptors of the copies of the standard streams: some units close those next to the ones that they open."""
+_INTERVAL = 0.2  # s
+
+
+def _identity_page() -> mmap.mmap:
+    """Return a page that holds 1, and in processes that are forked from this one 0 (Linux)."""
+    page = mmap.mmap(-1, mmap.PAGESIZE, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS) if _POSIX else mmap.mmap(-1, 4096)
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        page.madvise(_MADV_WIPEONFORK)
+    page[0] = 1
+    return page
+
+
+identity = _identity_page()
+"""Its first byte is 0 in a copy of this process that was forked since `claim`; for C code: `identity_address`."""
+
+
+def identity_address() -> int:
+    """Return the address of the first byte of `identity`."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(identity))
+
+
+def claim() -> None:
+    """Make the calling process the host, as before calls of units begin: it may have been forked by its own program."""
+    identity[0] = 1
+
+
+def end_copy() -> None:
+    """End this process at once if a unit has forked it from the host in a call that returns here too."""
+    if not identity[0]:
+        os._exit(0)
+
+
+class HostProcess:
+    """Notes directory, standard streams, signal handlers and floating-point environment, and puts them back.
+
+    The floating-point environment (rounding, traps, flushing to zero) is that of the calling thread. On Windows only
+    the directory is put back.
+    """
+
+    def __init__(self) -> None:
+        self._libc: Any = ctypes.CDLL(None) if _POSIX else None
+        self._libm: Any = _library_with("fegetenv") if _POSIX else None
+        self._streams: dict[int, int] = {}
+        self.note()
+
+    def note(self) -> None:
+        """Note how all is from here on, as before calls of units: the host's own program may have changed it."""
+        self._close_copies()
+        self._directory = _directory()
+        self._streams = {n: copy for n in _STREAMS if (copy := _copied(n)) is not None}
+        self._handlers = {n: (self._handler(n), signal.getsignal(n)) for n in _SIGNALS}
+        self._arithmetic = self._environment()
+        self._checked_at = time.monotonic()
+
+    def restore(self, *, handlers_set_here: bool = True) -> None:
+        """Put back what has changed; a process that a unit has forked ends.
+
+        Args:
+            handlers_set_here: put back also signal handlers that were set through Python, as by a unit that is a Python
+                block; else only those that were set behind its back.
+        """
+        end_copy()
+        if self._directory is not None and _directory() != self._directory:
+            with contextlib.suppress(OSError):
+                os.chdir(self._directory)
+        for number, copy in self._streams.items():
+            if _file(number) != _file(copy) and _file(copy) is not None:
+                os.dup2(copy, number)
+        for number, (handler, known) in self._handlers.items():
+            if _significant(self._handler(number)) != _significant(handler) and (
+                handlers_set_here or signal.getsignal(number) == known
+            ):
+                self._libc.sigaction(number, handler, None)
+        self.settle()
+
+    def settle(self) -> None:
+        """Put back the floating-point environment of the calling thread; a process that a unit has forked ends."""
+        end_copy()
+        if self._libm is not None and self._arithmetic is not None:
+            self._libm.fesetenv(self._arithmetic)
+
+    def restore_now_and_then(self) -> None:
+        """Do as `restore`, if that was not done in the last fifth of a second."""
+        now = time.monotonic()
+        if now - self._checked_at > _INTERVAL:
+            self._checked_at = now
+            self.restore(handlers_set_here=False)
+
+    def close(self) -> None:
+        """Put back all, and free what that took."""
+        self.restore(handlers_set_here=False)
+        self._close_copies()
+
+    def _close_copies(self) -> None:
+        for copy in self._streams.values():
+            with contextlib.suppress(OSError):
+                os.close(copy)
+        self._streams = {}
+
+    def _handler(self, number: int) -> bytes:
+        buffer = ctypes.create_string_buffer(_SIZE)
+        self._libc.sigaction(number, None, buffer)
+        return buffer.raw
+
+    def _environment(self) -> bytes | None:
+        if self._libm is None:
+            return None
+        buffer = ctypes.create_string_buffer(_SIZE)
+        self._libm.fegetenv(buffer)
+        return buffer.raw
+
+
+def _significant(handler: bytes) -> bytes:
+    """Return what there is in a `struct sigaction`: the function, the mask of the first signals, and the flags.
+
+    The rest of it is what happened to lie in the C library's memory.
+    """
+    return handler[:16] + (handler[136:140] if sys.platform == "linux" else b"")
+
+
+def _library_with(function: str) -> Any:
+    for name in (None, ctypes.util.find_library("m")):
+        with contextlib.suppress(OSError):
+            library = ctypes.CDLL(name)
+            if hasattr(library, function):
+                return library
+    return None
+
+
+def _directory() -> str | None:
+    try:
+        return os.getcwd()
+    except OSError:  # it was removed
+        return None
+
+
+def _copied(number: int) -> int | None:
+    """Return a copy of a descriptor, out of the way; None where it is closed, or where there is no room for one."""
+    if not _POSIX:
+        return None
+    import fcntl
+
+    with contextlib.suppress(OSError, ValueError):
+        return fcntl.fcntl(number, fcntl.F_DUPFD_CLOEXEC, _OUT_OF_THE_WAY)
+    return None
+
+
+def _file(number: int) -> tuple[int, int, int] | None:
+    """Return which file a descriptor is open for; None where it is closed."""
+    try:
+        found = os.fstat(number)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_rdev
