@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from processes import children, lives, until
 from sample_jobs import bad_job, job
 
 from handover.cosim.record.reader import Record
+from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
@@ -178,3 +180,24 @@ def test_a_run_that_is_not_wanted_any_more_is_ended(built: Path, tmp_path: Path)
     assert len(seen) == 1
     until(lambda: not any(map(lives, (server.pid, *seen))))
     assert list((tmp_path / "runs").iterdir()) == []
+
+
+@slow
+def test_a_run_that_is_stopped_for_a_while_does_not_hang(server: ServerProcess, tmp_path: Path):
+    stopped: list[int] = []
+
+    def stop_once() -> bool:
+        if not stopped and list((tmp_path / "runs").glob(".run.*/signals.tail")):
+            stopped.extend(children(server.pid))
+            for process in stopped:
+                os.kill(process, signal.SIGSTOP)
+            time.sleep(8.0)  # longer than the limit of a call, and than the server waits besides
+            for process in stopped:
+                os.kill(process, signal.SIGCONT)
+        return True
+
+    limited = replace(job(tmp_path / "runs"), options=MasterOptions(call_limit=0.5))
+    assert server.run_job(limited, stop_once).lost == ""
+    assert len(stopped) == 1
+    summary = json.loads((tmp_path / "runs" / "run" / "summary.json").read_text())
+    assert (summary["complete"], summary["failure"]) == (True, None)
