@@ -89,7 +89,8 @@ def test_an_evaluator_that_fails_leaves_a_whole_run_that_is_not_judged(
     where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     scenario = SCENARIOS["flyer_impedance"]
-    evaluator: type[Any] = type(scenario().evaluator(parse_parameters(scenario, ())))
+    experiment: Any = scenario()
+    evaluator = type(experiment.evaluator(parse_parameters(scenario, ())))
 
     def fail(*_: object) -> object:
         raise ZeroDivisionError("no time has passed")
