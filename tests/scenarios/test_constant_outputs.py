@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -89,13 +88,12 @@ def test_an_evaluator_that_fails_leaves_a_whole_run_that_is_not_judged(
     where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     scenario = SCENARIOS["flyer_impedance"]
-    experiment: Any = scenario()
-    evaluator = type(experiment.evaluator(parse_parameters(scenario, ())))
+    evaluator: object = scenario().evaluator(parse_parameters(scenario, ()))
 
     def fail(*_: object) -> object:
         raise ZeroDivisionError("no time has passed")
 
-    monkeypatch.setattr(evaluator, where, property(fail) if where == "over" else fail)
+    monkeypatch.setattr(evaluator.__class__, where, property(fail) if where == "over" else fail)
     ended = run(scenario, tmp_path / "r")
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     assert (tmp_path / "r" / "signals.parquet").is_file()
