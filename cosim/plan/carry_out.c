@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "cpu_clock.h"
-#include "float_control.h"
 #include "plan.h"
 
 typedef int (*Access2)(void *, const uint32_t *, size_t, void *);
@@ -159,8 +158,6 @@ static int step(Plan *plan, const Operation *o, bool *well) {
                                            o->step.terminate, o->step.early, o->step.last_time);
         *well = returned_well(o, t);
     }
-    if (plan->watches_float_control && float_control() != plan->float_control)
-        set_float_control(plan->float_control);
     if (status <= WARNING && *well)
         plan->unit_times[o->unit] = t + o->step.step;
     return status;

@@ -74,7 +74,6 @@ class Plan(ctypes.Structure):
         ("status", ctypes.c_int64),
         ("identity", ctypes.c_void_p),
         ("float_control", ctypes.c_uint64),
-        ("watches_float_control", ctypes.c_int64),
     )
 
 

@@ -49,10 +49,8 @@ static void settle(Plan *plan) {
     if (!*plan->identity)
         _exit(0);
 #endif
-    if (float_control() != plan->float_control) {
+    if (float_control() != plan->float_control)
         set_float_control(plan->float_control);
-        plan->watches_float_control = true;
-    }
 }
 
 static enum outcome arrive(Plan *plan, int64_t last) {

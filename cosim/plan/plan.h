@@ -132,7 +132,6 @@ typedef struct {
     int64_t status;     /* what it returned */
     const volatile char *identity; /* 0 in a process that a unit has forked from this one, see host_process.py */
     uint64_t float_control;        /* of the thread that calls the plan */
-    int64_t watches_float_control; /* after each step, as a unit has changed it before; else at each point */
 } Plan;
 
 double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator);
