@@ -326,6 +326,8 @@ class Ensemble:
                 instance = self._make(name, unpacked[d.path])
             except InvalidFmu as e:
                 raise InvalidFmu(e.path, f"{name}: {e.fault}", e.log) from e
+            finally:
+                self.host.restore()
             instance.on_fatal = functools.partial(self._corrupt.add, d.path)
             named[unpacked[d.path]].append(name)
             self._cleanups.add(functools.partial(self._free, instance))
@@ -335,7 +337,6 @@ class Ensemble:
     def _make(self, name: str, folder: Path) -> Instance:
         d = self.system.units[name].description
         return Instance(name, d, folder, self.system.fed_inputs(name), self.heartbeat)
-            named[unpacked[d.path]].append(name)
 
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:  # the unit is freed next, whether or not it terminates properly

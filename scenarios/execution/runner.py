@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu.failures import UnitHung, UnitTerminated
+from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.plan.memory import note_crashes
