@@ -25,6 +25,9 @@ Views = tuple[NDArray[Any], ...]
 Copy = tuple[NDArray[Any], NDArray[Any]]
 """Target and source of a copy."""
 
+SUCCEEDED = (0, 1)
+"""OK and Warning. Any other status is a failure, also one that the standards do not know, such as -2."""
+
 _VALUES: dict[str, Any] = {
     "Real": ctypes.c_double,
     "Integer": ctypes.c_int32,
@@ -116,10 +119,19 @@ class OutputBuffer(SignalBuffer):
     def __call__(self) -> int:
         """Get and copy all values; return the FMI status."""
         status = super().__call__()
-        if status <= 1:
+        if status in SUCCEEDED:
             for i in range(len(self._kept)):
                 self._keep(i)
         return status
+
+    def missing(self) -> str:
+        """Return which binary the unit gave a size but no memory; empty if there is none."""
+        if self._is_text:
+            return ""
+        for name, (addresses, sizes) in self.views.items():
+            if np.any((addresses == 0) & (sizes > 0)):
+                return f"NULL for {name}, a binary of {int(sizes.max())} bytes"
+        return ""
 
     def contents(self) -> list[bytes]:
         """Return the texts or binaries that the buffer holds."""
@@ -142,6 +154,8 @@ class OutputBuffer(SignalBuffer):
             self._kept[i] = ctypes.create_string_buffer(ctypes.string_at(address) if address else b"")
         else:
             size = int(self._arrays[1][i])
+            if size and not address:
+                return  # see `missing`
             if ctypes.sizeof(self._kept[i]) < size:
                 self._kept[i] = ctypes.create_string_buffer(size)
             ctypes.memmove(self._kept[i], address, size)

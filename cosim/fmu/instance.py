@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InvalidFmu, last_line
-from handover.cosim.fmu.buffers import InputDerivatives, OutputBuffer, SignalBuffer, Views, fill
+from handover.cosim.fmu.buffers import SUCCEEDED, InputDerivatives, OutputBuffer, SignalBuffer, Views, fill
 from handover.cosim.fmu.calls import (
     NativeStep,
     State,
@@ -24,9 +24,9 @@ from handover.cosim.fmu.calls import (
     is_rounding,
 )
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.fmu.failures import STATUS, InvalidReturn, StepDiscarded, UnitTerminated, failure_of
+from handover.cosim.fmu.failures import STATUS, InvalidReturn, StepDiscarded, UnitError, UnitTerminated, failure_of
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.fmu.loading import load_fmi2, load_fmi3
+from handover.cosim.fmu.loading import UNLOADING, load_fmi2, load_fmi3
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
@@ -103,7 +103,7 @@ class Instance:
             self._returned()
             if status == _FATAL:
                 self._fail(buffer.name, status)
-            if status <= 1:
+            if status in SUCCEEDED:
                 given.append(buffer)
             elif len(buffer.views) > 1:  # one that is not given takes all of a call with it
                 given += [one for p in ports if p.name in buffer.views for one in self.read([p])]
@@ -194,8 +194,17 @@ class Instance:
         Raises:
             UnitFailure: it is above Warning.
         """
-        if status > 1:
+        if status not in SUCCEEDED:
             self._fail(call, status)
+
+    def check_memory(self, buffer: OutputBuffer) -> None:
+        """Check the binaries that the unit gave.
+
+        Raises:
+            UnitError: one has a size but no memory.
+        """
+        if missing := buffer.missing():
+            raise UnitError(self.name, buffer.name, self.time, missing, tuple(self.log))
 
     @property
     def setters(self) -> Sequence[SignalBuffer]:
@@ -290,9 +299,12 @@ class Instance:
     def free(self) -> None:
         """Free the unit and its library, unless no call may follow, see `lost`."""
         if self._component is not None and not self.lost:
-            self._component = None
+            component, self._component = self._component, None
             self._begins(f"{self._prefix}FreeInstance")
-            self._fmu.freeInstance()
+            self._function("FreeInstance")(component)
+            self._returned()
+            self._begins(UNLOADING)
+            self._fmu.freeLibrary()
             self._returned()
 
     @property
@@ -372,8 +384,10 @@ class Instance:
             self._begins(buffer.name)
             status = buffer()
             self._returned()
-            if status > 1:
+            if status not in SUCCEEDED:
                 self._fail(buffer.name, status)
+            if isinstance(buffer, OutputBuffer):
+                self.check_memory(buffer)
 
     def _set_one(self, port: FmuPort, value: Any) -> None:
         buffer = self._buffer("Set", [port])
@@ -382,7 +396,7 @@ class Instance:
         status = buffer()
         del kept
         self._returned()
-        if status > 1:
+        if status not in SUCCEEDED:
             self._fail(f"setting {port.name}", status)
 
     def _function(self, name: str) -> Any:
@@ -392,7 +406,7 @@ class Instance:
         self._begins(self._prefix + name)
         status = self._function(name)(self._component, *arguments)
         self._returned()
-        if status > 1:
+        if status not in SUCCEEDED:
             self._fail(self._prefix + name, status)
 
     def _fail(self, call: str, status: int) -> None:

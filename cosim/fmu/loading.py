@@ -69,7 +69,7 @@ Logger = Callable[[int, str], None]
 Begins = Callable[[str], None]
 """Called with the name of the call that begins."""
 
-LOADING = "loading of its library"
+LOADING, UNLOADING = "loading of its library", "unloading of its library"
 
 
 def load_fmi3(
@@ -93,7 +93,7 @@ def load_fmi3(
     """
 
     def log_message(_environment: Any, status: int, _category: bytes, message: bytes) -> None:
-        log(status, message.decode("utf-8", "replace"))
+        log(status, _text_of(message))
 
     with _loading(path):
         begins(LOADING)
@@ -128,6 +128,11 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
         return fmu
 
 
+def _text_of(message: bytes | None) -> str:
+    """Return a unit's message, which may be no text at all: NULL, or bytes that are not UTF-8."""
+    return (message or b"").decode("utf-8", "replace")
+
+
 _environments = itertools.count(1)
 _loggers: dict[int, Logger] = {}  # by the unit's componentEnvironment
 
@@ -135,7 +140,7 @@ _loggers: dict[int, Logger] = {}  # by the unit's componentEnvironment
 def _log_fmi2(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
     log = _loggers.get(environment or 0)
     if log is not None:
-        log(status, message.decode("utf-8", "replace"))
+        log(status, _text_of(message))
 
 
 _dispatch_fmi2 = fmpy.fmi2.fmi2CallbackLoggerTYPE(_log_fmi2)

@@ -117,6 +117,8 @@ static bool keep(const Operation *o) {
         Kept *kept = &o->keep.kept[i];
         bool text = o->kind == KEEP_TEXTS;
         size_t size = !text ? o->keep.sizes[i] : given ? strlen(given) + 1 : 1;
+        if (!given && size && !text)
+            return false;
         if (kept->size < size || !kept->memory) {
             void *larger = realloc(kept->memory, size ? size : 1);
             if (!larger)
@@ -158,7 +160,7 @@ static int step(Plan *plan, const Operation *o, bool *well) {
                                            o->step.terminate, o->step.early, o->step.last_time);
         *well = returned_well(o, t);
     }
-    if (status <= WARNING && *well)
+    if ((unsigned)status <= WARNING && *well)
         plan->unit_times[o->unit] = t + o->step.step;
     return status;
 }
@@ -230,7 +232,7 @@ enum outcome carry_out(Plan *plan, const Segment *segment) {
         }
         if (heartbeat[TAKEN])
             return ABANDONED;
-        if (status > WARNING || !well) {
+        if ((unsigned)status > WARNING || !well) {
             plan->stopped_at = o - all;
             plan->status = status;
             outcome = STOPPED;

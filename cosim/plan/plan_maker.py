@@ -208,10 +208,19 @@ class PlanMaker:
             if isinstance(buffer, OutputBuffer):
                 kept = KeptMemory(self.library, len(arrays[0]))
                 buffer.kept_elsewhere = kept
-                self._note(keep(self._units[slot.unit], arrays, kept.address), _out_of_memory)
+                self._note(keep(self._units[slot.unit], arrays, kept.address), self._judge_kept(slot.unit, buffer))
         check = self._ensemble.finite_check(slot.unit)
         for block in check.blocks:
             self._note(finite(self._units[slot.unit], block), self._judge_numbers(slot.unit, check))
+
+    def _judge_kept(self, unit: str, buffer: OutputBuffer) -> Judge:
+        instance = self._ensemble.instances[unit]
+
+        def judge(status: int, t: float) -> None:  # noqa: ARG001
+            instance.check_memory(buffer)
+            raise MemoryError("there is no memory for a copy of a unit's binaries or texts")
+
+        return judge
 
     def _charge(self, slot: Slot) -> None:
         if self.has_clock:
@@ -258,7 +267,3 @@ def _is_all_of(array: NDArray[Any], copy: Copy) -> bool:
 
 def _judge_fit(narrowing: Narrowing) -> Judge:
     return lambda _status, t: narrowing.check(t)
-
-
-def _out_of_memory(_status: int, _t: float) -> None:
-    raise MemoryError("there is no memory for a copy of a unit's binaries or texts")

@@ -70,7 +70,8 @@ class ForkedChild:
             os.close(self._alive)
             os.close(self._parent_lives)
             os.setpgid(0, 0)
-            threading.Thread(target=_die_with_parent, args=(parent_alive,), daemon=True).start()
+            if sys.platform != "linux":  # there the kernel does it, whatever the units do to the descriptors
+                threading.Thread(target=_die_with_parent, args=(parent_alive,), daemon=True).start()
             command()
         os.close(child_lives)
         os.close(parent_alive)

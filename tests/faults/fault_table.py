@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from faulty_units import faulty_fmu
 from ssp_of import component, connection, connectors, described, pack_ssp, system
 
@@ -64,8 +65,7 @@ class Fault:
         rows: recorded; None: no folder is left.
         notes: of the sound units.
         fast: whether it is tried in the fast tier, in one of the standards.
-        wrong: why this row is not yet as it should be; "" where it is.
-        wrong_in: the standards in which it is not.
+        off: what the sound units' outputs may be off, relative to them: rounding is put back at communication points.
     """
 
     fault: str
@@ -75,8 +75,7 @@ class Fault:
     rows: int | None = WHOLE
     notes: frozenset[str] = ALL
     fast: bool = False
-    wrong: str = ""
-    wrong_in: tuple[int, ...] = (2, 3)
+    off: float = 0.0
 
     @property
     def name(self) -> str:
@@ -157,10 +156,6 @@ def _crash(fault: str, call: str, how: str, rows: int | None, **more: Any) -> Fa
 SEGMENT = "segmentation fault"
 _ONLY_A = frozenset({"a freed"})
 _HANG = "did not return within 2 s"
-_NAMELESS = "a failed instantiation in an SSP is told by the file's name and not by the instance's"
-_ROUNDS = "a rounding mode that a unit leaves changes what the others compute"
-_CLOSED = "descriptors that a unit closes are not put back"
-_AT_0 = "what goes wrong in terminating and freeing is told with t = 0"
 
 FAULTS = [
     _crash("crash", "load", SEGMENT, None, fast=True),
@@ -172,9 +167,9 @@ FAULTS = [
     _crash("crash", "get", SEGMENT, UNTIL_OUTPUT),
     _crash("crash", "step", SEGMENT, UNTIL_FAULT, fast=True),
     _crash("crash", "save", SEGMENT, UNTIL_FAULT),
-    _crash("crash", "terminate", f"at t = 1 s: {SEGMENT}", WHOLE, notes=frozenset({"c terminated"}), wrong=_AT_0),
-    _crash("crash", "free", f"at t = 1 s: {SEGMENT}", WHOLE, notes=ALL - {"a freed"}, wrong=_AT_0),
-    _crash("crash", "unload", SEGMENT, WHOLE, notes=ALL - {"a freed"}, wrong="unloading is told as freeing"),
+    _crash("crash", "terminate", f"at t = 1 s: {SEGMENT}", WHOLE, notes=frozenset({"c terminated"})),
+    _crash("crash", "free", f"at t = 1 s: {SEGMENT}", WHOLE, notes=ALL - {"a freed"}),
+    _crash("crash", "unload", SEGMENT, WHOLE, notes=ALL - {"a freed"}),
     _crash("divide", "step", "", UNTIL_FAULT),
     _crash("abort", "load", "aborted", None),
     _crash("abort", "step", "aborted", UNTIL_FAULT),
@@ -184,45 +179,50 @@ FAULTS = [
     _crash("overflow", "step", SEGMENT, UNTIL_FAULT),
     _crash("overrun", "step", SEGMENT, UNTIL_FAULT),
     _crash("double_free", "step", "aborted", UNTIL_FAULT),
-    Fault("null", "binary", 3, ("b", "{call}"), UNTIL_OUTPUT, wrong="NULL for a binary of 8 bytes passes unnoticed"),
+    Fault("null", "binary", 3, ("b", "{call}"), UNTIL_OUTPUT),
     _crash("garbage", "binary", SEGMENT, UNTIL_OUTPUT),
     Fault("hang", "load", 3, ("b", _HANG), None, NONE),
     Fault("hang", "enter", 3, ("b", "{call}", _HANG), None, FREED),
     Fault("hang", "step", 3, ("b: {call} at t = 0.3 s", _HANG), UNTIL_FAULT, fast=True),
-    Fault("hang", "terminate", 3, ("b: {call} at t = 1 s", _HANG), wrong=_AT_0),
-    Fault("hang", "free", 3, ("b: {call} at t = 1 s", _HANG), wrong=_AT_0),
-    Fault("hang", "unload", 3, ("b", _HANG), wrong="the limit of a call does not cover unloading"),
-    Fault("error", "instantiate", 2, ("b does not start", "the solver failed"), None, _ONLY_A, wrong=_NAMELESS),
+    Fault("hang", "terminate", 3, ("b: {call} at t = 1 s", _HANG)),
+    Fault("hang", "free", 3, ("b: {call} at t = 1 s", _HANG)),
+    Fault("hang", "unload", 3, ("b", _HANG)),
+    Fault("error", "instantiate", 2, (".fmu: b: ", "the solver failed"), None, _ONLY_A),
     Fault("error", "setup", 2, ("b does not start", "the solver failed"), None, FREED),
     Fault("error", "enter", 2, ("b does not start", "the solver failed"), None, FREED, fast=True),
     Fault("error", "exit", 2, ("b does not start", "the solver failed"), None, ALL - {"c terminated"}),
     Fault("error", "set", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_FAULT),
     Fault("error", "get", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_OUTPUT),
     Fault("error", "step", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_FAULT, fast=True),
-    Fault("error", "terminate", 3, ("b: {call} at t = 1 s", "the solver failed"), wrong=_AT_0),
+    Fault("error", "terminate", 3, ("b: {call} at t = 1 s", "the solver failed")),
     Fault("fatal", "enter", 2, ("b does not start", "memory is corrupt"), None, FREED),
     Fault("fatal", "step", 3, ("b: {call} at t = 0.3 s", "memory is corrupt"), UNTIL_FAULT, fast=True),
     Fault("discard", "step", 3, ("b: {call} at t = 0.3 s", "Discard"), UNTIL_FAULT),
     Fault("unknown", "step", 3, ("b: {call} at t = 0.3 s", "77"), UNTIL_FAULT),
-    Fault("negative", "step", 3, ("b: {call} at t = 0.3 s", "-2"), UNTIL_FAULT, wrong="a status below 0 counts as OK"),
+    Fault("negative", "step", 3, ("b: {call} at t = 0.3 s", "-2"), UNTIL_FAULT),
     Fault("nan", "get", 3, ("b: {call} at t = 0.3 s", "y = NaN"), UNTIL_OUTPUT, fast=True),
     Fault("infinity", "get", 3, ("b: {call} at t = 0.3 s", "y = infinity"), UNTIL_OUTPUT),
     _crash("exhaust", "step", "", UNTIL_FAULT),
     Fault("flood", "step", 0),
-    Fault("log_null", "step", 0, fast=True, wrong="a message that is NULL prints a traceback", wrong_in=(3,)),
+    Fault("log_null", "step", 0, fast=True),
     Fault("log_bytes", "step", 0, fast=True),
     Fault("log_huge", "step", 0),
     Fault("chdir", "load", 0),
-    Fault("chdir", "step", 0, fast=True, wrong="relative paths follow the unit's working directory"),
-    Fault("close_output", "step", 0, wrong=_CLOSED),
-    Fault("close_all", "load", 0, wrong=_CLOSED),
-    Fault("close_all", "step", 0, wrong=_CLOSED),
+    Fault("chdir", "step", 0, fast=True),
+    Fault("close_output", "step", 0),
+    Fault("close_all", "load", 0),
+    Fault("close_all", "step", 0),
     Fault("handlers", "load", 0),
     Fault("handlers", "step", 0),
-    Fault("rounding", "load", 0, wrong=_ROUNDS),
-    Fault("rounding", "step", 0, wrong=_ROUNDS),
+    Fault("rounding", "load", 0),
+    Fault("rounding", "step", 0, off=1e-14),
     Fault("fork", "step", 0, fast=True),
 ]
+
+
+def _alike(seen: bytes, sound: bytes, off: float) -> bool:
+    """Return whether recorded reals are the same bytes, or as near as is asked for."""
+    return seen == sound or (off > 0.0 and np.allclose(np.frombuffer(seen), np.frombuffer(sound), rtol=off, atol=0.0))
 
 
 def faults_of(fault: Fault, fmi: int, seen: Seen) -> list[str]:
@@ -236,7 +236,7 @@ def faults_of(fault: Fault, fmi: int, seen: Seen) -> list[str]:
     ):
         if wanted != was:
             found.append(f"{what} {was}, not {wanted}")
-    if fault.status == 0 and seen.values != sound_values(fmi):
+    if fault.status == 0 and not _alike(seen.values, sound_values(fmi), fault.off):
         found.append("the sound units' outputs are others than without the fault")
     if "Traceback" in seen.output:
         found.append("a traceback is told")

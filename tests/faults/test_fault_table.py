@@ -17,8 +17,6 @@ def rows() -> list[Any]:
         first = fault.standards[i % len(fault.standards)]
         for fmi in fault.standards:
             marks = [] if fault.fast and fmi == first else [pytest.mark.slow]
-            if fault.wrong and fmi in fault.wrong_in:
-                marks.append(pytest.mark.xfail(reason=fault.wrong, strict=True))
             found.append(pytest.param(fault, fmi, marks=marks, id=f"{fault.name}-{fmi}"))
     return found
 

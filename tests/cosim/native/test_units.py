@@ -13,13 +13,13 @@ HARM_HERE = ("_in_load", "_in_unload", "_in_instantiate", "_in_free")
 
 
 def units_of(fmi: int) -> list[str]:
-    return [d.name for d in declarations().values() if fmi == 3 or not d.needs_fmi3]
+    known = [d.name for d in declarations().values() if fmi == 3 or not d.needs_fmi3]
+    return [name for name in known if not name.endswith(HARM_HERE)]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_all_units_are_valid(fmi: int) -> None:
-    units = [name for name in units_of(fmi) if not name.endswith(HARM_HERE)]
-    problems = {name: validate_fmu(str(native_fmu(name, fmi))) for name in units}
+    problems = {name: validate_fmu(str(native_fmu(name, fmi))) for name in units_of(fmi)}
     assert {name: found for name, found in problems.items() if found} == {}
     assert len(problems) > 20
 
