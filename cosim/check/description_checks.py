@@ -103,8 +103,8 @@ def _unlisted_outputs(root: XmlElement, fmi: int, variables: Sequence[DescribedV
     """Yield the outputs that are not listed; FMPy says that some are not, but not which."""
     if fmi == 2:
         listed = {u.get("index") for u in root.named("ModelStructure", "Outputs", "Unknown")}
-        positions = {id(e): str(i + 1) for i, e in enumerate(root.named("ModelVariables", "ScalarVariable"))}
-        missing = [v for v in variables if v.causality == "output" and positions[id(v.element)] not in listed]
+        positions = {e: str(i + 1) for i, e in enumerate(root.named("ModelVariables", "ScalarVariable"))}
+        missing = [v for v in variables if v.causality == "output" and positions[v.element] not in listed]
     else:
         listed = {u.get("valueReference") for u in root.named("ModelStructure", "Output")}
         missing = [v for v in variables if v.causality == "output" and v.reference not in listed]

@@ -21,13 +21,20 @@ class UnsafeXml(ValueError):
 class XmlElement:
     """An element with the line at which it begins; `tag` has its namespace before it, as in `{urn:x}name`.
 
-    It is a view of lxml's: of a large document only what is looked at becomes Python objects.
+    It is a view of lxml's: of a large document only what is looked at becomes Python objects. Views of the same element
+    are equal.
     """
 
     __slots__ = ("_element",)
 
     def __init__(self, element: Any) -> None:
         self._element = element
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, XmlElement) and self._element is other._element
+
+    def __hash__(self) -> int:
+        return hash(self._element)
 
     @property
     def tag(self) -> str:
