@@ -5,6 +5,7 @@ from pathlib import Path
 from native_units import native_fmu
 
 from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.cosim.fmu.loading import UNLOADING
 from handover.cosim.system.system import System
 
 
@@ -19,7 +20,8 @@ class CallLog(Heartbeat):
         super().begin(code, t)
         under_way = self.under_way
         assert under_way is not None
-        self.calls.append(under_way[:2])
+        if under_way.call != UNLOADING:  # which is no call of the unit's
+            self.calls.append(under_way[:2])
 
     def after(self, unit: str, call: str, last: str) -> list[str]:
         """Return what was called of a unit after the last `call` of the unit `last`."""
