@@ -34,7 +34,7 @@ $(VENV)/bin/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 10) and 'Python 3.10 or newer is needed; this is ' + sys.version)"
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.installed: pyproject.toml constraints.txt setup.py $(wildcard fmus/runtime/*.[ch] cosim/plan/*.[ch]) | $(VENV)/bin/python
+$(VENV)/.installed: pyproject.toml constraints.txt setup.py $(wildcard fmus/runtime/*.[ch] cosim/plan/*.[ch] cosim/isolation/*.[ch]) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable . --constraint constraints.txt
 	touch $@
@@ -44,4 +44,4 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	touch $@
 
 clean:
-	rm -rf $(VENV) build *.egg-info fmus/runtime/bin cosim/plan/bin
+	rm -rf $(VENV) build *.egg-info fmus/runtime/bin cosim/plan/bin cosim/isolation/bin

@@ -1,7 +1,7 @@
 """Compiles the FMI runtime and the master's plan while the package is built; all else is in pyproject.toml.
 
 The wheel has the runtime for this machine, or for the platforms that the environment variable HANDOVER_FMI_PLATFORMS
-names, and the plan for this machine.
+names, and the plan and the process of isolated units for this machine.
 """
 
 import shutil
@@ -15,9 +15,12 @@ from setuptools.errors import CompileError, OptionError
 
 sys.path.insert(0, str(Path(__file__).parent))  # a build frontend leaves it out
 
+from handover.cosim.isolation.compile import compile_isolation
 from handover.cosim.native_libraries import CompilationError, host_platform
 from handover.cosim.plan.compile import compile_plan
 from handover.fmus.compile import UnknownPlatform, compile_runtime, wanted_platforms
+
+_FOR_THE_HOST = ("handover.cosim.plan", "handover.cosim.isolation")
 
 
 def _wanted_platforms() -> tuple[str, ...]:
@@ -35,15 +38,16 @@ class BuildWithLibraries(build_py):
         try:
             compile_runtime(_wanted_platforms())
             compile_plan()
+            compile_isolation()
         except CompilationError as e:
             raise CompileError(str(e)) from e
-        for package in (("handover", "fmus", "runtime"), ("handover", "cosim", "plan")):
+        for package in (("handover", "fmus", "runtime"), *(name.split(".") for name in _FOR_THE_HOST)):
             shutil.rmtree(Path(self.build_lib, *package, "bin"), ignore_errors=True)  # of a build before
         super().run()
 
     def find_data_files(self, package: str, src_dir: str) -> list[str]:
         """Leave out what a checkout has been compiled for besides."""
-        wanted = (host_platform(),) if package == "handover.cosim.plan" else _wanted_platforms()
+        wanted = (host_platform(),) if package in _FOR_THE_HOST else _wanted_platforms()
         files = [Path(file) for file in super().find_data_files(package, src_dir)]
         return [str(file) for file in files if file.parent.parent.name != "bin" or file.parent.name in wanted]
 

@@ -1,4 +1,4 @@
-"""Compiles C sources of this project to shared libraries with `zig cc`, once for each state of the sources.
+"""Compiles C sources of this project to libraries and programs with `zig cc`, once for each state of the sources.
 
 Used while the package is built, where nothing but the standard library and ziglang is installed, and for what is
 missing or out of date in a checkout.
@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 # by FMI 3.0's name of the platform: zig's name, the suffix of a shared library
@@ -29,17 +29,9 @@ TARGETS = {
 glibc 2.17 is the oldest with AArch64, macOS 11 the oldest on Apple silicon; zig's own choice is the latest but two.
 """
 
-FLAGS = (
-    "-O2",
-    "-std=c11",
-    "-shared",
-    "-fPIC",
-    "-fvisibility=hidden",
-    "-s",
-    "-Wall",
-    "-Wextra",
-    "-Wno-unused-parameter",
-)
+_FLAGS = ("-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-Wno-unused-parameter")
+FLAGS = ("-O2", "-std=c11", "-shared", "-fPIC", *_FLAGS)
+_PROGRAM_FLAGS = ("-O2", "-std=c11", *_FLAGS)
 STAMP = "sources.sha256"
 """The name of the file beside compiled libraries that holds the fingerprint of the sources they were made from."""
 DIGESTS = "libraries.sha256"
@@ -69,6 +61,7 @@ class NativeLibraries:
         folder: where the sources are.
         sources: by library's name, the source files that it is compiled from.
         compiler: compiles a library.
+        programs: by program's name, likewise; there are none for Windows.
     """
 
     what: str
@@ -76,10 +69,15 @@ class NativeLibraries:
     folder: Path
     sources: Mapping[str, Sequence[str]]
     compiler: Compiler
+    programs: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
 
     def library(self, target: str, name: str) -> Path:
         """Return the path of a library for a platform or, if it is not compiled, the path that it will have."""
-        return (self._current(target) or self.folder / "bin" / target) / f"{name}{TARGETS[target][1]}"
+        return self._place(target) / f"{name}{TARGETS[target][1]}"
+
+    def program(self, target: str, name: str) -> Path:
+        """Return the path of a program for a platform, likewise."""
+        return self._place(target) / name
 
     def is_current(self, target: str) -> bool:
         """Return whether the libraries for a platform exist and were compiled from the present sources."""
@@ -99,18 +97,26 @@ class NativeLibraries:
         folder = self._writable_folder(target, fingerprint)
         if self._is_made(folder, target, fingerprint):
             _log.warning("a library of the %s in %s is damaged; it is compiled again", self.what, folder)
-        names = {name: f"{name}{TARGETS[target][1]}" for name in self.sources}
+        files = self._files(target)
         with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as scratch:
-            for name, sources in self.sources.items():
-                files = [str(self.folder / source) for source in sources]
-                done = self.compiler([*_arguments(target, Path(scratch) / names[name]), *files])
+            for file, sources in files.items():
+                flags = _PROGRAM_FLAGS if file in self.programs else FLAGS
+                paths = [str(self.folder / source) for source in sources]
+                done = self.compiler([*_arguments(target, Path(scratch) / file, flags), *paths])
                 if done.returncode:
                     raise CompilationError(self.what, target, done.stdout)
-            (Path(scratch) / DIGESTS).write_text(_digests([Path(scratch) / name for name in names.values()]))
+            (Path(scratch) / DIGESTS).write_text(_digests([Path(scratch) / file for file in files]))
             (Path(scratch) / STAMP).write_text(fingerprint)
-            for file in (*names.values(), DIGESTS, STAMP):
+            for file in (*files, DIGESTS, STAMP):
                 _write_through(Path(scratch) / file)
                 os.replace(Path(scratch) / file, folder / file)
+
+    def _place(self, target: str) -> Path:
+        return self._current(target) or self.folder / "bin" / target
+
+    def _files(self, target: str) -> "dict[str, Sequence[str]]":
+        """Return what is compiled from which sources, by the name of its file."""
+        return {**{f"{name}{TARGETS[target][1]}": s for name, s in self.sources.items()}, **self.programs}
 
     def _current(self, target: str) -> "Path | None":
         fingerprint = self._fingerprint()
@@ -120,12 +126,12 @@ class NativeLibraries:
         return None
 
     def _is_made(self, folder: Path, target: str, fingerprint: str) -> bool:
-        is_complete = all((folder / f"{name}{TARGETS[target][1]}").is_file() for name in self.sources)
+        is_complete = all((folder / file).is_file() for file in self._files(target))
         return is_complete and (folder / STAMP).is_file() and (folder / STAMP).read_text() == fingerprint
 
     def _is_damaged(self, folder: Path, target: str) -> bool:
         digests = folder / DIGESTS  # there is none beside libraries of earlier versions
-        libraries = [folder / f"{name}{TARGETS[target][1]}" for name in self.sources]
+        libraries = [folder / file for file in self._files(target)]
         return digests.is_file() and digests.read_text() != _digests(libraries)
 
     def _folders(self, target: str, fingerprint: str) -> "tuple[Path, Path]":
@@ -144,7 +150,8 @@ class NativeLibraries:
         raise CompilationError(self.what, target, f"{reasons}HANDOVER_CACHE must be a writable folder")
 
     def _fingerprint(self) -> str:
-        digest = hashlib.sha256(repr((sorted(self.sources.items()), TARGETS, FLAGS)).encode())
+        programs = (sorted(self.programs.items()), _PROGRAM_FLAGS) if self.programs else ()
+        digest = hashlib.sha256(repr((sorted(self.sources.items()), TARGETS, FLAGS, *programs)).encode())
         for source in sorted(self.folder.glob("*.[ch]")):
             digest.update(source.name.encode() + b"\0" + source.read_bytes())
         return digest.hexdigest()
@@ -194,11 +201,11 @@ def zig_cc(arguments: "list[str]") -> "subprocess.CompletedProcess[str]":
     )
 
 
-def _arguments(target: str, library: Path) -> "list[str]":
-    arguments = [*FLAGS, "-target", TARGETS[target][0], "-o", str(library)]
+def _arguments(target: str, file: Path, flags: Sequence[str]) -> "list[str]":
+    arguments = [*flags, "-target", TARGETS[target][0], "-o", str(file)]
     if target.endswith("linux"):
-        arguments.append("-ldl")
-    if target.endswith("darwin"):
+        arguments += ["-ldl", *(["-lpthread"] if flags is _PROGRAM_FLAGS else [])]
+    if target.endswith("darwin") and flags is FLAGS:
         # the default name would be the path in the scratch folder, which differs with every compilation
-        arguments.append(f"-Wl,-install_name,@rpath/{library.name}")
+        arguments.append(f"-Wl,-install_name,@rpath/{file.name}")
     return arguments

@@ -1,0 +1,55 @@
+"""Compiles the process of an isolated unit and the library through which the master calls it, `cosim/isolation/*.c`.
+
+By hand: `python -m handover.cosim.isolation.compile`. `setup.py` imports this while the package is built, where nothing
+but the standard library and ziglang is installed.
+"""
+
+import functools
+from pathlib import Path
+
+from handover.cosim.native_libraries import TARGETS, NativeLibraries, has_compiler, host_platform, zig_cc
+
+FOLDER = Path(__file__).parent
+PROXY = ("channel.c", "proxy_process.c", "proxy_tape.c", "proxy_values.c", "proxy_fmi2.c", "proxy_fmi3.c")
+HOST = ("channel.c", "host.c", "host_calls.c")
+
+
+def is_supported() -> bool:
+    """Return whether units can have processes of their own on this machine: not on Windows."""
+    return host_platform() in TARGETS and not host_platform().endswith("windows")
+
+
+def compile_isolation() -> None:
+    """Compile what is missing or older than its sources; do nothing where it is not supported.
+
+    Raises:
+        CompilationError: the compiler failed or is missing, or the files cannot be written.
+    """
+    if is_supported():
+        _libraries().compile(host_platform())
+
+
+@functools.cache
+def isolation_files() -> "tuple[Path, Path] | None":
+    """Return the library and the program, compiled first if necessary and possible; None if there are none.
+
+    Raises:
+        CompilationError: the compiler failed, or the files cannot be written.
+    """
+    host = host_platform()
+    if not is_supported():
+        return None
+    if not _libraries().is_current(host) and has_compiler():
+        compile_isolation()
+    if not _libraries().is_current(host):
+        return None
+    return _libraries().library(host, "proxy"), _libraries().program(host, "unit_host")
+
+
+def _libraries() -> NativeLibraries:
+    what = "process of isolated units"
+    return NativeLibraries(what, "isolation", FOLDER, {"proxy": PROXY}, zig_cc, {"unit_host": HOST})
+
+
+if __name__ == "__main__":
+    compile_isolation()

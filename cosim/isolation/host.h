@@ -1,0 +1,22 @@
+#ifndef HOST_H
+#define HOST_H
+
+#include "calls.h"
+#include "channel.h"
+
+typedef void (*Function)(void);
+
+typedef struct {
+    const char *name;
+    enum shape shape;
+    Function function;
+} Entry;
+
+extern Entry entries[N_CALLS];
+
+int load_library(const char *path, const char *prefix);
+void unload_library(void);
+void add_log(int status, const char *message);
+_Noreturn void serve(const Channel *channel, size_t size);
+
+#endif

@@ -1,0 +1,231 @@
+/* The tape: calls are written one after another, and played up to the one whose result is wanted. */
+#include "proxy.h"
+
+#include <string.h>
+
+Record *record(Connection *c, uint64_t at) { return (Record *)(c->base + at); }
+
+static uint64_t tape_end(const Connection *c) { return TAPE_AT + c->channel.shared->tape_used; }
+
+/* Return room at the end of the tape, 0 if there is none. */
+uint64_t extend(Connection *c, Call *call, uint64_t size) {
+    Shared *shared = c->channel.shared;
+    uint64_t at = tape_end(c), more = aligned(size);
+    if (!call->at || size > c->size || at + more > c->size / 2) {
+        call->at = 0;
+        return 0;
+    }
+    shared->tape_used += more;
+    record(c, call->at)->size += more;
+    return at;
+}
+
+static void clear_tape(Connection *c) { c->channel.shared->tape_used = 0; }
+
+bool open_call(Connection *c, Call *call, int id) {
+    *call = (Call){0};
+    if (c->ending != RUNNING)
+        return false;
+    if (c->in_flight)
+        end_step(c, NULL);
+    if (c->ending != RUNNING)
+        return false;
+    call->at = tape_end(c);
+    if (!extend(c, call, sizeof(Record)))
+        return false;
+    *record(c, call->at) = (Record){.call = id, .size = sizeof(Record)};
+    return true;
+}
+
+void add_argument(Connection *c, Call *call, uint64_t value, bool is_address) {
+    if (!call->at)
+        return;
+    Record *r = record(c, call->at);
+    int i = call->n_arguments++;
+    r->arguments[i] = value;
+    r->addresses |= (uint32_t)is_address << i;
+}
+
+void give_number(Connection *c, Call *call, uint64_t number) { add_argument(c, call, number, false); }
+
+void give_real(Connection *c, Call *call, int i, double real) {
+    if (call->at)
+        record(c, call->at)->reals[i] = real;
+}
+
+uint64_t copied(Connection *c, Call *call, const void *bytes, uint64_t size) {
+    uint64_t at = bytes ? extend(c, call, size ? size : 1) : 0;
+    if (at && size)
+        memcpy(c->base + at, bytes, size);
+    return at;
+}
+
+void give_bytes(Connection *c, Call *call, const void *bytes, uint64_t size) {
+    call->last = copied(c, call, bytes, size);
+    add_argument(c, call, call->last, true);
+}
+
+void give_text(Connection *c, Call *call, const char *text) { give_bytes(c, call, text, text ? strlen(text) + 1 : 0); }
+
+void take_bytes(Connection *c, Call *call, void *bytes, uint64_t size) {
+    uint64_t at = bytes ? extend(c, call, size ? size : 1) : 0;
+    add_argument(c, call, at, true);
+    if (!at)
+        return;
+    call->results[call->n_results].to = bytes;
+    call->results[call->n_results].from = at;
+    call->results[call->n_results++].size = size;
+}
+
+void give_and_take(Connection *c, Call *call, void *bytes, uint64_t size) {
+    take_bytes(c, call, bytes, size);
+    if (call->at && bytes)
+        memcpy(c->base + call->results[call->n_results - 1].from, bytes, size);
+}
+
+static void take_results(Connection *c, const Call *call) {
+    for (int i = 0; i < call->n_results; i++)
+        memcpy(call->results[i].to, c->base + call->results[i].from, call->results[i].size);
+}
+
+/* Note that no room is left, as the unit's own log would. */
+static int too_large(Connection *c) {
+    const char *text = "a value is larger than the memory that is shared with the unit's process";
+    clear_tape(c);
+    if (c->logger_2)
+        c->logger_2(c->environment, c->name ? c->name : "", ERROR, "unit", "%s", text);
+    else if (c->logger_3)
+        c->logger_3(c->environment, ERROR, "unit", text);
+    return ERROR;
+}
+
+/* Read the status of the tape that was played until the record at `wanted`, and clear it. */
+static int outcome(Connection *c, uint64_t wanted) {
+    Shared *shared = c->channel.shared;
+    uint64_t stopped = shared->stopped_at;
+    int status = ERROR;
+    if (stopped >= TAPE_AT && stopped <= c->size / 2 - sizeof(Record)) {
+        const Record *r = record(c, stopped);
+        status = r->status;
+        if (stopped != wanted)
+            c->failed = r->call >= 0 && r->call < N_CALLS ? r->call : -1;
+    }
+    if (status == FATAL)
+        end_process(c, BY_MASTER); /* the standards forbid all further calls */
+    clear_tape(c);
+    return status;
+}
+
+static int exchange(Connection *c, uint64_t wanted) {
+    c->failed = -1;
+    channel_give(&c->channel);
+    return await(c) ? outcome(c, wanted) : FATAL;
+}
+
+int close_call(Connection *c, Call *call) {
+    if (c->ending != RUNNING)
+        return FATAL;
+    if (!call->at)
+        return too_large(c);
+    c->generation++;
+    int status = exchange(c, call->at);
+    if (c->ending == RUNNING && c->failed < 0)
+        take_results(c, call);
+    return status;
+}
+
+int defer_call(Connection *c, Call *call) {
+    if (!c->in_step_mode || !call->at)
+        return close_call(c, call);
+    c->generation++;
+    return OK;
+}
+
+int call_plain(Connection *c, int id) {
+    Call call;
+    open_call(c, &call, id);
+    return close_call(c, &call);
+}
+
+static void add_gets(Connection *c) {
+    for (size_t i = 0; i < c->n_known; i++) {
+        Known *known = &c->known[i];
+        Call get = {.at = tape_end(c)};
+        if (!known->asked || !extend(c, &get, sizeof(Record)))
+            continue;
+        *record(c, get.at) = (Record){
+            .call = CALL_get_slot, .size = sizeof(Record), .batched = 1, .addresses = 1, .arguments = {known->at}};
+        ((Slot *)(c->base + known->at))->done = 0;
+        known->generation = c->generation;
+        known->asked = false;
+    }
+}
+
+/* Let the tape be played, up to the step and on to the reading of what was asked for since the one before. */
+void start_step(Connection *c, Call *call) {
+    if (!call->at) {
+        too_large(c);
+        return;
+    }
+    c->generation++;
+    c->step_at = call->at;
+    add_gets(c);
+    c->in_flight = true;
+    c->failed = -1;
+    channel_give(&c->channel);
+}
+
+int end_step(Connection *c, bool *has_results) {
+    if (!c->in_flight)
+        return c->ending == RUNNING ? ERROR : FATAL; /* it could not be begun */
+    c->in_flight = false;
+    if (!await(c))
+        return FATAL;
+    int status = outcome(c, c->step_at);
+    if (has_results)
+        *has_results = c->ending == RUNNING && c->failed < 0;
+    return status;
+}
+
+void change_mode(Connection *c, bool in_step_mode) {
+    c->in_step_mode = in_step_mode;
+    for (size_t i = 0; i < c->n_known; i++)
+        c->known[i].asked = false;
+}
+
+API int isolation_load(Connection *c, const char *path, const char *prefix) {
+    Call call;
+    open_call(c, &call, CALL_load_library);
+    give_text(c, &call, path);
+    give_text(c, &call, prefix);
+    return close_call(c, &call);
+}
+
+API int isolation_unload(Connection *c) { return call_plain(c, CALL_unload_library); }
+
+API void isolation_log_to(Connection *c, Logger3 logger) {
+    c->logger_2 = NULL;
+    c->logger_3 = logger;
+}
+
+/* Have the unit's process read variables, unless it has since the last change; return the status. */
+int read_known(Connection *c, Known *known) {
+    Slot *slot = (Slot *)(c->base + known->at);
+    if (c->in_flight)
+        end_step(c, NULL);
+    if (c->ending != RUNNING)
+        return FATAL;
+    if (known->generation != c->generation || !slot->done) {
+        Call call;
+        if (!open_call(c, &call, CALL_get_slot))
+            return close_call(c, &call);
+        add_argument(c, &call, known->at, true);
+        slot->done = 0;
+        known->generation = c->generation;
+        int status = exchange(c, call.at);
+        if (c->failed >= 0 || c->ending != RUNNING)
+            return status;
+    }
+    known->asked = c->in_step_mode;
+    return slot->status;
+}
