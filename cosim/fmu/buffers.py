@@ -107,9 +107,11 @@ class OutputBuffer(SignalBuffer):
 
     Attributes:
         kept_elsewhere: keeps memory alive to which C code copies them instead of this buffer.
+        copies: False where they stay, until they are read again, in memory that an isolated unit shares.
     """
 
     kept_elsewhere: object = None
+    copies: bool = True
 
     def __init__(self, name: str, function: Any, component: Any, fmi: int, ports: Sequence[FmuPort]) -> None:
         super().__init__(name, function, component, fmi, ports)
@@ -119,7 +121,7 @@ class OutputBuffer(SignalBuffer):
     def __call__(self) -> int:
         """Get and copy all values; return the FMI status."""
         status = super().__call__()
-        if status in SUCCEEDED:
+        if status in SUCCEEDED and self.copies:
             for i in range(len(self._kept)):
                 self._keep(i)
         return status

@@ -87,12 +87,17 @@ def _doubles(values: Floats) -> Any:
 
 @dataclass(frozen=True)
 class NativeStep:
-    """Addresses that C code needs to call DoStep; `flags` are those of FMI 3's output arguments."""
+    """Addresses that C code needs to call DoStep; `flags` are those of FMI 3's output arguments.
+
+    `begin` is the function that begins the step of an isolated instance, with the arguments of FMI 2's DoStep; 0 for
+    others.
+    """
 
     fmi: int
     function: int
     component: int
     flags: tuple[int, ...]
+    begin: int = 0
 
 
 _LAST_SUCCESSFUL_TIME, _TERMINATED = ctypes.c_int(2), ctypes.c_int(3)  # of fmi2StatusKind

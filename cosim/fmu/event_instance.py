@@ -38,10 +38,10 @@ class EventInstance(Instance):
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
-        heartbeat: Heartbeat | None = None,
+        heartbeat: Heartbeat | None = None, *, isolated: bool = False,
     ) -> None:  # fmt: skip
         fed = list(inputs)
-        super().__init__(name, description, folder, fed, heartbeat)
+        super().__init__(name, description, folder, fed, heartbeat, isolated=isolated)
         self.in_event_mode = False
         self.active: set[str] = set()
         self.timers: list[ClockTimer] = []
@@ -147,10 +147,9 @@ class EventInstance(Instance):
             timer.next = None if tick is None else Fraction(tick)
 
     def _load(self, folder: Path) -> Any:
-        d = self.description
-        return load_fmi3(
-            d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins, events=True
-        )
+        d, log = self.description, self._take_log_line
+        where = d.path, folder, d.identifier, d.token, self.name
+        return load_fmi3(*where, log, self._begins, events=True, process=self._process.own)
 
     def _is_reachable(self, port: FmuPort) -> bool:
         return not port.clocks or not self._initialized or not self.active.isdisjoint(port.clocks)

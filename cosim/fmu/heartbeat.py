@@ -49,6 +49,7 @@ class Heartbeat:
 
     Attributes:
         abandoned: names of instances that did not return; they and their libraries are neither called nor freed.
+        isolated: names of instances in processes of their own, which are ended after `limit` without further ado.
     """
 
     def __init__(self, memory: mmap.mmap | None = None) -> None:
@@ -62,6 +63,7 @@ class Heartbeat:
         self._write = struct.Struct("=qqd").pack_into
         self._count = 0
         self.abandoned: set[str] = set()
+        self.isolated: set[str] = set()
         if memory is None:
             self.end()
 

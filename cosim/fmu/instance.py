@@ -26,10 +26,12 @@ from handover.cosim.fmu.calls import (
 from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.failures import STATUS, InvalidReturn, StepDiscarded, UnitError, UnitTerminated, failure_of
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.fmu.loading import UNLOADING, load_fmi2, load_fmi3
+from handover.cosim.fmu.instance_process import InstanceProcess
+from handover.cosim.fmu.loading import LOADING, UNLOADING, load_fmi2, load_fmi3
 
 _LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
+UNLOADING = "unloading of its library"
 
 
 def _nothing() -> None:
@@ -40,9 +42,11 @@ class Instance:
     """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
 
     Each call is noted in `heartbeat`. If a call returns after the unit was abandoned, `Abandoned` is raised.
+    An `isolated` instance lives in a process of its own: a crash there is a `UnitCrashed`, a hang a `UnitHung`.
 
     Raises:
         InvalidFmu: the library does not load or does not instantiate.
+        UnitCrashed, UnitHung: an isolated instance does so meanwhile.
     """
 
     returns_early: ClassVar[bool] = False
@@ -50,7 +54,7 @@ class Instance:
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
-        heartbeat: Heartbeat | None = None,
+        heartbeat: Heartbeat | None = None, *, isolated: bool = False,
     ) -> None:  # fmt: skip
         self.name = name
         self.description = description
@@ -62,9 +66,12 @@ class Instance:
         self._codes: dict[str, int] = {}
         self._states = StateCalls(self._call, self._fmi)
         d = description
+        self._process = InstanceProcess(name, d.path, self._heartbeat, isolated=isolated)
         try:
             self._fmu = self._load(folder)
         except InvalidFmu as e:
+            self._process.close()
+            self._fail_if_ended(LOADING)
             raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
         finally:
             self._returned()
@@ -148,6 +155,15 @@ class Instance:
         """Read the unit's outputs into `y`."""
         self._set_or_get(self._getters)
 
+    def begin_step(self, t: float, dt: float) -> None:
+        """Begin a step of an isolated instance, which `step` or `try_step` with the same times waits for."""
+        self._process.begin_step(self._fmi, self._component, t, dt, not self.can_roll_back)
+
+    @property
+    def is_stepping(self) -> bool:
+        """Whether a step was begun that is not waited for yet."""
+        return self._process.is_stepping
+
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt.
 
@@ -158,7 +174,8 @@ class Instance:
 
     def try_step(self, t: float, dt: float) -> StepEnd:
         """Advance from t by dt, or as far as the unit gets; raises as `step` does, except for a discarded step."""
-        if (status := self._call_step(t, dt)) == _DISCARD:
+        status = self._call_step(t, dt)
+        if status == _DISCARD and not self._process.failed_call:
             return StepEnd(self._reached(dt), early=True, discarded=True)
         self.time = self.judge_step(status, dt)
         return StepEnd(self.time, self.time < t + dt, self._step_returns.event)
@@ -175,7 +192,7 @@ class Instance:
             InvalidReturn: it returned early without being allowed to, or with a time out of the step.
             UnitFailure: the status is above Warning.
         """
-        if status == _DISCARD:
+        if status == _DISCARD and not self._process.failed_call:
             how = "--repeat-discarded (repeat_discarded of MasterOptions)"
             raise self.discarded(self._reached(dt), f"steps are repeated shorter only with {how}")
         if status == _PENDING:  # FMI 2: an asynchronous step, which is not supported
@@ -220,7 +237,8 @@ class Instance:
     def native_step(self) -> NativeStep:
         """The call that `step` makes, for C code."""
         do_step = ctypes.cast(self._do_step, ctypes.c_void_p).value or 0
-        return NativeStep(self._fmi, do_step, self._component or 0, self._step_returns.addresses)
+        begin = self._process.address_of_begin_step(self._fmi)
+        return NativeStep(self._fmi, do_step, self._component or 0, self._step_returns.addresses, begin)
 
     def directional_derivative(self, outputs: Sequence[str], inputs: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return the directional derivative dy = (dy/du) du of outputs at this instant, with the unit's state held.
@@ -297,7 +315,11 @@ class Instance:
             self._call("Terminate")
 
     def free(self) -> None:
-        """Free the unit and its library, unless no call may follow, see `lost`."""
+        """Free the unit and its library, unless no call may follow, see `lost`; end the process of an isolated one.
+
+        Raises:
+            UnitCrashed, UnitHung: an isolated instance does so meanwhile.
+        """
         if self._component is not None and not self.lost:
             component, self._component = self._component, None
             self._begins(f"{self._prefix}FreeInstance")
@@ -306,6 +328,15 @@ class Instance:
             self._begins(UNLOADING)
             self._fmu.freeLibrary()
             self._returned()
+        if self._abandoned:
+            self._process.kill()
+        elif self.isolated:
+            self._end_process()
+
+    @property
+    def isolated(self) -> bool:
+        """Whether the instance lives in a process of its own."""
+        return self._process.own is not None
 
     @property
     def fatal(self) -> bool:
@@ -339,7 +370,8 @@ class Instance:
 
     def _load(self, folder: Path) -> Any:
         load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
-        return load(d.path, folder, d.identifier, d.token, self.name, self._take_log_line, self._begins)
+        log = self._take_log_line
+        return load(d.path, folder, d.identifier, d.token, self.name, log, self._begins, process=self._process.own)
 
     def _call_step(self, t: float, dt: float) -> int:
         self.time = t
@@ -373,7 +405,8 @@ class Instance:
             fmi_type = "Integer" if self._fmi == 2 else "Int64"
         buffer_class = OutputBuffer if verb == "Get" and fmi_type in ("String", "Binary") else SignalBuffer
         call = f"{self._prefix}{verb}{fmi_type}"
-        return buffer_class(call, self._function(f"{verb}{fmi_type}"), self._component, self._fmi, ports)
+        function = self._function(f"{verb}{fmi_type}")
+        return self._process.share(buffer_class(call, function, self._component, self._fmi, ports))
 
     def _restorable_buffers(self) -> list[SignalBuffer]:
         """Return all buffers but those of inputs that hold addresses of other units' outputs."""
@@ -409,11 +442,31 @@ class Instance:
         if status not in SUCCEEDED:
             self._fail(self._prefix + name, status)
 
+    def _end_process(self) -> None:
+        if self.lost:
+            self._process.close()
+            return
+        try:
+            self._fail_if_ended(f"{self._prefix}FreeInstance")
+        finally:
+            self._begins(UNLOADING)
+            self._process.close()
+            self._returned()
+        self._fail_if_ended(UNLOADING)
+
     def _fail(self, call: str, status: int) -> None:
         self._failed = status
         if self.fatal:
             self.on_fatal()
-        raise failure_of(self.name, call, self.time, status, tuple(self.log))
+        self._fail_if_ended(call)
+        raise failure_of(self.name, self._process.failed_call or call, self.time, status, tuple(self.log))
+
+    def _fail_if_ended(self, call: str) -> None:
+        """Raise how the process of an isolated instance ended, if it did."""
+        failure = self._process.failure(call, self.time, tuple(self.log))
+        if failure is not None:
+            self._failed = _FATAL
+            raise failure
 
     def _take_log_line(self, status: int, message: str) -> None:
         if status > 0:

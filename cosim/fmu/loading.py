@@ -18,6 +18,8 @@ import fmpy.fmi2
 import fmpy.fmi3
 
 from handover.cosim.exceptions import InvalidFmu, one_line
+from handover.cosim.fmu.fmpy_edge import library_path
+from handover.cosim.isolation.unit_process import UnitProcess
 
 
 def _read_once(base: Any) -> Any:
@@ -82,8 +84,11 @@ def load_fmi3(
     begins: Begins,
     *,
     events: bool = False,
+    process: UnitProcess | None = None,
 ) -> Any:
     """Load and instantiate an FMI 3 co-simulation FMU; `events` turns on event mode and early return.
+
+    With a `process`, it is loaded by that process, and FMPy calls it through the proxy.
 
     Returns:
         FMPy's `FMU3Slave`.
@@ -97,15 +102,25 @@ def load_fmi3(
 
     with _loading(path):
         begins(LOADING)
-        fmu = FMU3Unit(guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance)
+        fmu = _loaded(FMU3Unit, 3, folder, identifier, token, instance, log, process)
         with _unloading(fmu):
             begins("fmi3InstantiateCoSimulation")
             fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
         return fmu
 
 
-def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: str, log: Logger, begins: Begins) -> Any:
-    """Load and instantiate an FMI 2 co-simulation FMU; return FMPy's `FMU2Slave`.
+def load_fmi2(
+    path: Path,
+    folder: Path,
+    identifier: str,
+    token: str,
+    instance: str,
+    log: Logger,
+    begins: Begins,
+    *,
+    process: UnitProcess | None = None,
+) -> Any:
+    """Load and instantiate an FMI 2 co-simulation FMU, by `process` if given; return FMPy's `FMU2Slave`.
 
     Raises:
         InvalidFmu: the library does not load, lacks a function, or does not instantiate.
@@ -119,7 +134,7 @@ def load_fmi2(path: Path, folder: Path, identifier: str, token: str, instance: s
     fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
     with _loading(path):
         begins(LOADING)
-        fmu = FMU2Unit(guid=token, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=instance)
+        fmu = _loaded(FMU2Unit, 2, folder, identifier, token, instance, log, process)
         _loggers[environment] = log
         weakref.finalize(fmu, _loggers.pop, environment, None)
         with _unloading(fmu):
@@ -146,6 +161,21 @@ def _log_fmi2(environment: int | None, _instance: bytes, status: int, _category:
 _dispatch_fmi2 = fmpy.fmi2.fmi2CallbackLoggerTYPE(_log_fmi2)
 """The logger of all FMI 2 units. FMPy's proxy, which formats messages, has one logger per process, the last one that it
 was given, and keeps calling it: so this must be one that distinguishes units and is never freed."""
+
+
+def _loaded(
+    kind: Any, fmi: int, folder: Path, identifier: str, token: str, instance: str, log: Logger,
+    process: UnitProcess | None,
+) -> Any:  # fmt: skip
+    """Return FMPy's object for a library that is loaded, into this process or into the unit's own."""
+    names = {"guid": token, "modelIdentifier": identifier, "unzipDirectory": str(folder), "instanceName": instance}
+    if process is None:
+        return kind(**names)
+    process.load((folder / library_path(fmi, identifier)).resolve(), fmi, log)
+    unit, first_base = kind.__new__(kind), kind.__mro__[-2]
+    first_base.__init__(unit, **names, libraryPath=str(process.proxy))  # the class's own has no choice of library
+    process.select()
+    return unit
 
 
 @contextmanager

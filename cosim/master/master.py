@@ -10,7 +10,7 @@ from typing import TypeVar
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
 from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.calls import is_rounding
-from handover.cosim.fmu.failures import UnitHung, UnitTerminated
+from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.host_process import claim
 from handover.cosim.master.pacing import Pacer
@@ -60,6 +60,7 @@ class Master:
         WiringError: the system has faults. InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
         ScheduleError: see `StepperFactory`.
         InitializationError: a unit did not accept its parameters or did not initialise.
+        UnitHung: one did not return; UnitCrashed: an isolated one ended its process.
     """
 
     def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
@@ -89,7 +90,7 @@ class Master:
         claim()
         try:
             self._watchdog.run_job(self._start)
-        except UnitHung:
+        except (UnitCrashed, UnitHung):
             self._end()
             raise
         except UnitFailure as e:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.cosim.master.isolated_units import isolated_units
 from handover.cosim.plan.choice import log_fallback, plan_stepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
@@ -27,11 +28,13 @@ class StepperFactory:
         schedule: the grid and the order of the units.
 
     Raises:
+        InvalidOptions: see `isolated_units`.
         ScheduleError: see `Schedule`, `check_control` and `check_off_grid`, or there are cycles that cannot be solved.
     """
 
     def __init__(self, system: System, options: MasterOptions) -> None:
         self._system, self._options = system, options
+        self._isolated = isolated_units(system, options.isolated)
         self.schedule = Schedule(system)
         if options.adaptive is not None:
             check_control(system, options.adaptive)
@@ -52,7 +55,7 @@ class StepperFactory:
     def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
         """Load the units; the caller closes `cleanups`, also if this fails."""
         load = EventEnsemble if self.has_events else Ensemble
-        ensemble = load(self._system, heartbeat, cleanups)
+        ensemble = load(self._system, heartbeat, cleanups, self._isolated)
         ensemble.measures_cpu = self._options.cpu_times
         return ensemble
 

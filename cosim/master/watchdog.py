@@ -80,7 +80,10 @@ class Watchdog:
         poll_interval = min(limit / 4, _MAX_POLL_INTERVAL)
         stall_timer = StallTimer(self._heartbeat, 2 * poll_interval, self._clock)
         while not task.done.wait(poll_interval):
-            if stall_timer.poll() >= limit and stall_timer.beat is not None:
+            seconds, call = stall_timer.poll(), self._heartbeat.under_way
+            if call is not None and call.unit in self._heartbeat.isolated:
+                seconds -= _GRACE  # its process is ended at the limit, and the call returns
+            if seconds >= limit and stall_timer.beat is not None:
                 self._give_up(task, stall_timer.beat, limit)
 
     def _give_up(self, task: _Task, beat: tuple[int, int], limit: float) -> None:

@@ -101,10 +101,15 @@ class Ensemble:
     """
 
     def __init__(
-        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None
-    ) -> None:
-        """Load the units; where `cleanups` is given, the caller closes it, also if this fails."""
+        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None,
+        isolated: Collection[str] = (),
+    ) -> None:  # fmt: skip
+        """Load the units, those `isolated` in processes of their own.
+
+        Where `cleanups` is given, the caller closes it, also if this fails.
+        """
         self.system = system
+        self._isolated = isolated
         self.heartbeat = heartbeat or Heartbeat()
         self.host = HostProcess()
         """How this process was before units were loaded; it is put back after each."""
@@ -214,6 +219,17 @@ class Ensemble:
             UnitFailure: a number does not fit its input.
         """
         self._feedings[unit].transfer(t)
+
+    def begin(self, unit: str, t: float, dt: float) -> bool:
+        """Begin a step, which `step` finishes, in the process of an isolated unit; return whether it is one.
+
+        Raises:
+            UnitFailure: what comes before a step failed.
+        """
+        instance = self.instances[unit]
+        if instance.isolated:
+            instance.begin_step(t, dt)
+        return instance.isolated
 
     def step(self, unit: str, t: float, dt: float) -> None:
         """Step a unit from t to t + dt.
@@ -328,15 +344,17 @@ class Ensemble:
                 raise InvalidFmu(e.path, f"{name}: {e.fault}", e.log) from e
             finally:
                 self.host.restore()
-            instance.on_fatal = functools.partial(self._corrupt.add, d.path)
-            named[unpacked[d.path]].append(name)
+            if not instance.isolated:
+                instance.on_fatal = functools.partial(self._corrupt.add, d.path)
+                named[unpacked[d.path]].append(name)
             self._cleanups.add(functools.partial(self._free, instance))
             self.instances[name] = instance
         note_libraries(self.heartbeat, named)
 
     def _make(self, name: str, folder: Path) -> Instance:
         d = self.system.units[name].description
-        return Instance(name, d, folder, self.system.fed_inputs(name), self.heartbeat)
+        isolated = name in self._isolated
+        return Instance(name, d, folder, self.system.fed_inputs(name), self.heartbeat, isolated=isolated)
 
     def _end_at_close(self, instance: Instance) -> None:
         def end() -> None:  # the unit is freed next, whether or not it terminates properly
@@ -346,9 +364,12 @@ class Ensemble:
         self._cleanups.add(end)
 
     def _free(self, instance: Instance) -> None:
-        if not self.is_corrupt(instance):
+        if instance.isolated or not self.is_corrupt(instance):
             instance.free()
 
     def is_corrupt(self, instance: Instance) -> bool:
-        """Return whether an instance of the same FMU returned Fatal: the standards then forbid calls of all of them."""
-        return instance.description.path in self._corrupt
+        """Return whether an instance of the same FMU returned Fatal: the standards then forbid calls of all of them.
+
+        Of an instance in a process of its own, that holds for itself alone.
+        """
+        return instance.fatal if instance.isolated else instance.description.path in self._corrupt

@@ -2,7 +2,7 @@
 
 import contextlib
 import logging
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,11 +29,12 @@ class EventEnsemble(Ensemble):
     """
 
     def __init__(
-        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None
-    ) -> None:
+        self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None,
+        isolated: Collection[str] = (),
+    ) -> None:  # fmt: skip
         self.ends: dict[str, StepEnd] = {}
         self._begun: dict[str, tuple[float, State]] = {}
-        super().__init__(system, heartbeat, cleanups)
+        super().__init__(system, heartbeat, cleanups, isolated)
         staying = (u.name for u in system.units.values() if not u.sampled and not can_roll_back(u))
         self._staying = dict.fromkeys(staying)
         self._warned: set[str] = set()
@@ -48,6 +49,12 @@ class EventEnsemble(Ensemble):
         """The units that run in event mode."""
         return {n: i for n, i in self.instances.items() if isinstance(i, EventInstance)}
 
+    def begin(self, unit: str, t: float, dt: float) -> bool:
+        """Begin a step in the process of an isolated unit; see `Ensemble`."""
+        if self.instances[unit].isolated:
+            self._keep_begin_of_step(unit, t)
+        return super().begin(unit, t, dt)
+
     def step(self, unit: str, t: float, dt: float) -> None:
         """Step a unit from t to t + dt, or as far as it comes; see `ends`.
 
@@ -57,9 +64,9 @@ class EventEnsemble(Ensemble):
         if self.system.units[unit].sampled:
             super().step(unit, t, dt)
             return
-        if unit not in self._staying:
-            self._keep_begin(unit, t)
         instance = self.instances[unit]
+        if not instance.is_stepping:
+            self._keep_begin_of_step(unit, t)
         end = instance.try_step(t, dt)
         self.ends[unit] = self._repeat(instance, t, dt, end) if end.discarded else end
 
@@ -128,6 +135,10 @@ class EventEnsemble(Ensemble):
                 return end if end.early else replace(end, early=True)
         raise instance.discarded(end.reached, f"steps down to {tried:.3g} s were tried")
 
+    def _keep_begin_of_step(self, unit: str, t: float) -> None:
+        if unit not in self._staying and not self.system.units[unit].sampled:
+            self._keep_begin(unit, t)
+
     def _keep_begin(self, unit: str, t: float) -> None:
         self._forget_begin(unit)
         self._begun[unit] = (t, self.instances[unit].save_state())
@@ -145,7 +156,8 @@ class EventEnsemble(Ensemble):
     def _make(self, name: str, folder: Path) -> Instance:
         unit = self.system.units[name]
         make = EventInstance if unit.uses_events else Instance
-        return make(name, unit.description, folder, self.system.fed_inputs(name), self.heartbeat)
+        inputs, isolated = self.system.fed_inputs(name), name in self._isolated
+        return make(name, unit.description, folder, inputs, self.heartbeat, isolated=isolated)
 
 
 def can_roll_back(unit: PlacedUnit) -> bool:

@@ -8,7 +8,7 @@ import enum
 import math
 from dataclasses import asdict, dataclass, fields
 from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
 from handover.cosim.exceptions import InvalidOptions
 
@@ -122,6 +122,9 @@ class MasterOptions:
         repeat_discarded: whether a step that a unit discards is repeated shorter, by all units. They then save their
             states at every step; else a discarded step ends the run. Systems with events do so anyway.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
+        isolated: units that live in processes of their own, by name; `foreign` are those that were not built by this
+            project, `all` is all. What a unit does then harms itself alone, and units that do not wait for each other
+            step at the same time; the results are the same.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
         strict: whether a model description that breaks the standard is refused even where only parts are at fault that
             co-simulation does not touch, such as local variables; else the master warns of it.
@@ -141,6 +144,7 @@ class MasterOptions:
     call_limit: float | None = None
     pace: float | None = None
     strict: bool = False
+    isolated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -151,6 +155,7 @@ class MasterOptions:
             "max_iterations": (_is_above_0(given["max_iterations"], int), "a whole number from 1 on"),
             "tolerance": (_is_above_0(given["tolerance"], int | float), "a finite number above 0"),
             "call_limit": (_is_above_0(given["call_limit"], int | float, None), "None, or a finite number above 0"),
+            "isolated": (_are_names(given["isolated"]), "a tuple of units' names, `foreign` or `all`"),
             "pace": (_is_above_0(given["pace"], int | float, None), "None, or a finite number above 0"),
         }
         faults = [f"{name} = {given[name]!r}: {valid} is right" for name, (fits, valid) in checks.items() if not fits]
@@ -169,6 +174,7 @@ class MasterOptions:
             "extrapolation": self.extrapolation.value,
             "adaptive": control,
             "repeat_discarded": self.repeat_discarded,
+            **({"isolated": list(self.isolated)} if self.isolated else {}),
         }
 
     @property
@@ -187,3 +193,7 @@ def _names(kind: type[enum.Enum]) -> str:
 
 def _is_above_0(value: Any, kind: Any, *others: None) -> bool:
     return value in others or (isinstance(value, kind) and 0 < value < math.inf)
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, tuple) and all(isinstance(name, str) for name in cast(tuple[Any, ...], value))

@@ -1,7 +1,7 @@
 """Options of commands that run units: how the master couples them and chooses their steps."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -34,6 +34,16 @@ class _Above0(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (g
 def _choice(values: type[Algorithm] | type[Extrapolation]) -> click.Choice[str]:
     return click.Choice([v.value for v in values])
 
+
+isolate_option = click.option(
+    "--isolate",
+    multiple=True,
+    metavar="UNIT|foreign|all",
+    help="Let a unit, those that were not built by this project, or all live in processes of their own: one that"
+    " crashes, exits or hangs harms itself alone, and units that do not wait for each other step at the same time."
+    " May be given more than once.",
+)
+"""For commands that take the other options from elsewhere; `isolated` converts it."""
 
 _coupling_option = partial(click.option, cls=HeadedOption, heading="Coupling of units")
 _step_option = partial(click.option, cls=HeadedOption, heading="Length of steps")
@@ -118,9 +128,14 @@ _CONTROL_FIELDS: Mapping[str, str] = {
 
 def master_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options; `coupling_of` converts them to those of `MasterOptions`."""
-    for option in reversed(_OPTIONS):
+    for option in reversed((*_OPTIONS, isolate_option)):
         command = option(command)
     return command
+
+
+def isolated(isolate: Sequence[str]) -> dict[str, Any]:
+    """Return the option `--isolate` as that of `MasterOptions`."""
+    return {"isolated": tuple(dict.fromkeys(isolate))}
 
 
 def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -142,4 +157,5 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
         "extrapolation": Extrapolation(given["extrapolation"]),
         "adaptive": None if given["adaptive"] is None else AdaptiveStep(relative=given["adaptive"], **control),
         "repeat_discarded": given["repeat_discarded"],
+        **isolated(given["isolate"]),
     }

@@ -2,12 +2,14 @@
 
 import contextlib
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from handover.scenarios.cli.console import progress_bar
+from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits
 from handover.scenarios.cli.run_summary import exit_with
 from handover.scenarios.execution.errors import one_line_errors
@@ -19,9 +21,9 @@ from handover.scenarios.results.run_folder import RunFolder
 _HELP = """Resume a run that was interrupted, was killed or failed, from its last checkpoint.
 
 DIR is the folder of a run with --checkpoint. Its results are those of a run without the break, bit for bit in its
-signals; only the times that it took differ. Units and versions must be those that it began with. The options below are
-not kept with the run: give them again where they are wanted. Where the run cannot be resumed, its record is completed
-all the same.
+signals; only the times that it took differ. Units and versions must be those that it began with. Of the options below
+only --isolate is kept with the run: give the others again where they are wanted. Where the run cannot be resumed, its
+record is completed all the same.
 
 A checkpoint is data, but a unit is a program: the run's run.json names the FMUs that are loaded. Where the folder is
 somebody else's, see that they are yours.
@@ -31,15 +33,17 @@ somebody else's, see that they are yours.
 @click.command("resume", help=_HELP, short_help="Resume a run from its last checkpoint.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
+@isolate_option
 @limit_options
-def resume(folder: Path, no_report: bool, call_limit: float, pace: float | None) -> None:
+def resume(folder: Path, no_report: bool, isolate: Sequence[str], call_limit: float, pace: float | None) -> None:
     """Resume a run from its last checkpoint."""
     with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
         run_folder = RunFolder.of_run(folder)
         opened.enter_context(run_folder.held())
         interrupted = InterruptedRun(run_folder)
         task = interrupted.task(opened)
-        task = replace(task, options=replace(task.options, **limits(call_limit, pace)), presented=not no_report)
+        options = replace(task.options, **limits(call_limit, pace), **(isolated(isolate) if isolate else {}))
+        task = replace(task, options=options, presented=not no_report)
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption, interrupted.resumption)
     exit_with(result, task)

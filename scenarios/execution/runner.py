@@ -44,7 +44,8 @@ def run_task(
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
             InvalidCheckpoint: before anything
             was written.
-        UnitHung: a unit does not return as it is loaded or initialised; nothing was written.
+        UnitHung, UnitCrashed: a unit does not return, or an isolated one ends its process, as it is loaded or
+            initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
         RecordNotWritten: there is no room for what it leaves; what was recorded stays.
     """

@@ -1,0 +1,49 @@
+"""Which units of a system live in processes of their own."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from handover.cosim.exceptions import InvalidOptions
+from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.isolation.unit_process import unavailable
+from handover.cosim.native_libraries import CompilationError
+from handover.cosim.system.system import System
+
+FOREIGN, ALL = "foreign", "all"
+_OF_THIS_PROJECT = "resources/unit.json"
+"""A file that every FMU built by this project has."""
+
+
+def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
+    """Return the names of the units that names, `foreign` and `all` stand for; see `MasterOptions.isolated`.
+
+    Raises:
+        InvalidOptions: a name is of no unit, or units cannot have processes of their own on this machine.
+    """
+    units = system.units
+    if unknown := [name for name in wanted if name not in (FOREIGN, ALL) and name not in units]:
+        valid = ", ".join((*units, FOREIGN, ALL))
+        raise InvalidOptions([f"there is no unit {name!r} to isolate; there are {valid}" for name in unknown])
+    if wanted:
+        _check_support()
+    if ALL in wanted:
+        return frozenset(units)
+    ours: dict[Path, bool] = {}
+    named = {name for name in wanted if name != FOREIGN}
+    if FOREIGN in wanted:
+        for name, unit in units.items():
+            path = unit.description.path
+            if path not in ours:
+                ours[path] = _OF_THIS_PROJECT in FmuArchive(path).names
+            if not ours[path]:
+                named.add(name)
+    return frozenset(named)
+
+
+def _check_support() -> None:
+    try:
+        reason = unavailable()
+    except CompilationError as e:
+        reason = str(e)
+    if reason:
+        raise InvalidOptions([f"no unit can be isolated: {reason}"])
