@@ -165,6 +165,10 @@ static int step(Plan *plan, const Operation *o, bool *well) {
     return status;
 }
 
+static void begin_step(const Plan *plan, const Operation *o) {
+    ((void (*)(void *, double, double, int))o->step.function)(o->step.component, plan->time, o->step.step, true);
+}
+
 static void charge(Plan *plan, const Operation *o) {
     double now = cpu_clock();
     plan->spent[o->unit * plan->spent_capacity + plan->n_spent[o->unit]++] = now - plan->clock;
@@ -206,6 +210,9 @@ enum outcome carry_out(Plan *plan, const Segment *segment) {
         case STEP_2:
         case STEP_3:
             status = step(plan, o, &well);
+            break;
+        case BEGIN_STEP:
+            begin_step(plan, o);
             break;
         case CONVERT:
             convert(o);

@@ -22,7 +22,8 @@ enum kind {
     STEP_2,      /* fmi2DoStep */
     STEP_3,      /* fmi3DoStep */
     START_CLOCK, /* read the CPU clock */
-    CHARGE       /* charge the CPU time since it was read to a unit */
+    CHARGE,      /* charge the CPU time since it was read to a unit */
+    BEGIN_STEP   /* begin the step of an isolated unit, which STEP_2 or STEP_3 waits for */
 };
 
 enum type { BOOL8, INT8, INT16, INT32, INT64, UINT8, UINT16, UINT32, UINT64, FLOAT32, FLOAT64 };

@@ -1,5 +1,6 @@
 """Turns what a coupling does at a communication point into a flat list of operations, packed as in `plan.h`."""
 
+import contextlib
 import ctypes
 import enum
 import struct
@@ -11,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Width
+from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.buffers import Copy, NativeCall, OutputBuffer, SignalBuffer, Views
 from handover.cosim.fmu.calls import NativeStep
+from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.plan.memory import KeptMemory, Segment
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.options import Algorithm
+from handover.cosim.stepping.pending_steps import n_sources
 from handover.cosim.stepping.transfers import FiniteCheck, Narrowing
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.schedule import Schedule, Slot
@@ -52,6 +56,7 @@ class _Kind(enum.IntEnum):
     STEP_3 = 11
     START_CLOCK = 12
     CHARGE = 13
+    BEGIN_STEP = 14
 
 
 def copy(unit: int, target: NDArray[Any], source: NDArray[Any]) -> bytes:
@@ -100,6 +105,11 @@ def step(unit: int, call: NativeStep, dt: float, code: int) -> bytes:
     return _packed(_STEP, kind, unit, call.function, call.component, dt, *(call.flags or (0, 0, 0, 0)), code=code)
 
 
+def begin_step(unit: int, call: NativeStep, dt: float) -> bytes:
+    """Begin the step of an isolated unit by dt; `step` waits for its end."""
+    return _packed(_STEP, _Kind.BEGIN_STEP, unit, call.begin, call.component, dt, 0, 0, 0, 0)
+
+
 def start_clock() -> bytes:
     """Read the CPU clock."""
     return _packed(_PLAIN, _Kind.START_CLOCK, 0)
@@ -133,6 +143,7 @@ class PlanMaker:
         self.arrive: list[Segment] = []
         self.depart: list[Segment] = []
         self._packed: list[bytes] = []
+        self._begun: Sequence[Slot] = ()  # the steps that have begun where an operation is executed
         self._ensemble, self.library, self.has_clock = ensemble, library, clock
         self._units = {name: i for i, name in enumerate(ensemble.instances)}
         for slots, sampled in ((schedule.sampled, True), (schedule.continuous, False)):
@@ -141,15 +152,21 @@ class PlanMaker:
         self._group_of = {unit: i for i, units in enumerate(self.groups.values()) for unit in units}
         if algorithm is Algorithm.JACOBI:
             due = (*schedule.sampled, *schedule.continuous)
+            isolated = [slot for slot in due if self._is_isolated(slot)]
             self._add(self.arrive, due, self._publish)
             self._add(self.depart, due, self._feed)
+            self._add(self.depart, isolated, self._begin)
             self._start_clock(self.depart)
-            self._add(self.depart, due, self._step, self._charge)
+            for slot in due:
+                if slot not in isolated:
+                    self._begun = due[: due.index(slot)]
+                    self._add(self.depart, [slot], self._step, self._charge)
+            self._begun = ()
+            self._add(self.depart, isolated, self._step, self._charge)
         else:
-            actions = (self._feed, self._step, self._publish, self._charge)
             for phase, slots in ((self.arrive, schedule.sampled), (self.depart, schedule.continuous)):
                 self._start_clock(phase)
-                self._add(phase, slots, *actions)
+                self._add_in_order(phase, slots)
 
     @property
     def packed(self) -> bytes:
@@ -162,6 +179,25 @@ class PlanMaker:
             for act in actions:
                 act(slot)
             self._close(phase, self._group_of[slot.unit], first)
+
+    def _add_in_order(self, phase: list[Segment], slots: Sequence[Slot]) -> None:
+        """Add what `PendingSteps` does: isolated units step while others do that do not read their outputs."""
+        begun: list[Slot] = []
+        for slot in slots:
+            n = n_sources(self._ensemble, slot.unit, begun)
+            self._add(phase, begun[:n], self._step, self._publish, self._charge)
+            begun = begun[n:]
+            self._begun = tuple(begun)
+            if self._is_isolated(slot):
+                self._add(phase, [slot], self._feed, self._begin)
+                begun.append(slot)
+            else:
+                self._add(phase, [slot], self._feed, self._step, self._publish, self._charge)
+            self._begun = ()
+        self._add(phase, begun, self._step, self._publish, self._charge)
+
+    def _is_isolated(self, slot: Slot) -> bool:
+        return self._ensemble.instances[slot.unit].isolated
 
     def _start_clock(self, phase: list[Segment]) -> None:
         if self.has_clock:
@@ -176,8 +212,26 @@ class PlanMaker:
 
     def _note(self, packed: bytes, judge: Judge | None = None) -> None:
         if judge is not None:
-            self.judges[len(self._packed)] = judge
+            self.judges[len(self._packed)] = self._after_begun(judge) if self._begun else judge
         self._packed.append(packed)
+
+    def _after_begun(self, judge: Judge) -> Judge:
+        """Let the failures of steps that were begun, of units that come before, be raised first."""
+        begun = [(self._ensemble.instances[slot.unit], slot.period) for slot in self._begun]
+
+        def judge_in_order(status: int, t: float) -> None:
+            try:
+                judge(status, t)
+            except UnitTerminated:  # no failure: the communication step may be completed
+                raise
+            except UnitFailure:
+                for instance, dt in begun:
+                    if instance.is_stepping:
+                        with contextlib.suppress(UnitTerminated):
+                            instance.step(t, dt)
+                raise
+
+        return judge_in_order
 
     def _feed(self, slot: Slot) -> None:
         unit, instance = self._units[slot.unit], self._ensemble.instances[slot.unit]
@@ -192,6 +246,10 @@ class PlanMaker:
         for buffer, arrays in zip(instance.setters, given, strict=True):
             self._access(slot.unit, buffer, arrays)
 
+    def _begin(self, slot: Slot) -> None:
+        call = self._ensemble.instances[slot.unit].native_step
+        self._note(begin_step(self._units[slot.unit], call, slot.period))
+
     def _step(self, slot: Slot) -> None:
         instance = self._ensemble.instances[slot.unit]
 
@@ -205,7 +263,7 @@ class PlanMaker:
         for buffer in self._ensemble.instances[slot.unit].getters:
             arrays = buffer.native.arrays
             self._access(slot.unit, buffer, arrays)
-            if isinstance(buffer, OutputBuffer):
+            if isinstance(buffer, OutputBuffer) and buffer.copies:
                 kept = KeptMemory(self.library, len(arrays[0]))
                 buffer.kept_elsewhere = kept
                 self._note(keep(self._units[slot.unit], arrays, kept.address), self._judge_kept(slot.unit, buffer))

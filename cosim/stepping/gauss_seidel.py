@@ -7,6 +7,7 @@ from typing import Any
 from handover.cosim.stepping.ensemble import Ensemble, LastStep
 from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.iteration import IteratedStep, IterationCount
+from handover.cosim.stepping.pending_steps import PendingSteps
 from handover.cosim.stepping.solvers import InterfaceSolver
 from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
@@ -88,12 +89,21 @@ class GroupStepping:
 
     def _one_after_another(self, t: float, due: Sequence[Slot], last: LastStep) -> None:
         with self._ensemble.stopwatch() as charge:
-            for slot in due:
-                self._ensemble.feed(slot.unit, t, slot.period)
+
+            def finish(slot: Slot) -> None:
                 with last.completed():
                     self._ensemble.step(slot.unit, t, slot.period)
                 self._ensemble.publish(slot.unit)
                 charge(slot.unit)
+
+            pending = PendingSteps(self._ensemble, finish)
+            for slot in due:
+                pending.finish_sources(slot.unit)
+                with pending.failing_first():
+                    self._ensemble.feed(slot.unit, t, slot.period)
+                    if not pending.begin(slot, t):
+                        finish(slot)
+            pending.finish()
 
 
 class GaussSeidel:

@@ -6,6 +6,7 @@ from typing import Any
 from handover.cosim.stepping.ensemble import Ensemble, LastStep
 from handover.cosim.stepping.gauss_seidel import GroupStepping, MakeSolver
 from handover.cosim.stepping.iteration import IterationCount
+from handover.cosim.stepping.pending_steps import PendingSteps
 from handover.cosim.system.loops import Group
 from handover.cosim.system.schedule import Slot
 
@@ -39,7 +40,11 @@ class Jacobi:
             self._ensemble.publish(slot.unit)
 
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
-        """Set all inputs, then step; units of loops come last, so that their results reach no other input."""
+        """Set all inputs, then step, isolated units all at the same time.
+
+        Units of loops come last, so that their results reach no other input.
+        """
+        due = [slot for slot in (*sampled, *continuous) if slot.unit not in self._looped]
         for slot in sampled:
             if slot.unit not in self._looped:
                 self._ensemble.feed(slot.unit, t)
@@ -48,11 +53,18 @@ class Jacobi:
                 self._ensemble.feed(slot.unit, t, slot.period)
         last = LastStep()
         with self._ensemble.stopwatch() as charge:
-            for slot in (*sampled, *continuous):
-                if slot.unit not in self._looped:
-                    with last.completed():
-                        self._ensemble.step(slot.unit, t, slot.period)
-                    charge(slot.unit)
+
+            def finish(slot: Slot) -> None:
+                with last.completed():
+                    self._ensemble.step(slot.unit, t, slot.period)
+                charge(slot.unit)
+
+            pending = PendingSteps(self._ensemble, finish)
+            here = [slot for slot in due if not pending.begin(slot, t)]
+            for slot in here:
+                with pending.failing_first(due[: due.index(slot)]):
+                    finish(slot)
+            pending.finish()
         self._loops.step(t, [slot for slot in (*sampled, *continuous) if slot.unit in self._looped])
         last.end()
 
