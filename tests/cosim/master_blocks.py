@@ -326,3 +326,60 @@ class Tally:
 
     def set_state(self, state: bytes) -> None:
         self.power, self.heard = pickle.loads(state)
+
+
+Photo = Annotated[NDArray[np.uint8], Raster(640, 480)]
+
+
+@dataclass(kw_only=True)
+class CameraOutputs:
+    photo: Photo = output("pixels that differ, also from those of the step before")
+
+
+class Camera:
+    """Gives large pictures."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+
+    def __init__(self, params: EchoParams) -> None:  # noqa: ARG002
+        self.n = 0
+
+    def outputs(self, t: float, u: CounterInputs) -> CameraOutputs:  # noqa: ARG002
+        pixels = np.arange(640 * 480 * 3, dtype=np.uint32) * (self.n + 1)
+        return CameraOutputs(photo=pixels.astype(np.uint8).reshape(480, 640, 3))
+
+    def step(self, t: float, dt: float, u: CounterInputs) -> CameraOutputs:
+        self.n += 1
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        return self.n.to_bytes(8, "little")
+
+    def set_state(self, state: bytes) -> None:
+        self.n = int.from_bytes(state, "little")
+
+
+@dataclass(kw_only=True)
+class ViewerInputs:
+    photo: Photo = port(np.zeros((480, 640, 3), dtype=np.uint8), "a picture")
+
+
+@dataclass(kw_only=True)
+class ViewerOutputs:
+    weight: Number = output("the pixels, each times its place")
+
+
+class Viewer(Stateless):
+    """Looks at every pixel of a large picture."""
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"weight": ("photo",)}
+
+    def __init__(self, params: EchoParams) -> None:  # noqa: ARG002
+        self.places = np.arange(640 * 480 * 3, dtype=np.float64)
+
+    def outputs(self, t: float, u: ViewerInputs) -> ViewerOutputs:  # noqa: ARG002
+        return ViewerOutputs(weight=float(u.photo.ravel() @ self.places))
+
+    def step(self, t: float, dt: float, u: ViewerInputs) -> ViewerOutputs:  # noqa: ARG002
+        return self.outputs(t, u)

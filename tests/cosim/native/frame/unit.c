@@ -89,6 +89,8 @@ static bool reachable(Unit *unit, const Variable *v, bool to_set, const char *ca
 }
 
 const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to_set, const char *call) {
+    if (to_set && unit->model->set)
+        unit->model->set(unit);
     const Variable *v = reference - 1u < unit->model->n_variables ? &unit->model->variables[reference - 1] : NULL;
     if (!v || v->type != (int)type || (to_set && v->causality == OUTPUT)) {
         say(unit, ERROR, "%s: there is no such variable with value reference %u", call, (unsigned)reference);

@@ -68,6 +68,7 @@ typedef struct {
                                                                     fmi3IntervalQualifier it is */
     enum status (*terminate)(Unit *);                            /* what Terminate answers */
     void (*freed)(Unit *);                                       /* the instance is about to be freed */
+    void (*set)(Unit *);                                         /* a variable is about to be set */
 } Model;
 
 /* All of it that a saved state holds lies in one block, `kept`. */

@@ -1,0 +1,190 @@
+"""A unit that ends its own process, in whatever call: it is named, and the others are terminated and freed in order."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from call_log import CallLog, fed_by
+from native_units import native_fmu
+
+from handover.cosim.exceptions import InitializationError, UnitFailure
+from handover.cosim.fmu.failures import UnitCrashed, UnitFatal, UnitHung
+from handover.cosim.master.master import Master
+from handover.cosim.record.reader import Record
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+
+HOW = {
+    "crashes": ("segmentation fault",),
+    "exits": ("it ended its process with status 0",),
+    "aborts": ("aborted",),
+    "overruns": ("segmentation fault", "aborted"),
+}
+CALLS = {
+    "instantiate": ("fmi2Instantiate", "fmi3InstantiateCoSimulation"),
+    "initialize": ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode"),
+    "set": ("fmi2SetReal", "fmi3SetFloat64"),
+    "step": ("fmi2DoStep", "fmi3DoStep"),
+    "get": ("fmi2GetReal", "fmi3GetFloat64"),
+    "terminate": ("fmi2Terminate", "fmi3Terminate"),
+    "free": ("fmi2FreeInstance", "fmi3FreeInstance"),
+}
+TIMES = {"set": 0.3, "step": 0.3, "get": 0.2, "terminate": 1.0, "free": 1.0}
+"""Simulated time of the failure, which is the last that is recorded: outputs are read together with the step."""
+LIMIT = 0.2  # s
+CASES = [
+    (phase, fault, fmi, compiled)
+    for phase in CALLS
+    for fault in (*HOW, "hangs")
+    for fmi, compiled in ((2, True), (3, True), (3, False))
+    if compiled or phase in ("set", "step", "get")
+]
+
+
+def ended(unit: str, fmi: int, record: Path, options: MasterOptions) -> tuple[UnitFailure, CallLog]:
+    call_log, system = CallLog(), fed_by(native_fmu(unit, fmi), fmi)
+    with (
+        pytest.raises((UnitFailure, InitializationError)) as caught,
+        Master(system, options, call_log) as master,
+        Recorder(record) as recorder,
+    ):
+        master.run(Fraction(1), [recorder])
+    failure = caught.value
+    return failure.failure if isinstance(failure, InitializationError) else failure, call_log
+
+
+@pytest.mark.parametrize(("phase", "fault", "fmi", "compiled"), CASES)
+def test_a_unit_that_ends_its_process(phase: str, fault: str, fmi: int, compiled: bool, tmp_path: Path):
+    limit = LIMIT if fault == "hangs" else None
+    options = MasterOptions(isolated=("bad",), compiled=compiled, call_limit=limit)
+    failure, call_log = ended(f"{fault}_in_{phase}", fmi, tmp_path / "r.parquet", options)
+    assert type(failure) is (UnitHung if fault == "hangs" else UnitCrashed)
+    assert (failure.unit, failure.call) == ("bad", CALLS[phase][fmi - 2])
+    assert any("about to" in line for line in failure.log)
+    if fault in HOW:
+        assert failure.status in HOW[fault]
+    if phase in TIMES:
+        assert failure.t == pytest.approx(TIMES[phase])
+        assert Record(tmp_path / "r.parquet").time[-1] == pytest.approx(TIMES[phase])
+    ends = [(unit, call) for unit, call in call_log.calls if call.endswith(("Terminate", "FreeInstance"))]
+    for unit in {"source", "reader"} & {unit for unit, _ in call_log.calls}:
+        begun = ["Terminate"] if phase in TIMES else []
+        assert [c for u, c in ends if u == unit] == [f"fmi{fmi}{name}" for name in (*begun, "FreeInstance")]
+
+
+def siblings(fmi: int) -> tuple[UnitFailure, CallLog]:
+    """Run two instances of one FMU, of which the first returns Fatal in a process of its own."""
+    system, call_log = fed_by(native_fmu("fatal", fmi), fmi), CallLog()
+    system.add("sibling", native_fmu("fatal", fmi), at=1e9)
+    with pytest.raises(UnitFatal) as caught, Master(system, MasterOptions(isolated=("bad",)), call_log) as master:
+        master.run(Fraction(1))
+    return caught.value, call_log
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_fatal_in_a_process_of_its_own_leaves_other_instances_of_the_fmu_alone(fmi: int):
+    failure, call_log = siblings(fmi)
+    assert (failure.unit, failure.call) == ("bad", f"fmi{fmi}DoStep")
+    ends = [call for unit, call in call_log.calls if unit == "sibling"][-2:]
+    assert ends == [f"fmi{fmi}Terminate", f"fmi{fmi}FreeInstance"]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("unit", ["errs", "gives_nan"])
+def test_other_failures_are_those_of_one_process(unit: str, fmi: int, tmp_path: Path):
+    failures = [ended(unit, fmi, tmp_path / f"{i}", MasterOptions(isolated=i))[0] for i in ((), ("all",))]
+    assert [type(f) for f in failures] == [type(failures[0])] * 2
+    assert failures[0].as_data() == failures[1].as_data()
+
+
+@pytest.mark.parametrize("compiled", [False, True], ids=["general", "plan"])
+@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL])
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_request_to_end_is_that_of_one_process(fmi: int, algorithm: Algorithm, compiled: bool, tmp_path: Path):
+    outcomes: list[object] = []
+    for isolated in ((), ("bad",), ("all",)):
+        record = tmp_path / "-".join(("r", *isolated))
+        options = MasterOptions(isolated=isolated, algorithm=algorithm, compiled=compiled)
+        with Master(fed_by(native_fmu("ends", fmi), fmi), options) as master, Recorder(record) as recorder:
+            master.run(Fraction(1), [recorder])
+            assert master.ended is not None
+            ended = master.ended.as_data()
+        outcomes.append((ended, record.read_bytes()))
+    assert outcomes[0] == outcomes[1] == outcomes[2]
+
+
+_RUN = """
+import sys, os
+import os
+import subprocess
+import sys
+import threading
+import time
+from fractions import Fraction
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from native_units import native_fmu
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.system.system import System
+s = System()
+s.add("idle", native_fmu("gain"))
+s.add("busy", native_fmu("hangs"))
+with Master(s, MasterOptions(isolated=("all",))) as master:
+    hosts = [i._process.own._process.pid for i in master.ensemble.instances.values()]
+    print(*hosts, flush=True)
+    master.run(Fraction(1))
+"""
+
+
+def test_no_process_is_left_when_the_master_is_killed():
+    tests = str(Path(__file__).parents[1])
+    with subprocess.Popen([sys.executable, "-c", _RUN.format(tests=tests)], stdout=subprocess.PIPE) as run:
+        assert run.stdout is not None
+        hosts = [int(pid) for pid in run.stdout.readline().split()]
+        assert len(hosts) == 2
+        assert all(runs(pid) for pid in hosts)
+        run.kill()
+    deadline = time.monotonic() + 30
+    while any(runs(pid) for pid in hosts) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not any(runs(pid) for pid in hosts)
+
+
+def runs(pid: int) -> bool:
+    """Whether a process is there; one that has ended may wait for somebody to ask how."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    stat = Path(f"/proc/{pid}/stat")
+    return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+class Stuck(CallLog):
+    """Holds the thread of the calls before one of them reaches the process of the unit."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.let_go = threading.Event()
+
+    def begin(self, code: int, t: float) -> None:
+        super().begin(code, t)
+        if self.calls[-1] == ("bad", "fmi3DoStep"):
+            self.let_go.wait(60)
+
+
+def test_what_hangs_on_the_master_s_side_is_left_and_the_process_is_ended():
+    stuck = Stuck()
+    options = MasterOptions(isolated=("bad",), compiled=False, call_limit=LIMIT)
+    master = Master(fed_by(native_fmu("gain"), 3), options, stuck)
+    with pytest.raises(UnitHung, match="bad: fmi3DoStep at t = 0 s did not return"), master:
+        master.run(Fraction(1))
+    for unit in ("source", "reader"):
+        assert [c for u, c in stuck.calls if u == unit][-2:] == ["fmi3Terminate", "fmi3FreeInstance"]
+    stuck.let_go.set()

@@ -1,0 +1,171 @@
+"""Isolated units give the bytes of units in one process, however they are coupled and whatever flows between them."""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import checkpointed_runs
+import pytest
+from both_paths import Build, everything
+from fmu_of import FmuOf
+from native_units import native_fmu
+
+from handover.cosim.exceptions import UnitFailure
+from handover.cosim.master.checkpoint import take_checkpoint
+from handover.cosim.master.master import Master
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+
+SECOND = Fraction(1)
+TENTH = Fraction(1, 10)
+OPTIONS = {
+    **{algorithm.value: {"algorithm": algorithm} for algorithm in Algorithm},
+    **{f"{a.value} general": {"algorithm": a, "compiled": False} for a in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL)},
+    "jacobi events": {"algorithm": Algorithm.JACOBI, "repeat_discarded": True},
+    "events": {"repeat_discarded": True},
+    "linear": {"extrapolation": Extrapolation.LINEAR},
+    "adaptive": {"adaptive": AdaptiveStep(), "extrapolation": Extrapolation.LINEAR},
+}
+PLAIN = [{"algorithm": a, "compiled": c} for a in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL) for c in (False, True)]
+plain = pytest.mark.parametrize("options", PLAIN, ids=["jacobi", "jacobi plan", "gauss-seidel", "gauss-seidel plan"])
+
+
+def recorded(build: Build, stop: Fraction, folder: Path, isolated: Sequence[str], **options: Any) -> object:
+    """Return the record, what an observer saw, and how the run failed, if it did."""
+    seen: list[object] = []
+    system = build()
+    file = folder / f"{'-'.join(isolated) or 'none'}.parquet"
+    failure = ""
+
+    def look(t: float, signals: Signals) -> None:
+        seen.append((t, everything(system, signals)))
+
+    with (
+        Master(system, MasterOptions(isolated=tuple(isolated), **options)) as master,
+        Recorder(file) as recorder,
+    ):
+        try:
+            master.run(stop / 2, [recorder])
+            master.run(stop, [recorder, look])
+        except UnitFailure as e:
+            failure = f"{type(e)} {vars(e)}"
+    return file.read_bytes(), tuple(seen), failure
+
+
+def expect_alike(build: Build, stop: Fraction, folder: Path, options: dict[str, Any], *some: str) -> None:
+    """Expect the outcome of one process if some units are isolated, and if all are."""
+    together = recorded(build, stop, folder, (), **options)
+    for isolated in (some, ("all",)) if some else (("all",),):
+        assert recorded(build, stop, folder, isolated, **options) == together
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+def test_native_units_at_three_rates(options: dict[str, Any], tmp_path: Path):
+    expect_alike(checkpointed_runs.oscillator, SECOND, tmp_path, options, "a", "between")
+
+
+@plain
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_every_kind_of_port_sampled_and_pictures(fmu: FmuOf, fmi: int, options: dict[str, Any], tmp_path: Path):
+    def build() -> System:
+        s = System()
+        counter = s.add("counter", fmu("Counter"), period=Fraction(1, 30), sampled=True)
+        echo = s.add("echo", fmu("Echo"), period=Fraction(1, 20))
+        passer = s.add("passer", native_fmu("discrete_passer", fmi), period=TENTH)
+        for name in ("n", "odd", "light", "pair", "picture"):
+            s.connect(getattr(counter.y, name), getattr(echo.u, name))
+        s.connect(echo.y.odd_back, passer.u.truth_in)
+        s.connect(echo.y.n_back, passer.u.count_in)
+        return s
+
+    expect_alike(build, SECOND, tmp_path, options, "counter")
+
+
+@plain
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_texts_that_become_longer(fmu: FmuOf, fmi: int, options: dict[str, Any], tmp_path: Path):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Diary", fmi)), s.add("b", fmu("Diary", 3), mark="bbb")
+        s.connect(a.y.text, b.u.heard)
+        s.connect(b.y.text, a.u.heard)
+        return s
+
+    expect_alike(build, 2 * SECOND, tmp_path, options, "a")
+
+
+@plain
+def test_numbers_of_other_widths_and_bytes(fmu: FmuOf, options: dict[str, Any], tmp_path: Path):
+    def build() -> System:
+        s = System()
+        a, b = s.add("a", fmu("Tally", 3), factor=-3), s.add("b", fmu("Tally", 3), factor=2)
+        s.connect(a.y.positive, b.u.whole)
+        s.connect(a.y.third, b.u.single)
+        s.connect(b.y.third, a.u.double)
+        first = s.add("first", native_fmu("binary_passer", 3), u=b"some bytes\0, a zero among them")
+        second = s.add("second", native_fmu("binary_passer", 3), period=Fraction(1, 5))
+        s.connect(first.y.y, second.u.u)
+        return s
+
+    expect_alike(build, 2 * SECOND, tmp_path, options, "b", "first")
+
+
+def bouncing() -> System:
+    """At most times the slow unit is ahead; at an impact it is rolled back."""
+    s = System()
+    ball, slow = s.add("ball", native_fmu("ball")), s.add("slow", native_fmu("integrator"), period=Fraction(1, 2))
+    alarm, watch = s.add("alarm", native_fmu("alarm"), delay=0.15), s.add("watch", native_fmu("watch"))
+    s.connect(ball.y.v, slow.u.u)
+    s.connect(ball.y.bounces, alarm.u.wish)
+    s.connect(alarm.y.rings, watch.u.count_in)
+    return s
+
+
+def counting() -> System:
+    s = System()
+    fast, slow = s.add("fast", native_fmu("counter_tenths")), s.add("slow", native_fmu("counter_triggered"))
+    thirds = s.add("thirds", native_fmu("counter_thirds"))
+    s.connect(fast.y.carry, slow.u.tick)
+    s.connect(slow.y.count, thirds.u.increment)
+    return s
+
+
+@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL])
+@pytest.mark.parametrize(("build", "some"), [(bouncing, ("ball", "slow")), (counting, ("slow",))])
+def test_events_and_clocks(build: Build, some: tuple[str, ...], algorithm: Algorithm, tmp_path: Path):
+    expect_alike(build, 2 * SECOND, tmp_path, {"algorithm": algorithm}, *some)
+
+
+@pytest.mark.parametrize("repeats", [False, True])
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_step_that_is_discarded(fmi: int, repeats: bool, tmp_path: Path):
+    def build() -> System:
+        s = System()
+        s.add("short", native_fmu("discards", fmi))
+        s.add("other", native_fmu("integrator"), u=1.0)
+        return s
+
+    expect_alike(build, SECOND, tmp_path, {"repeat_discarded": repeats}, "short")
+
+
+@pytest.mark.parametrize("options", PLAIN[2:], ids=["general", "plan"])
+@pytest.mark.parametrize("into", [(), ("all",)], ids=["together", "isolated"])
+def test_a_run_that_is_resumed(into: tuple[str, ...], options: dict[str, Any], tmp_path: Path):
+    """A checkpoint of isolated units is one of units in one process, and the other way round."""
+    whole, rest = tmp_path / "whole.parquet", tmp_path / "rest.parquet"
+    make: Callable[..., MasterOptions] = MasterOptions
+    with Master(checkpointed_runs.oscillator(), make(**options)) as master, Recorder(whole) as recorder:
+        master.run(SECOND, [recorder])
+    out = tuple({"all"} - {*into})
+    with Master(checkpointed_runs.oscillator(), make(isolated=out, **options)) as master, Recorder(rest) as recorder:
+        master.run(Fraction(2, 5), [recorder])
+        checkpoint = take_checkpoint(master, recorder.rows)
+    with Master(checkpointed_runs.oscillator(), make(isolated=into, **options)) as master:
+        checkpoint.restore(master)
+        with Recorder(rest, after=checkpoint.rows) as recorder:
+            skipped = iter([True])
+            master.run(SECOND, [lambda t, y: None if next(skipped, False) else recorder(t, y)])
+    assert rest.read_bytes() == whole.read_bytes()
