@@ -1,0 +1,74 @@
+"""What a process of its own costs a unit, and what two processes save two heavy units.
+
+`pytest tests/benchmarks/test_isolated_speed.py --benchmark-enable -s` prints the figures, of wall time: they are those
+of the units only where the machine is idle.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="units are isolated on Linux and macOS"),
+]
+
+NativeFmu = Callable[..., Path]
+TARGET, TARGET_SHARE = 15.0, 0.6
+"""Most us of wall time that isolation adds to a step, and the most of one process's time that two need."""
+
+
+def microseconds(fmu: Path, isolated: str, *arguments: int) -> float:
+    """Return what a step of a ring takes."""
+    command = [sys.executable, str(Path(__file__).with_name("isolated_units.py")), str(fmu), isolated]
+    done = subprocess.run([*command, *map(str, arguments)], capture_output=True, text=True, timeout=170, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def is_idle() -> bool:
+    """Whether nothing else runs: wall time then tells of the units."""
+    return os.getloadavg()[0] < 0.7
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_step_of_an_isolated_unit(benchmark: BenchmarkFixture, native_fmu: NativeFmu, fmi: int) -> None:
+    times: dict[str, float] = {}
+
+    def measure() -> None:
+        for isolated in ("", "u0", "all"):
+            times[isolated] = microseconds(native_fmu("trivial", fmi), isolated, 10_000, 2)
+
+    benchmark.pedantic(measure)
+    cost = times["u0"] - times[""]
+    of_both = (times["all"] - times[""]) / 2
+    print(f"\nisolation adds {cost:.1f} us of wall time to a step of FMI {fmi} (set, step and get),", end=" ")
+    print(f"{of_both:.1f} us where both units of the ring are isolated; {idleness()}")
+    benchmark.extra_info["us a step"] = cost
+    if benchmark.enabled and is_idle():
+        assert cost <= TARGET
+
+
+def test_two_heavy_units(benchmark: BenchmarkFixture, native_fmu: NativeFmu) -> None:
+    times: dict[str, float] = {}
+
+    def measure() -> None:
+        for isolated in ("", "all"):
+            times[isolated] = microseconds(native_fmu("heavy", 3), isolated, 200, 2, 100)
+
+    benchmark.pedantic(measure)
+    share = times["all"] / times[""]
+    print(f"\ntwo units of {times[''] / 2e3:.2f} ms a step under Jacobi take {share:.0%} of one process; {idleness()}")
+    benchmark.extra_info["share of one process"] = share
+    if benchmark.enabled and is_idle() and (os.cpu_count() or 1) > 1:
+        assert share <= TARGET_SHARE
+
+
+def idleness() -> str:
+    return f"load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors"
