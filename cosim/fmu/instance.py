@@ -6,12 +6,11 @@ heartbeat and is checked: a status above Warning raises the `UnitFailure` of tha
 
 import collections
 import ctypes
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.exceptions import InvalidFmu, last_line
 from handover.cosim.fmu.buffers import SUCCEEDED, InputDerivatives, OutputBuffer, SignalBuffer, Views, fill
 from handover.cosim.fmu.calls import (
     NativeStep,
@@ -23,30 +22,19 @@ from handover.cosim.fmu.calls import (
     discarded_step,
     is_rounding,
 )
+from handover.cosim.fmu.checked_calls import CheckedCalls
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.fmu.failures import STATUS, InvalidReturn, StepDiscarded, UnitError, UnitTerminated, failure_of
-from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.fmu.instance_process import InstanceProcess
-from handover.cosim.fmu.loading import LOADING, UNLOADING, load_fmi2, load_fmi3
+from handover.cosim.fmu.failures import InvalidReturn, StepDiscarded, UnitError, UnitTerminated
+from handover.cosim.fmu.heartbeat import Heartbeat
 
-_LOG_LINES = 30
 _DISCARD, _FATAL, _PENDING = 2, 4, 5
-UNLOADING = "unloading of its library"
 
 
-def _nothing() -> None:
-    pass
-
-
-class Instance:
+class Instance(CheckedCalls):
     """A unit in a run. `folder` holds its unpacked FMU; `inputs` names the inputs that will be set while running.
 
-    Each call is noted in `heartbeat`. If a call returns after the unit was abandoned, `Abandoned` is raised.
-    An `isolated` instance lives in a process of its own: a crash there is a `UnitCrashed`, a hang a `UnitHung`.
-
     Raises:
-        InvalidFmu: the library does not load or does not instantiate.
-        UnitCrashed, UnitHung: an isolated instance does so meanwhile.
+        InvalidFmu, UnitCrashed, UnitHung: as `CheckedCalls`.
     """
 
     returns_early: ClassVar[bool] = False
@@ -56,29 +44,9 @@ class Instance:
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
         heartbeat: Heartbeat | None = None, *, isolated: bool = False,
     ) -> None:  # fmt: skip
-        self.name = name
-        self.description = description
-        self.time = 0.0
-        self.log: collections.deque[str] = collections.deque(maxlen=_LOG_LINES)
-        self._fmi = description.fmi
-        self._prefix = f"fmi{self._fmi}"
-        self._heartbeat = heartbeat or Heartbeat()
-        self._codes: dict[str, int] = {}
+        super().__init__(name, description, folder, heartbeat, isolated=isolated)
         self._states = StateCalls(self._call, self._fmi)
         d = description
-        self._process = InstanceProcess(name, d.path, self._heartbeat, isolated=isolated)
-        try:
-            self._fmu = self._load(folder)
-        except InvalidFmu as e:
-            self._process.close()
-            self._fail_if_ended(LOADING)
-            raise InvalidFmu(e.path, last_line(self.log) or e.fault, tuple(self.log)) from e
-        finally:
-            self._returned()
-        self._component = self._fmu.component
-        self._failed: int | None = None
-        self.on_fatal: Callable[[], object] = _nothing
-        """Is called when a call returns Fatal, after which no instance of the FMU may be called."""
         self._setters = self._buffers("Set", [d.inputs[i] for i in inputs])
         self._getters = self._buffers("Get", list(d.outputs.values()))
         self.u: dict[str, Views] = {k: v for b in self._setters for k, v in b.views.items()}
@@ -205,15 +173,6 @@ class Instance:
             raise self._terminated(reached, dt)
         return reached
 
-    def judge(self, call: str, status: int) -> None:
-        """Check the status of a call at `time`.
-
-        Raises:
-            UnitFailure: it is above Warning.
-        """
-        if status not in SUCCEEDED:
-            self._fail(call, status)
-
     def check_memory(self, buffer: OutputBuffer) -> None:
         """Check the binaries that the unit gave.
 
@@ -309,70 +268,6 @@ class Instance:
         for buffer, content in zip(self._restorable_buffers(), contents, strict=True):
             buffer.refill(content)
 
-    def end(self) -> None:
-        """Terminate the unit, unless a call failed with another status than Discard: the standards forbid it then."""
-        if not self.failed and not self._abandoned:
-            self._call("Terminate")
-
-    def free(self) -> None:
-        """Free the unit and its library, unless no call may follow, see `lost`; end the process of an isolated one.
-
-        Raises:
-            UnitCrashed, UnitHung: an isolated instance does so meanwhile.
-        """
-        if self._component is not None and not self.lost:
-            component, self._component = self._component, None
-            self._begins(f"{self._prefix}FreeInstance")
-            self._function("FreeInstance")(component)
-            self._returned()
-            self._begins(UNLOADING)
-            self._fmu.freeLibrary()
-            self._returned()
-        if self._abandoned:
-            self._process.kill()
-        elif self.isolated:
-            self._end_process()
-
-    @property
-    def isolated(self) -> bool:
-        """Whether the instance lives in a process of its own."""
-        return self._process.own is not None
-
-    @property
-    def fatal(self) -> bool:
-        """Whether a call returned Fatal."""
-        return self._failed == _FATAL
-
-    @property
-    def failed(self) -> bool:
-        """Whether a call returned a status after which the unit cannot be stepped."""
-        return self._failed not in (None, _DISCARD)
-
-    @property
-    def lost(self) -> bool:
-        """Whether no call may follow, not even to free the unit: one returned Fatal, or did not return."""
-        return self.fatal or self._abandoned
-
-    @property
-    def _abandoned(self) -> bool:
-        return self.name in self._heartbeat.abandoned
-
-    def _begins(self, call: str) -> None:
-        code = self._codes.get(call)
-        if code is None:
-            code = self._codes[call] = self._heartbeat.code(self.name, call)
-        self._heartbeat.begin(code, self.time)
-
-    def _returned(self) -> None:
-        self._heartbeat.end()
-        if self._heartbeat.abandoned and self._abandoned:
-            raise Abandoned
-
-    def _load(self, folder: Path) -> Any:
-        load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
-        log = self._take_log_line
-        return load(d.path, folder, d.identifier, d.token, self.name, log, self._begins, process=self._process.own)
-
     def _call_step(self, t: float, dt: float) -> int:
         self.time = t
         self._step_returns.clear(t + dt)
@@ -431,46 +326,3 @@ class Instance:
         self._returned()
         if status not in SUCCEEDED:
             self._fail(f"setting {port.name}", status)
-
-    def _function(self, name: str) -> Any:
-        return getattr(self._fmu.dll, self._prefix + name)
-
-    def _call(self, name: str, *arguments: Any) -> None:
-        self._begins(self._prefix + name)
-        status = self._function(name)(self._component, *arguments)
-        self._returned()
-        if status not in SUCCEEDED:
-            self._fail(self._prefix + name, status)
-
-    def _end_process(self) -> None:
-        if self.lost:
-            self._process.close()
-            return
-        try:
-            self._fail_if_ended(f"{self._prefix}FreeInstance")
-        finally:
-            self._begins(UNLOADING)
-            self._process.close()
-            self._returned()
-        self._fail_if_ended(UNLOADING)
-
-    def _fail(self, call: str, status: int) -> None:
-        self._failed = status
-        if self.fatal:
-            self.on_fatal()
-        self._fail_if_ended(call)
-        raise failure_of(self.name, self._process.failed_call or call, self.time, status, tuple(self.log))
-
-    def _fail_if_ended(self, call: str) -> None:
-        """Raise how the process of an isolated instance ended, if it did."""
-        failure = self._process.failure(call, self.time, tuple(self.log))
-        if failure is not None:
-            self._failed = _FATAL
-            raise failure
-
-    def _take_log_line(self, status: int, message: str) -> None:
-        if status > 0:
-            text = message.removeprefix(f"{self.name}: ")  # logs are shown with the instance's name
-            line = f"[{STATUS[status] if status < len(STATUS) else status}] {text}"
-            self.log.append(line)
-            self._heartbeat.log(self.name, line)

@@ -2,7 +2,6 @@
 
 However a run ends, its summary is made here: `finished_summary`, also where a unit failed; `crashed_summary`, where the
 run's process ended; `unstarted_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
-Keys stand in the files as the keyword arguments here name them.
 
 Also here: the metrics that every run has, whatever the scenario (`run_metrics`: CPU time, memory, iterations), and the
 system's units and connections, which `run.json` keeps for the report's graph (`describe_system`).
@@ -154,10 +153,7 @@ class Summary(Configuration, _OfSomeSummaries):
 
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """A run after its end. `failure` is set if a unit failed; the record then ends at the failure.
-
-    `left_out` says, a line each, what of its presentation could not be made.
-    """
+    """A run after its end; where a unit failed, `failure` says how. For `left_out` see `Summary`."""
 
     outcome: Outcome
     summary: Summary
