@@ -104,7 +104,7 @@ static bool fits(const Operation *o) {
 }
 
 /* A number times zero is zero, unless it is infinite or NaN: a sum without branches, which compilers vectorise. */
-static bool finite(const Operation *o) {
+static bool values_are_finite(const Operation *o) {
     double sum = 0;
     for (size_t i = 0; i < o->check.n; i++)
         sum += real(o->check.values, (int)o->check.type, i) * 0.0;
@@ -224,7 +224,7 @@ enum outcome carry_out(Plan *plan, const Segment *segment) {
             well = fits(o);
             break;
         case FINITE:
-            well = finite(o);
+            well = values_are_finite(o);
             break;
         case KEEP_BYTES:
         case KEEP_TEXTS:

@@ -4,12 +4,13 @@
 #include <signal.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <ucontext.h>
 #include <unistd.h>
 #ifdef __linux__
 #include <sys/syscall.h>
-#else
+#include <ucontext.h>
+#else /* macOS's <ucontext.h> is refused without _XOPEN_SOURCE, which hides pthread_threadid_np() */
 #include <pthread.h>
+#include <sys/ucontext.h>
 #endif
 
 static volatile int64_t *note;

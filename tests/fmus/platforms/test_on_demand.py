@@ -179,6 +179,7 @@ def test_two_processes_compile_at_once(sources: Path):
         library(host_platform(), 2).name,
         library(host_platform(), 3).name,
         "sources.sha256",
+        "libraries.sha256",
     }
 
 
