@@ -6,17 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from failing_systems import start, wait_until
-from native_units import native_fmu
+from failing_systems import failing_ssp, start, wait_until
 from processes import children, family, lives, until
 
 from handover.cosim.record.reader import Record
-from handover.cosim.ssp.writing import write_ssp
-from handover.cosim.system.system import System
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 slow = pytest.mark.slow
@@ -29,16 +25,6 @@ HARMLESS_IN_THE_END = (
 FIRST = {("close_descriptors", "step"), ("take_output", "load"), ("round_up", "step"), ("fork_itself", "step")}
 
 
-def ssp(folder: Path, bad: str, fmi: int = 3) -> Path:
-    """Write a system of a sine, the unit `bad`, and an integrator of it, of 0.1 s steps until 1 s."""
-    s = System()
-    source, unit = s.add("source", native_fmu("sine", fmi)), s.add("bad", native_fmu(bad, fmi))
-    reader = s.add("reader", native_fmu("integrator", fmi))
-    s.connect(source.y.y, unit.u.u)
-    s.connect(unit.y.y, reader.u.u)
-    return write_ssp(s, folder / f"{bad}.ssp", bad, Fraction(1))
-
-
 def finish(going: "subprocess.Popen[str]") -> tuple[int, str, str]:
     shown, errors = going.communicate(timeout=180)
     return going.returncode, shown, errors
@@ -48,7 +34,7 @@ def finish(going: "subprocess.Popen[str]") -> tuple[int, str, str]:
 def expected(tmp_path_factory: pytest.TempPathFactory) -> list[float]:
     """What the reader's output is where nothing does harm."""
     folder = tmp_path_factory.mktemp("expected")
-    status, _, errors = finish(start(folder, ssp(folder, "stateless"), "--out", "r", "--no-report"))
+    status, _, errors = finish(start(folder, failing_ssp(folder, "stateless"), "--out", "r", "--no-report"))
     assert (status, errors) == (0, "")
     return Record(folder / "r" / "signals.parquet")["reader.x"].tolist()
 
@@ -66,7 +52,7 @@ def test_a_run_ends_as_if_the_unit_had_done_no_harm(
     harm: str, when: str, way: str, expected: list[float], tmp_path: Path
 ):
     coupling = () if way == "plan" else ("--algorithm", "fixed-point")
-    status, shown, errors = finish(start(tmp_path, ssp(tmp_path, f"{harm}_in_{when}"), "--out", "r", *coupling))
+    status, shown, errors = finish(start(tmp_path, failing_ssp(tmp_path, f"{harm}_in_{when}"), "--out", "r", *coupling))
     assert (status, errors) == (0, ""), shown
     assert f"{harm}_in_{when}.ssp succeeded: ran to 1 s" in shown
     assert shown.count("succeeded") == 1
@@ -100,7 +86,7 @@ def test_a_run_ends_as_if_the_unit_had_done_no_harm(
     ],
 )
 def test_what_fails_as_units_are_loaded_or_ended_is_told_with_call_and_time(bad: str, text: str, tmp_path: Path):
-    going = start(tmp_path, ssp(tmp_path, bad), "--out", "r", "--call-limit", "0.5", "--no-report")
+    going = start(tmp_path, failing_ssp(tmp_path, bad), "--out", "r", "--call-limit", "0.5", "--no-report")
     status, _, errors = finish(going)
     assert status == 3, errors
     assert text in errors, errors
@@ -115,7 +101,7 @@ def test_what_fails_as_units_are_loaded_or_ended_is_told_with_call_and_time(bad:
 
 
 def test_a_thread_of_a_unit_that_crashes_is_told_with_the_unit(tmp_path: Path):
-    file = ssp(tmp_path, "start_crashing_thread_in_step")
+    file = failing_ssp(tmp_path, "start_crashing_thread_in_step")
     status, _, errors = finish(start(tmp_path, file, "--out", "r", "--pace", "1", "--no-report"))
     assert status == 3, errors
     assert errors.startswith("unit bad crashed in a thread of its own at t = 0."), errors
@@ -125,7 +111,9 @@ def test_a_thread_of_a_unit_that_crashes_is_told_with_the_unit(tmp_path: Path):
 
 
 def test_what_a_unit_has_forked_does_not_outlive_the_run(tmp_path: Path):
-    going = start(tmp_path, ssp(tmp_path, "fork_and_hang_in_step"), "--out", "r", "--call-limit", "2", "--no-report")
+    going = start(
+        tmp_path, failing_ssp(tmp_path, "fork_and_hang_in_step"), "--out", "r", "--call-limit", "2", "--no-report"
+    )
     processes: list[int] = []
 
     def forked() -> bool:
@@ -140,7 +128,7 @@ def test_what_a_unit_has_forked_does_not_outlive_the_run(tmp_path: Path):
 
 @pytest.mark.parametrize("bad", ["ignore_signals_and_hang", pytest.param("fork_and_hang", marks=slow)])
 def test_a_run_dies_with_its_parent_whatever_the_unit_does(bad: str, tmp_path: Path):
-    going = start(tmp_path, ssp(tmp_path, f"{bad}_in_step"), "--out", "r", "--call-limit", "0")
+    going = start(tmp_path, failing_ssp(tmp_path, f"{bad}_in_step"), "--out", "r", "--call-limit", "0")
     tail = tmp_path / "r" / "signals.tail"
     wait_until(lambda: tail.exists() and tail.read_bytes()[16] >= 3, going)
     processes = children(going.pid)
