@@ -1,8 +1,8 @@
 """What units share with their host: its directory, standard streams, signal handlers, arithmetic, and its identity.
 
 A unit's library may change any of these as it is loaded or called, and then every other unit, and the host itself, runs
-with that. `HostProcess` notes how they were and puts them back. `is_copy` tells a process that a unit has forked, and
-which returns from the unit's call beside the host, from the host.
+with that. `HostProcess` notes how they were and puts them back. A process that a unit has forked returns from the
+unit's call, too, and would go on as a second host: `exit_if_forked` ends it.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ def _identity_page() -> mmap.mmap:
 
 
 identity = _identity_page()
-"""Its first byte is 0 in a copy of this process that was forked since `claim`; for C code: `identity_address`."""
+"""Its first byte is 0 in a process that was forked from this one since `mark_as_host`; C code: `identity_address`."""
 
 
 def identity_address() -> int:
@@ -43,12 +43,12 @@ def identity_address() -> int:
     return ctypes.addressof(ctypes.c_char.from_buffer(identity))
 
 
-def claim() -> None:
+def mark_as_host() -> None:
     """Make the calling process the host, as before calls of units begin: it may have been forked by its own program."""
     identity[0] = 1
 
 
-def end_copy() -> None:
+def exit_if_forked() -> None:
     """End this process at once if a unit has forked it from the host in a call that returns here too."""
     if not identity[0]:
         os._exit(0)
@@ -83,27 +83,27 @@ class HostProcess:
             handlers_set_here: put back also signal handlers that were set through Python, as by a unit that is a Python
                 block; else only those that were set behind its back.
         """
-        end_copy()
+        exit_if_forked()
         if self._directory is not None and _directory() != self._directory:
             with contextlib.suppress(OSError):
                 os.chdir(self._directory)
         for number, copy in self._streams.items():
-            if _file(number) != _file(copy) and _file(copy) is not None:
+            if opened_file(number) != opened_file(copy) and opened_file(copy) is not None:
                 os.dup2(copy, number)
         for number, (handler, known) in self._handlers.items():
             if _significant(self._handler(number)) != _significant(handler) and (
                 handlers_set_here or signal.getsignal(number) == known
             ):
                 self._libc.sigaction(number, handler, None)
-        self.settle()
+        self.restore_arithmetic()
 
-    def settle(self) -> None:
+    def restore_arithmetic(self) -> None:
         """Put back the floating-point environment of the calling thread; a process that a unit has forked ends."""
-        end_copy()
+        exit_if_forked()
         if self._libm is not None and self._arithmetic is not None:
             self._libm.fesetenv(self._arithmetic)
 
-    def restore_now_and_then(self) -> None:
+    def restore_if_due(self) -> None:
         """Do as `restore`, if that was not done in the last fifth of a second."""
         now = time.monotonic()
         if now - self._checked_at > _INTERVAL:
@@ -169,8 +169,11 @@ def _copied(number: int) -> int | None:
     return None
 
 
-def _file(number: int) -> tuple[int, int, int] | None:
-    """Return which file a descriptor is open for; None where it is closed."""
+def opened_file(number: int) -> tuple[int, int, int] | None:
+    """Return which file a descriptor is open for; None where it is closed.
+
+    A unit may close a descriptor of the host, and open another file, which then gets its number.
+    """
     try:
         found = os.fstat(number)
     except OSError:

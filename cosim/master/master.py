@@ -12,7 +12,7 @@ from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
-from handover.cosim.fmu.host_process import claim
+from handover.cosim.fmu.host_process import mark_as_host
 from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.master.watchdog import Watchdog
@@ -87,7 +87,7 @@ class Master:
             raise RuntimeError("the master is entered already: leave it first, or make another one")
         self._is_left = False
         self.ended = None
-        claim()
+        mark_as_host()
         try:
             self._watchdog.run_job(self._start)
         except (UnitCrashed, UnitHung):
@@ -198,7 +198,7 @@ class Master:
         Raises:
             UnitHung: a unit does not return. Whatever else the job raises.
         """
-        claim()
+        mark_as_host()
         return self._watchdog.run_job(job)
 
     def _start(self) -> None:
@@ -246,7 +246,7 @@ class Master:
             self.pacer.start(self.time)
         last, arriving = self.schedule.ticks(stop), True
         if len(observers) > 1:  # a recorder alone does not bring the plan back to Python at each point
-            observers = [*observers, lambda _t, _signals: self.ensemble.host.restore_now_and_then()]
+            observers = [*observers, lambda _t, _signals: self.ensemble.host.restore_if_due()]
         try:
             if isinstance(self.stepper, PlanStepper):
                 pause = None if self.pacer is None else self._pause(until)
@@ -259,7 +259,7 @@ class Master:
                     raise Abandoned
                 if self.pacer is not None:
                     self._pause(until)()
-                self.ensemble.host.settle()
+                self.ensemble.host.restore_arithmetic()
                 for observe in observers:
                     observe(self.stepper.time, signals)
                 if ended or until():

@@ -44,7 +44,7 @@ static enum outcome carry_out_all(Plan *plan, const Segment *segments, int64_t n
 
 /* Undo what units have done to this thread's arithmetic; end a process that a unit has forked from this one. Once a
  * communication point, before its row is recorded: after each step it would cost a tenth of the loop. */
-static void settle(Plan *plan) {
+static void restore_arithmetic(Plan *plan) {
 #ifndef _WIN32
     if (!*plan->identity)
         _exit(0);
@@ -96,14 +96,14 @@ static bool add_row(const Plan *plan, const Record *record) {
 API int plan_arrive(Plan *plan, int64_t last) {
     plan->float_control = float_control();
     enum outcome outcome = arrive(plan, last);
-    settle(plan);
+    restore_arithmetic(plan);
     return outcome;
 }
 
 API int plan_depart(Plan *plan) {
     plan->float_control = float_control();
     enum outcome outcome = depart(plan);
-    settle(plan);
+    restore_arithmetic(plan);
     return outcome;
 }
 
@@ -121,7 +121,7 @@ API int plan_run(Plan *plan, int64_t last, int64_t points, bool leave, const Rec
         outcome = leave ? depart(plan) : PAUSED;
         if (outcome == PAUSED)
             outcome = arrive(plan, last);
-        settle(plan);
+        restore_arithmetic(plan);
         leave = true;
         if (outcome > PAUSED)
             break;

@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from handover.cosim.fmu.host_process import opened_file
 from handover.cosim.record.columns import RecordColumns
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.record.tail import DamagedTail, RecordBlock
@@ -34,7 +35,7 @@ class RecordStream:
         self.path = path
         self._file = open(path, "r+b" if size else "wb", buffering=0)  # noqa: SIM115 (kept open)
         self._lost: list[Any] = []  # files whose descriptors belong to somebody else: not to be closed
-        self._is = _identity(self._file)
+        self._opened = opened_file(self._file.fileno())
         self.size = size
         """Bytes written."""
         if size:
@@ -62,7 +63,7 @@ class RecordStream:
         self._file.close()
 
     def _reopen_if_lost(self) -> None:
-        if _identity(self._file) != self._is:
+        if opened_file(self._file.fileno()) != self._opened:
             self._lost.append(self._file)
             self._file = open(self.path, "r+b", buffering=0)  # noqa: SIM115 (kept open)
             self._file.seek(self.size)
@@ -78,15 +79,6 @@ class RecordStream:
             self._file.seek(self.size)
             raise
         self.size = self._file.tell()
-
-
-def _identity(file: Any) -> tuple[int, int] | None:
-    """Return which file on the disk an open file's descriptor stands for; None where it is closed."""
-    try:
-        found = os.fstat(file.fileno())
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino
 
 
 def stream_schema(path: Path) -> "pa.Schema":

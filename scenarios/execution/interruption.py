@@ -9,6 +9,7 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
+from handover.cosim.fmu.host_process import opened_file
 from handover.scenarios.execution.exit_status import ABORTED
 from handover.scenarios.execution.supervisor import leave
 
@@ -119,23 +120,15 @@ class Interruption:
 
 def _closing(end: socket.socket) -> Callable[[], None]:
     """Return a function that closes a socket, unless a unit has closed it and maybe opened a file under its number."""
-    made = _inode(end)
+    made = opened_file(end.fileno())
 
     def close() -> None:
-        if _inode(end) == made:
+        if opened_file(end.fileno()) == made:
             end.close()
         else:
             end.detach()
 
     return close
-
-
-def _inode(end: socket.socket) -> tuple[int, int] | None:
-    try:
-        found = os.fstat(end.fileno())
-    except OSError:
-        return None
-    return found.st_dev, found.st_ino
 
 
 def _say(line: str) -> None:
