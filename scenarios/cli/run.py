@@ -54,7 +54,7 @@ _INPUT = _option(
 )
 
 
-def ssp_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def file_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--stop`, `--step` and `--input`, which are for SSPs and FMUs."""
     return _STOP(_STEP(_INPUT(command)))
 
@@ -87,7 +87,7 @@ def reject_other_options(scenario: str, given: Mapping[str, Any]) -> None:
     elif "--input" in used:
         raise UsageError("--input is for an FMU that runs by itself; a scenario's inputs are wired in it")
     elif {"--stop", "--step"} & set(used):
-        raise UsageError("--stop and --step are for an SSP; a scenario has its own")
+        raise UsageError("--stop and --step are for an SSP or an FMU; a scenario has its own")
 
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
@@ -118,7 +118,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     " `handover check`.  [default: warn]",
 )
 @click.help_option("-h", "--help")
-@ssp_options
+@file_options
 @_record_option(
     "--format",
     "formats",
