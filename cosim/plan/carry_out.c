@@ -136,7 +136,7 @@ static bool keep(const Operation *o) {
 }
 
 /* Whether a step of FMI 3 reached its end, or came as near to it as `time_reached` in calls.py accepts. */
-static bool returned_well(const Operation *o, double t) {
+static bool return_is_valid(const Operation *o, double t) {
 #pragma STDC FP_CONTRACT OFF
     double last = *o->step.last_time, end = t + o->step.step;
     if (*o->step.terminate)
@@ -158,7 +158,7 @@ static int step(Plan *plan, const Operation *o, bool *well) {
         *o->step.last_time = t + o->step.step;
         status = ((Step3)o->step.function)(o->step.component, t, o->step.step, true, o->step.event_needed,
                                            o->step.terminate, o->step.early, o->step.last_time);
-        *well = returned_well(o, t);
+        *well = return_is_valid(o, t);
     }
     if ((unsigned)status <= WARNING && *well)
         plan->unit_times[o->unit] = t + o->step.step;

@@ -163,8 +163,8 @@ class Ensemble:
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
             lost[name] = keep_start(self.instances[name], unit.start, self.system.fed_inputs(name))
-        if losers := [name for name in lost if lost[name]]:
-            raise StartValuesLost(losers, 0.0, [value for name in losers for value in lost[name]])
+        if affected := [name for name in lost if lost[name]]:
+            raise StartValuesLost(affected, 0.0, [value for name in affected for value in lost[name]])
         compute_values()
         for slot in slots:
             self.feed(slot.unit, 0.0)

@@ -31,7 +31,7 @@ class Jacobi:
         self._ensemble = ensemble
         self.count = IterationCount()
         loops = [group for group in groups if group.cycle]
-        self._looped = {name for group in loops for name in group.units}
+        self._in_loops = {name for group in loops for name in group.units}
         self._loops = GroupStepping(ensemble, loops, make_solver, self.count)
 
     def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
@@ -44,12 +44,12 @@ class Jacobi:
 
         Units of loops come last, so that their results reach no other input.
         """
-        due = [slot for slot in (*sampled, *continuous) if slot.unit not in self._looped]
+        due = [slot for slot in (*sampled, *continuous) if slot.unit not in self._in_loops]
         for slot in sampled:
-            if slot.unit not in self._looped:
+            if slot.unit not in self._in_loops:
                 self._ensemble.feed(slot.unit, t)
         for slot in continuous:
-            if slot.unit not in self._looped:
+            if slot.unit not in self._in_loops:
                 self._ensemble.feed(slot.unit, t, slot.period)
         last = LastStep()
         with self._ensemble.stopwatch() as charge:
@@ -65,7 +65,7 @@ class Jacobi:
                 with pending.failing_first(due[: due.index(slot)]):
                     finish(slot)
             pending.finish()
-        self._loops.step(t, [slot for slot in (*sampled, *continuous) if slot.unit in self._looped])
+        self._loops.step(t, [slot for slot in (*sampled, *continuous) if slot.unit in self._in_loops])
         last.end()
 
     def get_state(self) -> Mapping[str, Any]:
