@@ -58,7 +58,6 @@ typedef struct {
     uint64_t tape_used;     /* bytes */
     uint64_t stopped_at;    /* offset of the record that was executed last */
     uint64_t heap_used;     /* offset of free memory, behind the tape */
-    uint64_t tape_end, size;
     uint32_t log_used;
     char log[LOG_SIZE];
 } Shared;
@@ -74,6 +73,9 @@ typedef struct {
 void channel_give(const Channel *channel);
 /* Wait for this side's turn, for so many milliseconds at most; return whether it has come. */
 bool channel_wait(const Channel *channel, int milliseconds);
+
+/* Any other status is a failure, also one that the standards do not know, such as -2. */
+static inline bool succeeded(int status) { return status == OK || status == WARNING; }
 
 static inline uint64_t aligned(uint64_t size) { return (size + 15) & ~(uint64_t)15; }
 

@@ -143,7 +143,7 @@ static int setup(const Entry *entry, const W *a, const double *reals) {
 
 static int step_2(const Entry *entry, const W *a, const double *reals, bool *plain) {
     int status = ((int (*)(void *, double, double, int))entry->function)(component, reals[0], reals[1], (int)a[0]);
-    *plain = status <= WARNING;
+    *plain = succeeded(status);
     return status;
 }
 
@@ -152,7 +152,7 @@ static int step_3(const Entry *entry, const W *a, const double *reals, bool *pla
     bool *flags[] = {(bool *)a[1], (bool *)a[2], (bool *)a[3]};
     int status = ((Step)entry->function)(component, reals[0], reals[1], a[0], flags[0], flags[1], flags[2],
                                          (double *)a[4]);
-    *plain = status <= WARNING && !*flags[0] && !*flags[1] && !*flags[2];
+    *plain = succeeded(status) && !*flags[0] && !*flags[1] && !*flags[2];
     return status;
 }
 
@@ -207,7 +207,7 @@ static int get_texts(const Entry *entry, Slot *slot, bool binary) {
         status = integers(entry, (W[10]){(W)references, slot->n, (W)sizes, (W)given, slot->n_values});
     else if (given && sizes)
         status = integers(entry, (W[10]){(W)references, slot->n, (W)given, slot->n_values});
-    for (uint64_t i = 0; status <= WARNING && i < slot->n_values; i++) {
+    for (uint64_t i = 0; succeeded(status) && i < slot->n_values; i++) {
         size_t size = binary ? sizes[i] : given[i] ? strlen(given[i]) + 1 : 1;
         if (!keep(slot, &places[i], given[i], size)) {
             add_log(ERROR, "the memory shared with the master has no room for its texts and binaries");
@@ -282,7 +282,7 @@ static void play_tape(bool *ended) {
         int status = make_call(record, &plain);
         record->status = status;
         *ended = entries[record->call].shape == UNLOAD;
-        if (status > WARNING && !record->batched)
+        if (!succeeded(status) && !record->batched)
             break;
         at += size;
     }

@@ -33,8 +33,6 @@ API Connection *isolation_open(int file, uint64_t size, int number, uint32_t spi
     Shared *shared = memory;
     shared->spin = spin;
     shared->doing = -1;
-    shared->size = size;
-    shared->tape_end = size / 2;
     shared->heap_used = size / 2;
     pthread_mutex_lock(&lock);
     c->next = connections;

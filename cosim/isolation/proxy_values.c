@@ -90,9 +90,9 @@ int get_variables(Connection *c, int id, const uint32_t *references, size_t n, v
     if (!known)
         return ERROR;
     int status = read_known(c, known);
-    if (status <= WARNING && bytes)
+    if (succeeded(status) && bytes)
         memcpy(values, c->base + known->values_at, n_values * bytes);
-    else if (status <= WARNING)
+    else if (succeeded(status))
         take_texts(c, known, values, sizes);
     return status;
 }

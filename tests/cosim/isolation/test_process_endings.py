@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from call_log import CallLog, fed_by
+from faulty_units import faulty_fmu
 from native_units import native_fmu
 
 from handover.cosim.exceptions import InitializationError, UnitFailure
@@ -164,6 +165,18 @@ def runs(pid: int) -> bool:
         return False
     stat = Path(f"/proc/{pid}/stat")
     return not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+@pytest.mark.parametrize("isolated", [(), ("all",)])
+@pytest.mark.parametrize("call", ["set", "get", "step", "terminate"])
+def test_a_status_that_no_standard_knows_fails_isolated_too(tmp_path: Path, call: str, isolated: tuple[str, ...]):
+    """A set waits for the step and is made with it: its status must not be lost behind that of the step."""
+    bad = faulty_fmu(f"negative_in_{call}", 2, tmp_path)
+    t = 1.0 if call == "terminate" else 0.3
+    named = f"bad: {CALLS[call][0]} at t = {t:g} s answered -2"
+    master = Master(fed_by(bad, 2), MasterOptions(isolated=isolated))
+    with pytest.raises(UnitFailure, match=named), master:
+        master.run(Fraction(1))
 
 
 class Stuck(CallLog):
