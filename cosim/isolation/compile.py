@@ -10,7 +10,15 @@ from pathlib import Path
 from handover.cosim.native_libraries import TARGETS, NativeLibraries, has_compiler, host_platform, zig_cc
 
 FOLDER = Path(__file__).parent
-PROXY = ("channel.c", "proxy_process.c", "proxy_tape.c", "proxy_values.c", "proxy_fmi2.c", "proxy_fmi3.c")
+PROXY = (
+    "channel.c",
+    "proxy_process.c",
+    "proxy_tape.c",
+    "proxy_values.c",
+    "proxy_calls.c",
+    "proxy_fmi2.c",
+    "proxy_fmi3.c",
+)
 HOST = ("channel.c", "host.c", "host_calls.c")
 
 

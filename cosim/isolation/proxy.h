@@ -8,9 +8,7 @@
 #include "calls.h"
 #include "channel.h"
 
-#if defined(__GNUC__)
 #define API __attribute__((visibility("default")))
-#endif
 
 typedef void (*Logger2)(void *, const char *, int, const char *, const char *, ...);
 typedef void (*Logger3)(void *, int, const char *, const char *);
@@ -89,6 +87,15 @@ int set_variables(Connection *c, int id, const uint32_t *references, size_t n, c
                   size_t n_values, size_t bytes);
 int set_table(Connection *c, int id, const uint32_t *references, size_t n, const void *const *values,
               const size_t *sizes, size_t n_values);
+
+int set_debug_logging(Connection *c, int id, bool on, size_t n, const char *const names[]);
+int set_up_experiment(Connection *c, int id, bool has_tolerance, double tolerance, double start, bool has_stop,
+                      double stop);
+int get_or_free_state(Connection *c, int id, void **state);
+int set_state(Connection *c, int id, void *state);
+int get_state_size(Connection *c, int id, void *state, size_t *size);
+int serialize_state(Connection *c, int id, void *state, void *bytes, size_t size);
+int deserialize_state(Connection *c, int id, const void *bytes, size_t size, void **state);
 
 int call_plain(Connection *c, int id);
 int read_known(Connection *c, Known *known);

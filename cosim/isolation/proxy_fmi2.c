@@ -39,30 +39,18 @@ API Connection *fmi2Instantiate(const char *name, int type, const char *guid, co
 API void fmi2FreeInstance(Connection *c) { call_plain(c, CALL_fmi2FreeInstance); }
 
 API int fmi2SetDebugLogging(Connection *c, int on, size_t n, const char *const names[]) {
-    Call call;
-    open_call(c, &call, CALL_fmi2SetDebugLogging);
-    give_number(c, &call, (uint64_t)on);
-    give_number(c, &call, n);
-    give_table(c, &call, (const void *const *)names, NULL, n);
-    return close_call(c, &call);
+    return set_debug_logging(c, CALL_fmi2SetDebugLogging, on, n, names);
 }
 
 API int fmi2SetupExperiment(Connection *c, int has_tolerance, double tolerance, double start, int has_stop,
                             double stop) {
-    Call call;
-    open_call(c, &call, CALL_fmi2SetupExperiment);
-    give_number(c, &call, (uint64_t)has_tolerance);
-    give_number(c, &call, (uint64_t)has_stop);
-    give_real(c, &call, 0, tolerance);
-    give_real(c, &call, 1, start);
-    give_real(c, &call, 2, stop);
-    return close_call(c, &call);
+    return set_up_experiment(c, CALL_fmi2SetupExperiment, has_tolerance, tolerance, start, has_stop, stop);
 }
 
 PLAIN(fmi2EnterInitializationMode)
 API int fmi2ExitInitializationMode(Connection *c) {
     int status = call_plain(c, CALL_fmi2ExitInitializationMode);
-    change_mode(c, status <= WARNING);
+    change_mode(c, succeeded(status));
     return status;
 }
 API int fmi2Terminate(Connection *c) {
@@ -112,46 +100,17 @@ API int fmi2GetRealOutputDerivatives(REFERENCES, const int orders[], double valu
     return close_call(c, &call);
 }
 
-API int fmi2GetFMUstate(Connection *c, void **state) {
-    Call call;
-    open_call(c, &call, CALL_fmi2GetFMUstate);
-    give_and_take(c, &call, state, sizeof *state);
-    return close_call(c, &call);
-}
-API int fmi2SetFMUstate(Connection *c, void *state) {
-    Call call;
-    open_call(c, &call, CALL_fmi2SetFMUstate);
-    give_number(c, &call, (uint64_t)state);
-    return close_call(c, &call);
-}
-API int fmi2FreeFMUstate(Connection *c, void **state) {
-    Call call;
-    open_call(c, &call, CALL_fmi2FreeFMUstate);
-    give_and_take(c, &call, state, sizeof *state);
-    return close_call(c, &call);
-}
+API int fmi2GetFMUstate(Connection *c, void **state) { return get_or_free_state(c, CALL_fmi2GetFMUstate, state); }
+API int fmi2SetFMUstate(Connection *c, void *state) { return set_state(c, CALL_fmi2SetFMUstate, state); }
+API int fmi2FreeFMUstate(Connection *c, void **state) { return get_or_free_state(c, CALL_fmi2FreeFMUstate, state); }
 API int fmi2SerializedFMUstateSize(Connection *c, void *state, size_t *size) {
-    Call call;
-    open_call(c, &call, CALL_fmi2SerializedFMUstateSize);
-    give_number(c, &call, (uint64_t)state);
-    give_and_take(c, &call, size, sizeof *size);
-    return close_call(c, &call);
+    return get_state_size(c, CALL_fmi2SerializedFMUstateSize, state, size);
 }
 API int fmi2SerializeFMUstate(Connection *c, void *state, char bytes[], size_t size) {
-    Call call;
-    open_call(c, &call, CALL_fmi2SerializeFMUstate);
-    give_number(c, &call, (uint64_t)state);
-    take_bytes(c, &call, bytes, size);
-    give_number(c, &call, size);
-    return close_call(c, &call);
+    return serialize_state(c, CALL_fmi2SerializeFMUstate, state, bytes, size);
 }
 API int fmi2DeSerializeFMUstate(Connection *c, const char bytes[], size_t size, void **state) {
-    Call call;
-    open_call(c, &call, CALL_fmi2DeSerializeFMUstate);
-    give_bytes(c, &call, bytes, size);
-    give_number(c, &call, size);
-    give_and_take(c, &call, state, sizeof *state);
-    return close_call(c, &call);
+    return deserialize_state(c, CALL_fmi2DeSerializeFMUstate, bytes, size, state);
 }
 
 API int fmi2GetDirectionalDerivative(Connection *c, const uint32_t unknowns[], size_t n, const uint32_t knowns[],

@@ -34,31 +34,19 @@ API Connection *fmi3InstantiateCoSimulation(const char *name, const char *token,
 API void fmi3FreeInstance(Connection *c) { call_plain(c, CALL_fmi3FreeInstance); }
 
 API int fmi3SetDebugLogging(Connection *c, bool on, size_t n, const char *const names[]) {
-    Call call;
-    open_call(c, &call, CALL_fmi3SetDebugLogging);
-    give_number(c, &call, on);
-    give_number(c, &call, n);
-    give_table(c, &call, (const void *const *)names, NULL, n);
-    return close_call(c, &call);
+    return set_debug_logging(c, CALL_fmi3SetDebugLogging, on, n, names);
 }
 
 API int fmi3EnterInitializationMode(Connection *c, bool has_tolerance, double tolerance, double start, bool has_stop,
                                     double stop) {
-    Call call;
-    open_call(c, &call, CALL_fmi3EnterInitializationMode);
-    give_number(c, &call, has_tolerance);
-    give_number(c, &call, has_stop);
-    give_real(c, &call, 0, tolerance);
-    give_real(c, &call, 1, start);
-    give_real(c, &call, 2, stop);
-    return close_call(c, &call);
+    return set_up_experiment(c, CALL_fmi3EnterInitializationMode, has_tolerance, tolerance, start, has_stop, stop);
 }
 
 static int change(Connection *c, int id, bool into_step_mode) {
     if (!into_step_mode)
         change_mode(c, false);
     int status = call_plain(c, id);
-    change_mode(c, into_step_mode && status <= WARNING);
+    change_mode(c, into_step_mode && succeeded(status));
     return status;
 }
 
@@ -122,46 +110,17 @@ API int fmi3SetClock(REFERENCES, const bool values[]) {
     return set_variables(c, CALL_fmi3SetClock, references, n, values, n, sizeof *values);
 }
 
-API int fmi3GetFMUState(Connection *c, void **state) {
-    Call call;
-    open_call(c, &call, CALL_fmi3GetFMUState);
-    give_and_take(c, &call, state, sizeof *state);
-    return close_call(c, &call);
-}
-API int fmi3SetFMUState(Connection *c, void *state) {
-    Call call;
-    open_call(c, &call, CALL_fmi3SetFMUState);
-    give_number(c, &call, (uint64_t)state);
-    return close_call(c, &call);
-}
-API int fmi3FreeFMUState(Connection *c, void **state) {
-    Call call;
-    open_call(c, &call, CALL_fmi3FreeFMUState);
-    give_and_take(c, &call, state, sizeof *state);
-    return close_call(c, &call);
-}
+API int fmi3GetFMUState(Connection *c, void **state) { return get_or_free_state(c, CALL_fmi3GetFMUState, state); }
+API int fmi3SetFMUState(Connection *c, void *state) { return set_state(c, CALL_fmi3SetFMUState, state); }
+API int fmi3FreeFMUState(Connection *c, void **state) { return get_or_free_state(c, CALL_fmi3FreeFMUState, state); }
 API int fmi3SerializedFMUStateSize(Connection *c, void *state, size_t *size) {
-    Call call;
-    open_call(c, &call, CALL_fmi3SerializedFMUStateSize);
-    give_number(c, &call, (uint64_t)state);
-    give_and_take(c, &call, size, sizeof *size);
-    return close_call(c, &call);
+    return get_state_size(c, CALL_fmi3SerializedFMUStateSize, state, size);
 }
 API int fmi3SerializeFMUState(Connection *c, void *state, uint8_t bytes[], size_t size) {
-    Call call;
-    open_call(c, &call, CALL_fmi3SerializeFMUState);
-    give_number(c, &call, (uint64_t)state);
-    take_bytes(c, &call, bytes, size);
-    give_number(c, &call, size);
-    return close_call(c, &call);
+    return serialize_state(c, CALL_fmi3SerializeFMUState, state, bytes, size);
 }
 API int fmi3DeserializeFMUState(Connection *c, const uint8_t bytes[], size_t size, void **state) {
-    Call call;
-    open_call(c, &call, CALL_fmi3DeserializeFMUState);
-    give_bytes(c, &call, bytes, size);
-    give_number(c, &call, size);
-    give_and_take(c, &call, state, sizeof *state);
-    return close_call(c, &call);
+    return deserialize_state(c, CALL_fmi3DeserializeFMUState, bytes, size, state);
 }
 
 #define DERIVATIVE(name)                                                                                               \
