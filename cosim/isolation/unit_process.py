@@ -28,6 +28,8 @@ _SPIN = 50
 _PATIENCE = 5.0
 """Seconds that a process has to end after it was told to."""
 
+_Sockets = tuple[socket.socket | None, socket.socket | None]
+
 _numbers = itertools.count()
 _LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 _RUNNING, _BY_SIGNAL, _BY_EXIT, _BY_LIMIT, _BY_MASTER = range(5)
@@ -72,26 +74,26 @@ class UnitProcess:
         self.proxy, program = files
         self._library = _loaded(self.proxy)
         memory = _memory()
-        wires = _wires()
+        sockets = _socket_pair()
         try:
             os.ftruncate(memory, _SIZE)
-            wire, other = (w.fileno() if w else -1 for w in wires)
-            self._connection = self._library.isolation_open(memory, _SIZE, next(_numbers), _spin(), wire)
+            ours, other = (end.fileno() if end else -1 for end in sockets)
+            self._connection = self._library.isolation_open(memory, _SIZE, next(_numbers), _spin(), ours)
             if not self._connection:
-                raise NoUnitProcess("the memory shared with a unit's process cannot be mapped")
+                raise NoUnitProcess("the memory that it shares with this one cannot be mapped")
             self._process = subprocess.Popen(
                 [str(program), str(memory), str(_SIZE), str(os.getpid()), str(other)],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[fd for fd in (memory, other) if fd >= 0],
                 start_new_session=True,  # Ctrl-C is for this process
             )
-        except OSError as e:
-            os.close(memory)
+        except (OSError, NoUnitProcess) as e:
+            _close(memory, sockets)
             raise NoUnitProcess(f"a process for a unit cannot be started: {e}") from e
         self._library.isolation_started(self._connection, self._process.pid, limit)
         self._logger: Any = None
         weakref.finalize(self, self._library.isolation_close, self._connection)
-        self._end = weakref.finalize(self, _end, self._process, memory, wires)
+        self._end = weakref.finalize(self, _end, self._process, memory, sockets)
 
     def load(self, library: Path, fmi: int, log: Callable[[int, str], None]) -> None:
         """Load a unit's library.
@@ -169,14 +171,18 @@ def unavailable() -> str:
     return "units can be isolated on Linux and macOS only, with the program that is compiled with this package"
 
 
-def _end(process: "subprocess.Popen[bytes]", memory: int, wires: Any) -> None:
+def _end(process: "subprocess.Popen[bytes]", memory: int, sockets: _Sockets) -> None:
     if process.returncode is None:
         process.kill()
         process.wait()
+    _close(memory, sockets)
+
+
+def _close(memory: int, sockets: _Sockets) -> None:
     os.close(memory)
-    for wire in wires:
-        if wire is not None:
-            wire.close()
+    for end in sockets:
+        if end is not None:
+            end.close()
 
 
 def _memory() -> int:
@@ -187,7 +193,7 @@ def _memory() -> int:
         return os.dup(file.fileno())
 
 
-def _wires() -> "tuple[socket.socket | None, socket.socket | None]":
+def _socket_pair() -> _Sockets:
     """Return two connected sockets, over which the sides wake each other where the system has no futex."""
     return (None, None) if sys.platform == "linux" else socket.socketpair()
 
