@@ -89,10 +89,8 @@ class ForkedChild:
             watched: a file descriptor.
             stop_limit: seconds after which a child that stays stopped is killed; None: it may stay so for ever.
         """
-        calls = StallTimer(self._heartbeat, 2 * _POLL_INTERVAL, page_reads=lambda: _page_reads(self.pid))
         files = [self._alive] if watched is None else [self._alive, watched]
-        suspended, stopped, ending, since_closed = _Clock(), False, _Clock(), _Clock()
-        closed = hung = given_up = False
+        limits, closed, since_closed = _Limits(self._heartbeat, self.pid, stop_limit), False, _Clock()
         while True:
             ready, _, _ = select.select(files, [], [], _EXIT_INTERVAL if closed else _POLL_INTERVAL)
             if self._alive in ready:  # it is about to end, or a unit has closed the pipe: see below
@@ -100,7 +98,7 @@ class ForkedChild:
                 closed, since_closed = True, _Clock()
             pid, status, spent = os.wait4(self.pid, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
             if pid and (os.WIFSTOPPED(status) or os.WIFCONTINUED(status)):
-                stopped, suspended = os.WIFSTOPPED(status), _Clock()
+                limits.note_suspension(stopped=os.WIFSTOPPED(status))
             elif pid:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.killpg(self.pid, signal.SIGKILL)  # what a unit has forked and left
@@ -108,20 +106,10 @@ class ForkedChild:
                 exited = os.WIFEXITED(status)
                 number = None if exited else os.WTERMSIG(status)
                 code = os.WEXITSTATUS(status) if exited else 0
-                return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, hung, given_up)
+                return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, limits.hung, limits.given_up)
             if watched is not None and watched in ready:
                 return None
-            if stopped:
-                calls.poll(suspended=True)
-                if stop_limit is not None and suspended.tick() >= stop_limit:
-                    given_up = True
-                    os.kill(self.pid, signal.SIGKILL)
-                continue
-            limit = self._heartbeat.limit + _GRACE if self._heartbeat.limit else float("inf")
-            if self._heartbeat.status is None:
-                hung = calls.poll() >= limit
-                ending = _Clock()
-            if hung or ending.tick() >= limit:
+            if limits.exceeded():
                 os.kill(self.pid, signal.SIGKILL)
             closed = closed and since_closed.tick() < _EXIT_PATIENCE
 
@@ -148,6 +136,43 @@ class _Clock:
         self.seconds += min(now - self._at, 2 * _POLL_INTERVAL)
         self._at = now
         return self.seconds
+
+
+class _Limits:
+    """Says, at each poll of a child, whether it has taken longer for something than it may.
+
+    Args:
+        heartbeat: of the run in the child; its limit is that of a call, and of the end after the last one.
+        pid: of the child.
+        stop_limit: seconds for which it may stay stopped (SIGSTOP); None: for ever.
+
+    Attributes:
+        hung: whether a call has not returned in time.
+        given_up: whether it stayed stopped for too long.
+    """
+
+    def __init__(self, heartbeat: Heartbeat, pid: int, stop_limit: float | None) -> None:
+        self._heartbeat, self._stop_limit = heartbeat, stop_limit
+        self._calls = StallTimer(heartbeat, 2 * _POLL_INTERVAL, page_reads=lambda: _page_reads(pid))
+        self._stopped: _Clock | None = None
+        self._ending = _Clock()
+        self.hung = self.given_up = False
+
+    def note_suspension(self, *, stopped: bool) -> None:
+        """Note that the child was stopped, or continues."""
+        self._stopped = _Clock() if stopped else None
+
+    def exceeded(self) -> bool:
+        """Poll; return whether the child is to be killed."""
+        if self._stopped is not None:
+            self._calls.poll(suspended=True)
+            self.given_up = self._stop_limit is not None and self._stopped.tick() >= self._stop_limit
+            return self.given_up
+        limit = self._heartbeat.limit + _GRACE if self._heartbeat.limit else float("inf")
+        if self._heartbeat.status is None:
+            self.hung = self._calls.poll() >= limit
+            self._ending = _Clock()
+        return self.hung or self._ending.tick() >= limit
 
 
 def _page_reads(pid: int) -> int:

@@ -42,8 +42,7 @@ def run_task(
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
-            InvalidCheckpoint: before anything
-            was written.
+            InvalidCheckpoint: before anything was written.
         UnitHung, UnitCrashed: a unit does not return, or an isolated one ends its process, as it is loaded or
             initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
