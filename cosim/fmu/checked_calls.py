@@ -7,7 +7,7 @@ A status above Warning raises the `UnitFailure` of that status. A unit may live 
 import collections
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from handover.cosim.exceptions import InvalidFmu, last_line
 from handover.cosim.fmu.buffers import SUCCEEDED
@@ -15,7 +15,7 @@ from handover.cosim.fmu.description import FmuDescription
 from handover.cosim.fmu.failures import STATUS, failure_of
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance_process import InstanceProcess
-from handover.cosim.fmu.loading import LOADING, UNLOADING, load_fmi2, load_fmi3
+from handover.cosim.fmu.loading import LOADING, UNLOADING, load_unit
 
 _LOG_LINES = 30
 _DISCARD, _FATAL = 2, 4
@@ -35,6 +35,9 @@ class CheckedCalls:
         InvalidFmu: the library does not load or does not instantiate.
         UnitCrashed, UnitHung: an isolated instance does so meanwhile.
     """
+
+    uses_events: ClassVar[bool] = False
+    """Whether it is loaded with event mode, and so is allowed to end a step before its end."""
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, heartbeat: Heartbeat | None, *, isolated: bool
@@ -131,9 +134,10 @@ class CheckedCalls:
             raise Abandoned
 
     def _load(self, folder: Path) -> Any:
-        load, d = load_fmi2 if self._fmi == 2 else load_fmi3, self.description
-        log = self._take_log_line
-        return load(d.path, folder, d.identifier, d.token, self.name, log, self._begins, process=self._process.own)
+        return load_unit(
+            self.description, folder, self.name, self._take_log_line, self._begins,
+            events=self.uses_events, process=self._process.own,
+        )  # fmt: skip
 
     def _function(self, name: str) -> Any:
         return getattr(self._fmu.dll, self._prefix + name)

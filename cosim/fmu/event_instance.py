@@ -18,7 +18,6 @@ from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
-from handover.cosim.fmu.loading import load_fmi3
 
 
 class EventInstance(Instance):
@@ -34,7 +33,7 @@ class EventInstance(Instance):
         next_event: the time of its next event that is known beforehand, s; None if there is none.
     """
 
-    returns_early: ClassVar[bool] = True
+    uses_events: ClassVar[bool] = True
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
@@ -145,11 +144,6 @@ class EventInstance(Instance):
         for timer in self.timers:
             tick = timing["ticks"][timer.clock.name]
             timer.next = None if tick is None else Fraction(tick)
-
-    def _load(self, folder: Path) -> Any:
-        d, log = self.description, self._take_log_line
-        where = d.path, folder, d.identifier, d.token, self.name
-        return load_fmi3(*where, log, self._begins, events=True, process=self._process.own)
 
     def _is_reachable(self, port: FmuPort) -> bool:
         return not port.clocks or not self._initialized or not self.active.isdisjoint(port.clocks)

@@ -8,7 +8,7 @@ import collections
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.fmu.buffers import SUCCEEDED, InputDerivatives, OutputBuffer, SignalBuffer, Views, fill
@@ -36,9 +36,6 @@ class Instance(CheckedCalls):
     Raises:
         InvalidFmu, UnitCrashed, UnitHung: as `CheckedCalls`.
     """
-
-    returns_early: ClassVar[bool] = False
-    """Whether it is allowed to end a step before its end."""
 
     def __init__(
         self, name: str, description: FmuDescription, folder: Path, inputs: Iterable[str],
@@ -166,7 +163,7 @@ class Instance(CheckedCalls):
         if status == _PENDING:  # FMI 2: an asynchronous step, which is not supported
             self._function("CancelStep")(self._component)
         self.judge(self._step_call, status)
-        reached = self._step_returns.time_reached(self.time, dt, early_allowed=self.returns_early)
+        reached = self._step_returns.time_reached(self.time, dt, early_allowed=self.uses_events)
         if isinstance(reached, str):
             raise InvalidReturn(self.name, self._step_call, self.time, self._step_returns.last, reached, self.log)
         if self._step_returns.ends:

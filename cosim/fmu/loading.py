@@ -18,6 +18,7 @@ import fmpy.fmi2
 import fmpy.fmi3
 
 from handover.cosim.exceptions import InvalidFmu, one_line
+from handover.cosim.fmu.description import FmuDescription
 from handover.cosim.fmu.fmpy_edge import library_path
 from handover.cosim.isolation.unit_process import UnitProcess
 
@@ -74,57 +75,41 @@ Begins = Callable[[str], None]
 LOADING, UNLOADING = "loading of its library", "unloading of its library"
 
 
-def load_fmi3(
-    path: Path,
-    folder: Path,
-    identifier: str,
-    token: str,
-    instance: str,
-    log: Logger,
-    begins: Begins,
-    *,
-    events: bool = False,
-    process: UnitProcess | None = None,
-) -> Any:
-    """Load and instantiate an FMI 3 co-simulation FMU; `events` turns on event mode and early return.
+def load_unit(
+    description: FmuDescription, folder: Path, instance: str, log: Logger, begins: Begins, *,
+    events: bool = False, process: UnitProcess | None = None,
+) -> Any:  # fmt: skip
+    """Load and instantiate a co-simulation FMU.
 
-    With a `process`, it is loaded by that process, and FMPy calls it through the proxy.
+    Args:
+        description: of the FMU.
+        folder: where it is unpacked.
+        instance: name of the instance.
+        log: takes what the unit logs.
+        begins: is told of each call.
+        events: whether an FMI 3 unit is to use event mode and early return.
+        process: the process that loads the library, which FMPy then calls through the proxy; None: this one.
 
     Returns:
-        FMPy's `FMU3Slave`.
+        FMPy's `FMU2Slave` or `FMU3Slave`.
 
     Raises:
         InvalidFmu: the library does not load, lacks a function, or does not instantiate.
     """
-
-    def log_message(_environment: Any, status: int, _category: bytes, message: bytes) -> None:
-        log(status, _text_of(message))
-
-    with _loading(path):
+    with _loading(description.path):
         begins(LOADING)
-        fmu = _loaded(FMU3Unit, 3, folder, identifier, token, instance, log, process)
+        fmu = _loaded(description, folder, instance, log, process)
         with _unloading(fmu):
-            begins("fmi3InstantiateCoSimulation")
-            fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
+            if description.fmi == 2:
+                begins("fmi2Instantiate")
+                _instantiate_fmi2(fmu, log)
+            else:
+                begins("fmi3InstantiateCoSimulation")
+                _instantiate_fmi3(fmu, log, events)
         return fmu
 
 
-def load_fmi2(
-    path: Path,
-    folder: Path,
-    identifier: str,
-    token: str,
-    instance: str,
-    log: Logger,
-    begins: Begins,
-    *,
-    process: UnitProcess | None = None,
-) -> Any:
-    """Load and instantiate an FMI 2 co-simulation FMU, by `process` if given; return FMPy's `FMU2Slave`.
-
-    Raises:
-        InvalidFmu: the library does not load, lacks a function, or does not instantiate.
-    """
+def _instantiate_fmi2(fmu: Any, log: Logger) -> None:
     environment = next(_environments)
     callbacks = fmpy.fmi2.fmi2CallbackFunctions()
     callbacks.logger = _dispatch_fmi2
@@ -132,15 +117,16 @@ def load_fmi2(
     callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     callbacks.componentEnvironment = environment
     fmpy.fmi2.addLoggerProxy(ctypes.byref(callbacks))
-    with _loading(path):
-        begins(LOADING)
-        fmu = _loaded(FMU2Unit, 2, folder, identifier, token, instance, log, process)
-        _loggers[environment] = log
-        weakref.finalize(fmu, _loggers.pop, environment, None)
-        with _unloading(fmu):
-            begins("fmi2Instantiate")
-            fmu.instantiate(callbacks=callbacks, loggingOn=True)
-        return fmu
+    _loggers[environment] = log
+    weakref.finalize(fmu, _loggers.pop, environment, None)
+    fmu.instantiate(callbacks=callbacks, loggingOn=True)
+
+
+def _instantiate_fmi3(fmu: Any, log: Logger, events: bool) -> None:
+    def log_message(_environment: Any, status: int, _category: bytes, message: bytes) -> None:
+        log(status, _text_of(message))
+
+    fmu.instantiate(loggingOn=True, logMessage=log_message, eventModeUsed=events, earlyReturnAllowed=events)
 
 
 def _text_of(message: bytes | None) -> str:
@@ -163,15 +149,13 @@ _dispatch_fmi2 = fmpy.fmi2.fmi2CallbackLoggerTYPE(_log_fmi2)
 was given, and keeps calling it: so this must be one that distinguishes units and is never freed."""
 
 
-def _loaded(
-    kind: Any, fmi: int, folder: Path, identifier: str, token: str, instance: str, log: Logger,
-    process: UnitProcess | None,
-) -> Any:  # fmt: skip
+def _loaded(d: FmuDescription, folder: Path, instance: str, log: Logger, process: UnitProcess | None) -> Any:
     """Return FMPy's object for a library that is loaded, into this process or into the unit's own."""
-    names = {"guid": token, "modelIdentifier": identifier, "unzipDirectory": str(folder), "instanceName": instance}
+    kind: Any = FMU2Unit if d.fmi == 2 else FMU3Unit
+    names = {"guid": d.token, "modelIdentifier": d.identifier, "unzipDirectory": str(folder), "instanceName": instance}
     if process is None:
         return kind(**names)
-    process.load((folder / library_path(fmi, identifier)).resolve(), fmi, log)
+    process.load((folder / library_path(d.fmi, d.identifier)).resolve(), d.fmi, log)
     unit, first_base = kind.__new__(kind), kind.__mro__[-2]
     first_base.__init__(unit, **names, libraryPath=str(process.proxy))  # the class's own has no choice of library
     process.select()

@@ -11,7 +11,7 @@ import numpy as np
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort, describe_fmu
 from handover.cosim.fmu.fmpy_edge import unpack
-from handover.cosim.fmu.loading import load_fmi2, load_fmi3
+from handover.cosim.fmu.loading import load_unit
 
 Digests = dict[str, str]
 """A digest of every output's bytes, by name."""
@@ -31,12 +31,11 @@ class FmpyHost:
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         folder = Path(self._folder.name)
         unpack(fmu, folder, d.fmi, d.identifier)
-        load = load_fmi2 if d.fmi == 2 else load_fmi3
 
         def log(_status: int, message: str) -> None:
             self.log.append(message)
 
-        self.fmu = load(fmu, folder, d.identifier, d.token, "unit", log, lambda _call: None)
+        self.fmu = load_unit(d, folder, "unit", log, lambda _call: None)
 
     def __enter__(self) -> "FmpyHost":
         return self

@@ -7,7 +7,7 @@ from fmpy.fmi1 import FMICallException
 
 from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.fmu.fmpy_edge import unpack
-from handover.cosim.fmu.loading import load_fmi2, load_fmi3
+from handover.cosim.fmu.loading import load_unit
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -16,14 +16,13 @@ def test_a_log_line_goes_to_the_unit_that_wrote_it_however_many_are_loaded(
 ):
     d = describe_fmu(fmu("Mass", fmi))
     unpack(d.path, tmp_path, d.fmi, d.identifier)
-    load = load_fmi2 if fmi == 2 else load_fmi3
     logs: list[list[str]] = [[], []]
 
     def loaded(log: list[str]) -> Any:
         def take(_status: int, message: str) -> None:
             log.append(message)
 
-        return load(d.path, tmp_path, d.identifier, d.token, "mass", take, lambda _what: None)
+        return load_unit(d, tmp_path, "mass", take, lambda _what: None)
 
     units = [loaded(log) for log in logs]
     with pytest.raises(FMICallException):

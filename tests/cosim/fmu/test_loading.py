@@ -8,16 +8,14 @@ from native_units import native_fmu
 
 from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.fmu.fmpy_edge import unpack
-from handover.cosim.fmu.loading import load_fmi2, load_fmi3
+from handover.cosim.fmu.loading import load_unit
 
 
 def loaded(d: FmuDescription, folder: Path) -> Any:
-    load = load_fmi2 if d.fmi == 2 else load_fmi3
-
     def log(_status: int, _message: str) -> None:
         pass
 
-    return load(d.path, folder, d.identifier, d.token, "unit", log, lambda _call: None)
+    return load_unit(d, folder, "unit", log, lambda _call: None)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
