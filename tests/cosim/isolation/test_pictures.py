@@ -12,6 +12,8 @@ from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
 
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for files in memory in /proc")
+
 PHOTO = 640 * 480 * 3
 
 
@@ -42,7 +44,6 @@ def shared_memory() -> dict[tuple[int, int], int]:
     return found
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="files in memory")
 @pytest.mark.parametrize("compiled", [False, True], ids=["general", "plan"])
 @pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL])
 def test_a_picture_lies_in_the_camera_s_memory_alone(fmu: FmuOf, algorithm: Algorithm, compiled: bool):
