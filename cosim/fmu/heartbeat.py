@@ -39,7 +39,9 @@ class Heartbeat:
 
     The first 64 bytes are eight cells: 0 the call under way as int64 (see `code`; -1: none), 1 a count as int64 that
     changes with every call, 2 simulated time as float64, 3 an int64 that is not 0 when the thread that steps the units
-    has to stop.
+    has to stop, 4 the limit of a call in seconds as float64, 5 the exit status plus 1 (0: none yet), 6 the thread that
+    crashed the process and 7 the address of its instruction, as int64.
+
     C code that steps units writes cell 2 at each step's time, then before a call adds one to cell 1 and sets cell 0,
     and after the last call sets cell 0 to -1. After each call it reads cell 3; where that is not 0 it touches no unit
     any more and returns, and its caller raises `Abandoned`.

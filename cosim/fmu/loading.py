@@ -86,7 +86,7 @@ def load_unit(
         folder: where it is unpacked.
         instance: name of the instance.
         log: takes what the unit logs.
-        begins: is told of each call.
+        begins: called with the name of each call before it is made.
         events: whether an FMI 3 unit is to use event mode and early return.
         process: the process that loads the library, which FMPy then calls through the proxy; None: this one.
 
