@@ -207,7 +207,7 @@ static int get_texts(const Entry *entry, Slot *slot, bool binary) {
         status = integers(entry, (W[10]){(W)references, slot->n, (W)sizes, (W)given, slot->n_values});
     else if (given && sizes)
         status = integers(entry, (W[10]){(W)references, slot->n, (W)given, slot->n_values});
-    for (uint64_t i = 0; succeeded(status) && i < slot->n_values; i++) {
+    for (uint64_t i = 0; status <= WARNING && i < slot->n_values; i++) {
         size_t size = binary ? sizes[i] : given[i] ? strlen(given[i]) + 1 : 1;
         if (!keep(slot, &places[i], given[i], size)) {
             add_log(ERROR, "the memory shared with the master has no room for its texts and binaries");
