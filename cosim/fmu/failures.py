@@ -204,7 +204,7 @@ class UnitTerminated(UnitFailure):
         return "asked to end the simulation"
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """What happened, for who reads how a run went."""
         return f"unit {self.unit} ended the simulation at t = {self.reached:.6g} s"
 

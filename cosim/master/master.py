@@ -213,7 +213,7 @@ class Master:
         """Terminate and free all units but those that do not return; return the first failure of that."""
         self._is_left = True
         if isinstance(self._stepper, PlanStepper):
-            self._stepper.publish_unit_times()  # failures are told with the time that the unit has reached
+            self._stepper.publish_unit_times()  # failures state the time that the unit has reached
         if self._ensemble is not None:
             self._ensemble.host.note()
         first: UnitFailure | None = None
@@ -232,7 +232,7 @@ class Master:
         if self._is_left:
             raise RuntimeError("the units are freed: run inside of `with Master(system) as master:`")
         if self.ended is not None:
-            raise RuntimeError(f"{self.ended.told}: make another master to simulate again")
+            raise RuntimeError(f"{self.ended.summary}: make another master to simulate again")
         for name, instance in self.ensemble.instances.items():
             if instance.failed or instance.lost:
                 raise RuntimeError(f"{name} failed, and the standards forbid further calls of it: make another master")
@@ -282,7 +282,7 @@ class Master:
             for name in dict.fromkeys((request.unit, *arrived)):
                 self.ensemble.publish(name)
         except UnitFailure as e:
-            _log.warning("%s, but its last signals are left out: %s", request.told, e.cause)
+            _log.warning("%s, but its last signals are left out: %s", request.summary, e.cause)
             return
         for observe in observers:
             observe(request.reached, self.signals)

@@ -185,7 +185,7 @@ def _outcome(
     if interrupted and not evaluator.over:
         return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
     if ended is not None:
-        return Outcome(success=seen.success, reason=f"{seen.reason}; {ended.told}", metrics=seen.metrics)
+        return Outcome(success=seen.success, reason=f"{seen.reason}; {ended.summary}", metrics=seen.metrics)
     return seen
 
 

@@ -58,7 +58,7 @@ def test_a_run_is_recorded_to_the_end_of_the_step_that_a_unit_completed(fmi: int
         record, ended, seen, log = run(around("ends", fmi), options, file, observed=observed)
         assert ended is not None
         assert (ended.unit, ended.call, ended.t, ended.reached) == ("bad", f"fmi{fmi}DoStep", 0.2, 0.3)
-        assert ended.told == "unit bad ended the simulation at t = 0.3 s"
+        assert ended.summary == "unit bad ended the simulation at t = 0.3 s"
         assert record.time.tolist() == [0.0, 0.1, 0.2, 0.3]
         for signal in ("before.x", "bad.y", "after.x"):
             assert record[signal].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
