@@ -65,8 +65,12 @@ class ProbedInstance(Instance):
         self._failed = None
         self._call("Reset")
 
-    def read(self, ports: Sequence[FmuPort]) -> None:
-        """Read variables of one type, whatever their causality."""
+    def check_readable(self, ports: Sequence[FmuPort]) -> None:
+        """Read variables of one type, whatever their causality.
+
+        Raises:
+            UnitFailure: the unit does not give one of them.
+        """
         self._set_or_get(self._buffers("Get", list(ports)))
 
     def keep_state(self) -> Any:

@@ -172,7 +172,7 @@ class SmokeRun:
             unit.reset()
             unit.start(self.start)
             try:
-                unit.read(ports)
+                unit.check_readable(ports)
             except UnitFailure as e:
                 if e.status == "Discard":  # a value that cannot be computed at this time
                     continue
