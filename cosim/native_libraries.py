@@ -204,7 +204,7 @@ def zig_cc(arguments: "list[str]") -> "subprocess.CompletedProcess[str]":
 def _arguments(target: str, file: Path, flags: Sequence[str]) -> "list[str]":
     arguments = [*flags, "-target", TARGETS[target][0], "-o", str(file)]
     if target.endswith("linux"):
-        arguments += ["-ldl", *(["-lpthread"] if flags is _PROGRAM_FLAGS else [])]
+        arguments += ["-ldl", *(["-lpthread", "-lm"] if flags is _PROGRAM_FLAGS else [])]
     if target.endswith("darwin") and flags is FLAGS:
         # the default name would be the path in the scratch folder, which differs with every compilation
         arguments.append(f"-Wl,-install_name,@rpath/{file.name}")

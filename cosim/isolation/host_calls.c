@@ -3,6 +3,7 @@
 #include "host.h"
 
 #include <fcntl.h>
+#include <fenv.h>
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -28,6 +29,8 @@ static size_t region_size;
 static char *base;
 static void *component;
 static pthread_t serving;
+static fenv_t arithmetic;
+static volatile bool is_copy; /* of the process, that the unit has forked */
 static const char *maps[MAX_MAPS];
 
 static void *address(uint64_t offset) { return offset ? base + offset : NULL; }
@@ -182,6 +185,11 @@ static void fill_table(const Record *record) {
 
 static bool keep(Slot *slot, Place *place, const void *given, size_t size) {
     uint32_t which = !slot->held;
+    if (!given && size) { /* a NULL that has a size: passed on, for the master to refuse */
+        place->at[which] = place->room[which] = 0;
+        place->size[which] = size;
+        return true;
+    }
     if (place->room[which] < size || !place->at[which]) {
         uint64_t room = size + size / 2 + 16, at = heap_take(shared, region_size, room);
         if (!at)
@@ -189,10 +197,8 @@ static bool keep(Slot *slot, Place *place, const void *given, size_t size) {
         place->at[which] = at;
         place->room[which] = room;
     }
-    if (given && size)
+    if (size)
         memcpy(address(place->at[which]), given, size);
-    else if (size)
-        memset(address(place->at[which]), 0, size);
     place->size[which] = size;
     return true;
 }
@@ -208,8 +214,8 @@ static int get_texts(const Entry *entry, Slot *slot, bool binary) {
     else if (given && sizes)
         status = integers(entry, (W[10]){(W)references, slot->n, (W)given, slot->n_values});
     for (uint64_t i = 0; status <= WARNING && i < slot->n_values; i++) {
-        size_t size = binary ? sizes[i] : given[i] ? strlen(given[i]) + 1 : 1;
-        if (!keep(slot, &places[i], given[i], size)) {
+        const char *value = binary || given[i] ? given[i] : "";
+        if (!keep(slot, &places[i], value, binary ? sizes[i] : strlen(value) + 1)) {
             add_log(ERROR, "the memory shared with the master has no room for its texts and binaries");
             status = ERROR;
         }
@@ -280,6 +286,8 @@ static void play_tape(bool *ended) {
         shared->stopped_at = record->batched ? shared->stopped_at : at;
         atomic_store(&shared->doing, record->call);
         int status = make_call(record, &plain);
+        if (is_copy)
+            _exit(0);
         record->status = status;
         *ended = entries[record->call].shape == UNLOAD;
         if (!succeeded(status) && !record->batched)
@@ -289,16 +297,21 @@ static void play_tape(bool *ended) {
     atomic_store(&shared->doing, -1);
 }
 
+static void note_copy(void) { is_copy = true; }
+
 _Noreturn void serve(const Channel *with, size_t size) {
     channel = *with;
     shared = channel.shared;
     base = (char *)shared;
     region_size = size;
     serving = pthread_self();
+    pthread_atfork(NULL, NULL, note_copy);
+    fegetenv(&arithmetic);
     for (bool ended = false;;) {
         while (!channel_wait(&channel, 1000))
             ;
         play_tape(&ended);
+        fesetenv(&arithmetic); /* as the master puts back what a unit in its own process changes */
         add_lines_of_others();
         channel_give(&channel);
         if (ended)

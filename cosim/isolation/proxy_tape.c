@@ -175,15 +175,20 @@ void start_step(Connection *c, Call *call) {
     channel_give(&c->channel);
 }
 
+/* Whether the process ended while it read variables for the calls that follow the step. */
+static bool ended_after_step(const Connection *c) {
+    return c->channel.shared->stopped_at == c->step_at && c->failed >= 0 && c->failed != CALL_fmi2DoStep &&
+           c->failed != CALL_fmi3DoStep;
+}
+
 int end_step(Connection *c, bool *has_results) {
     if (!c->in_flight)
         return c->ending == RUNNING ? ERROR : FATAL; /* it could not be begun */
     c->in_flight = false;
-    if (!await(c))
-        return FATAL;
-    int status = outcome(c, c->step_at);
+    bool answered = await(c), went_on = !answered && ended_after_step(c);
+    int status = answered ? outcome(c, c->step_at) : went_on ? record(c, c->step_at)->status : FATAL;
     if (has_results)
-        *has_results = c->ending == RUNNING && c->failed < 0;
+        *has_results = went_on || (c->ending == RUNNING && c->failed < 0);
     return status;
 }
 

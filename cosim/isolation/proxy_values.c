@@ -51,11 +51,14 @@ static Known *add(Connection *c, int id, const uint32_t *references, size_t n, s
     return &c->known[c->n_known++];
 }
 
-/* Return the bytes of a text or a binary that was read last; an empty one where the unit wrote over its place. */
+/* Return the bytes of a text or a binary that was read last; an empty one where the unit wrote over its place, and NULL
+ * where it gave that for some bytes. */
 static char *content(Connection *c, const Known *known, uint32_t which, size_t i, uint64_t *size) {
     const Place *place = (const Place *)(c->base + known->values_at) + i;
     uint64_t at = place->at[which & 1];
     *size = place->size[which & 1];
+    if (!at && *size)
+        return NULL;
     if (at >= c->size || *size >= c->size - at)
         *size = 0, at = known->values_at;
     return c->base + at;
@@ -70,7 +73,7 @@ static void take_texts(Connection *c, const Known *known, const char **texts, si
         texts[i] = bytes;
         if (sizes)
             sizes[i] = size;
-        else if (size)
+        else if (bytes && size)
             bytes[size - 1] = 0;
         else
             texts[i] = "";

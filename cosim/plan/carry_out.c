@@ -111,14 +111,17 @@ static bool values_are_finite(const Operation *o) {
     return sum == 0;
 }
 
+/* Copy texts or binaries; those that lie in memory which a unit's process shares are only looked at. */
 static bool keep(const Operation *o) {
     for (size_t i = 0; i < o->keep.n; i++) {
         const void *given = o->keep.addresses[i];
-        Kept *kept = &o->keep.kept[i];
         bool text = o->kind == KEEP_TEXTS;
         size_t size = !text ? o->keep.sizes[i] : given ? strlen(given) + 1 : 1;
         if (!given && size && !text)
             return false;
+        if (!o->keep.kept)
+            continue;
+        Kept *kept = &o->keep.kept[i];
         if (kept->size < size || !kept->memory) {
             void *larger = realloc(kept->memory, size ? size : 1);
             if (!larger)
@@ -187,6 +190,7 @@ enum outcome carry_out(Plan *plan, const Segment *segment) {
         if (o->code >= 0) {
             heartbeat[COUNT] += 1;
             heartbeat[DOING] = o->code;
+            ((volatile double *)heartbeat)[TIME] = plan->unit_times[o->unit];
         }
         switch (o->kind) {
         case COPY:

@@ -94,7 +94,10 @@ def access(unit: int, call: NativeCall, arrays: Views, code: int) -> bytes:
 
 
 def keep(unit: int, arrays: Views, kept: int) -> bytes:
-    """Copy binaries, or texts, which have no sizes, to the memory that the `Kept` at address `kept` hold."""
+    """Copy binaries, or texts, which have no sizes, to the memory that the `Kept` at address `kept` hold.
+
+    Where `kept` is 0, only look whether a binary that has a size has memory.
+    """
     kind, sizes = (_Kind.KEEP_BYTES, arrays[1].ctypes.data) if len(arrays) == 2 else (_Kind.KEEP_TEXTS, 0)
     return _packed(_KEEP, kind, unit, arrays[0].ctypes.data, sizes, len(arrays[0]), kept)
 
@@ -263,10 +266,11 @@ class PlanMaker:
         for buffer in self._ensemble.instances[slot.unit].getters:
             arrays = buffer.native.arrays
             self._access(slot.unit, buffer, arrays)
-            if isinstance(buffer, OutputBuffer) and buffer.copies:
-                kept = KeptMemory(self.library, len(arrays[0]))
-                buffer.kept_elsewhere = kept
-                self._note(keep(self._units[slot.unit], arrays, kept.address), self._judge_kept(slot.unit, buffer))
+            if isinstance(buffer, OutputBuffer) and (buffer.copies or len(arrays) == 2):
+                kept = KeptMemory(self.library, len(arrays[0])) if buffer.copies else None
+                buffer.kept_elsewhere = kept or buffer.kept_elsewhere
+                address = kept.address if kept else 0
+                self._note(keep(self._units[slot.unit], arrays, address), self._judge_kept(slot.unit, buffer))
         check = self._ensemble.finite_check(slot.unit)
         for block in check.blocks:
             self._note(finite(self._units[slot.unit], block), self._judge_numbers(slot.unit, check))

@@ -210,6 +210,9 @@ static int go_wrong(const char *where, Unit *unit) {
     else if (is("fork")) {
         if (fork() == 0)
             _exit(9);
+    } else if (is("duplicate")) {
+        if (fork() == -1) /* both go on */
+            abort();
     } else if (unit && is("error")) {
         say(unit, ERROR, "the solver failed");
         return ERROR;
