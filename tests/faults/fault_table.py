@@ -1,10 +1,11 @@
-"""The table of faults: what `handover run` makes of an SSP in which one unit does one thing wrong.
+"""The table of faults: what `handover run` makes of an SSP in which one unit does one thing wrong, in each way to run.
 
-Each row names the fault and the call, as `units/by_name/faults.c` knows them, and what is right: exit status, what is
-told, rows recorded, and what the two sound units beside it note of their end. `python fault_table.py` prints what is.
+The rows say what is right: exit status, what is told, rows recorded, and what the two sound units beside it note of
+their end. `python fault_table.py [WORD ...]` prints what is, of the faults whose names contain a word.
 """
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,80 +13,18 @@ import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from fault_rows import CALLS, FAULTS, LIMIT, WAYS, Fault
 from faulty_units import faulty_fmu
 from ssp_of import component, connection, connectors, described, pack_ssp, system
 
 from handover.cosim.record.reader import Record
 
 STOP = 1.0
-WHOLE = 11
-"""Rows of a run that comes to its end, one each 0.1 s."""
-
-UNTIL_FAULT, UNTIL_OUTPUT = 4, 3
-"""Rows of one that ends in a step from 0.3 s on, or in what is set for it; or in outputs that are got at 0.3 s."""
-
-LIMIT = 2.0
-"""Seconds for a call."""
 
 PATIENCE = 40.0
 """Seconds for a whole run, after which it counts as one that does not end."""
-
-NOTES = ("a terminated", "a freed", "c terminated", "c freed")
-ALL, FREED, NONE = frozenset(NOTES), frozenset({"a freed", "c freed"}), frozenset[str]()
-
-CALLS = {
-    "load": ("loading", "loading"),
-    "instantiate": ("fmi2Instantiate", "fmi3InstantiateCoSimulation"),
-    "setup": ("fmi2SetupExperiment", ""),
-    "enter": ("fmi2EnterInitializationMode", "fmi3EnterInitializationMode"),
-    "exit": ("fmi2ExitInitializationMode", "fmi3ExitInitializationMode"),
-    "set": ("fmi2SetReal", "fmi3SetFloat64"),
-    "get": ("fmi2GetReal", "fmi3GetFloat64"),
-    "binary": ("", "fmi3GetBinary"),
-    "step": ("fmi2DoStep", "fmi3DoStep"),
-    "save": ("fmi2GetFMUstate", "fmi3GetFMUState"),
-    "terminate": ("fmi2Terminate", "fmi3Terminate"),
-    "free": ("fmi2FreeInstance", "fmi3FreeInstance"),
-    "unload": ("unloading", "unloading"),
-}
-"""The calls in which something goes wrong, by the name in a fault's, as FMI 2 and FMI 3 call them."""
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A row.
-
-    Attributes:
-        fault, call: what goes wrong, and where.
-        status: of the command.
-        told: what is printed of it, besides the unit's name; `{call}` is the standard's name of the call.
-        rows: recorded; None: no folder is left.
-        notes: of the sound units.
-        fast: whether it is tried in the fast tier, in one of the standards.
-        off: what the sound units' outputs may be off, relative to them: rounding is put back at communication points.
-    """
-
-    fault: str
-    call: str
-    status: int
-    told: tuple[str, ...] = ()
-    rows: int | None = WHOLE
-    notes: frozenset[str] = ALL
-    fast: bool = False
-    off: float = 0.0
-
-    @property
-    def name(self) -> str:
-        """What the unit's library is named."""
-        return f"{self.fault}_in_{self.call}"
-
-    @property
-    def standards(self) -> tuple[int, ...]:
-        """The standards that have the call."""
-        return tuple(fmi for fmi in (2, 3) if CALLS[self.call][fmi - 2])
 
 
 @dataclass(frozen=True)
@@ -95,12 +34,13 @@ class Seen:
     status: int
     output: str
     rows: int | None
-    notes: frozenset[str]
+    notes: tuple[str, ...]
+    """Of the sound units, in their order."""
     values: bytes = b""
     """Of the sound units' outputs."""
 
 
-def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
+def run_fault(fault: Fault, fmi: int, way: str, folder: Path) -> Seen:
     """Run a system with a faulty unit b between two sound ones, with relative paths, as people type them."""
     sound = faulty_fmu("sound", fmi, folder)
     faulty = faulty_fmu(fault.name, fmi, folder, blob=fault.call == "binary")
@@ -114,8 +54,7 @@ def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
     )
     out, notes = folder / "out", folder / "notes"
     notes.touch()
-    saves = ("--repeat-discarded",) if fault.call == "save" else ()
-    options = ("--no-report", "--call-limit", str(LIMIT), *saves)
+    options = ("--no-report", "--call-limit", str(LIMIT), *fault.options(way))
     command = ["-c", "from handover.scenarios.cli.entry import main; main()"]
     process = subprocess.Popen(
         [sys.executable, *command, "run", ssp.name, "--stop", str(STOP), *options, "--out", out.name],
@@ -137,87 +76,15 @@ def run_fault(fault: Fault, fmi: int, folder: Path) -> Seen:
     if record.is_file():
         read = Record(record)
         rows, values = len(read.time), read["a.y"].tobytes() + read["c.y"].tobytes()
-    return Seen(
-        process.returncode, printed.decode("utf-8", "replace"), rows, frozenset(notes.read_text().splitlines()), values
-    )
+    noted = tuple(notes.read_text().splitlines())
+    return Seen(process.returncode, printed.decode("utf-8", "replace"), rows, noted, values)
 
 
 @cache
 def sound_values(fmi: int) -> bytes:
     """Return the outputs of a and c where b is sound, too."""
     with tempfile.TemporaryDirectory() as folder:
-        return run_fault(Fault("nothing", "step", 0), fmi, Path(folder)).values
-
-
-def _crash(fault: str, call: str, how: str, rows: int | None, **more: Any) -> Fault:
-    return Fault(fault, call, 3, ("unit b crashed in {call}", how), rows, more.pop("notes", NONE), **more)
-
-
-SEGMENT = "segmentation fault"
-_ONLY_A = frozenset({"a freed"})
-_HANG = "did not return within 2 s"
-
-FAULTS = [
-    _crash("crash", "load", SEGMENT, None, fast=True),
-    _crash("crash", "instantiate", SEGMENT, None),
-    _crash("crash", "setup", SEGMENT, None),
-    _crash("crash", "enter", SEGMENT, None),
-    _crash("crash", "exit", SEGMENT, None),
-    _crash("crash", "set", SEGMENT, UNTIL_FAULT),
-    _crash("crash", "get", SEGMENT, UNTIL_OUTPUT),
-    _crash("crash", "step", SEGMENT, UNTIL_FAULT, fast=True),
-    _crash("crash", "save", SEGMENT, UNTIL_FAULT),
-    _crash("crash", "terminate", f"at t = 1 s: {SEGMENT}", WHOLE, notes=frozenset({"c terminated"})),
-    _crash("crash", "free", f"at t = 1 s: {SEGMENT}", WHOLE, notes=ALL - {"a freed"}),
-    _crash("crash", "unload", SEGMENT, WHOLE, notes=ALL - {"a freed"}),
-    _crash("divide", "step", "", UNTIL_FAULT),
-    _crash("abort", "load", "aborted", None),
-    _crash("abort", "step", "aborted", UNTIL_FAULT),
-    _crash("exit", "step", "it ended the process with status 0", UNTIL_FAULT, fast=True),
-    _crash("leave", "load", "it ended the process with status 0", None),
-    _crash("leave", "step", "it ended the process with status 0", UNTIL_FAULT),
-    _crash("overflow", "step", SEGMENT, UNTIL_FAULT),
-    _crash("overrun", "step", SEGMENT, UNTIL_FAULT),
-    _crash("double_free", "step", "aborted", UNTIL_FAULT),
-    Fault("null", "binary", 3, ("b", "{call}"), UNTIL_OUTPUT),
-    _crash("garbage", "binary", SEGMENT, UNTIL_OUTPUT),
-    Fault("hang", "load", 3, ("b", _HANG), None, NONE),
-    Fault("hang", "enter", 3, ("b", "{call}", _HANG), None, FREED),
-    Fault("hang", "step", 3, ("b: {call} at t = 0.3 s", _HANG), UNTIL_FAULT, fast=True),
-    Fault("hang", "terminate", 3, ("b: {call} at t = 1 s", _HANG)),
-    Fault("hang", "free", 3, ("b: {call} at t = 1 s", _HANG)),
-    Fault("hang", "unload", 3, ("b", _HANG)),
-    Fault("error", "instantiate", 2, (".fmu: b: ", "the solver failed"), None, _ONLY_A),
-    Fault("error", "setup", 2, ("b does not start", "the solver failed"), None, FREED),
-    Fault("error", "enter", 2, ("b does not start", "the solver failed"), None, FREED, fast=True),
-    Fault("error", "exit", 2, ("b does not start", "the solver failed"), None, ALL - {"c terminated"}),
-    Fault("error", "set", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_FAULT),
-    Fault("error", "get", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_OUTPUT),
-    Fault("error", "step", 3, ("b: {call} at t = 0.3 s", "the solver failed"), UNTIL_FAULT, fast=True),
-    Fault("error", "terminate", 3, ("b: {call} at t = 1 s", "the solver failed")),
-    Fault("fatal", "enter", 2, ("b does not start", "memory is corrupt"), None, FREED),
-    Fault("fatal", "step", 3, ("b: {call} at t = 0.3 s", "memory is corrupt"), UNTIL_FAULT, fast=True),
-    Fault("discard", "step", 3, ("b: {call} at t = 0.3 s", "Discard"), UNTIL_FAULT),
-    Fault("unknown", "step", 3, ("b: {call} at t = 0.3 s", "77"), UNTIL_FAULT),
-    Fault("negative", "step", 3, ("b: {call} at t = 0.3 s", "-2"), UNTIL_FAULT),
-    Fault("nan", "get", 3, ("b: {call} at t = 0.3 s", "y = NaN"), UNTIL_OUTPUT, fast=True),
-    Fault("infinity", "get", 3, ("b: {call} at t = 0.3 s", "y = infinity"), UNTIL_OUTPUT),
-    _crash("exhaust", "step", "", UNTIL_FAULT),
-    Fault("flood", "step", 0),
-    Fault("log_null", "step", 0, fast=True),
-    Fault("log_bytes", "step", 0, fast=True),
-    Fault("log_huge", "step", 0),
-    Fault("chdir", "load", 0),
-    Fault("chdir", "step", 0, fast=True),
-    Fault("close_output", "step", 0),
-    Fault("close_all", "load", 0),
-    Fault("close_all", "step", 0),
-    Fault("handlers", "load", 0),
-    Fault("handlers", "step", 0),
-    Fault("rounding", "load", 0),
-    Fault("rounding", "step", 0, off=1e-14),
-    Fault("fork", "step", 0, fast=True),
-]
+        return run_fault(Fault("nothing", "step"), fmi, "plan", Path(folder)).values
 
 
 def _alike(seen: bytes, sound: bytes, off: float) -> bool:
@@ -225,41 +92,55 @@ def _alike(seen: bytes, sound: bytes, off: float) -> bool:
     return seen == sound or (off > 0.0 and np.allclose(np.frombuffer(seen), np.frombuffer(sound), rtol=off, atol=0.0))
 
 
-def faults_of(fault: Fault, fmi: int, seen: Seen) -> list[str]:
+def faults_of(fault: Fault, fmi: int, way: str, seen: Seen) -> list[str]:
     """Return in what a run was not as its row says."""
-    told = [text.format(call=CALLS[fault.call][fmi - 2]) for text in fault.told]
+    right = fault.right_in(way)
+    told = [text.format(call=CALLS[fault.call][fmi - 2]) for text in right.told]
     found = [f"{text!r} is not told" for text in told if text not in seen.output]
     for what, wanted, was in (
-        ("status", fault.status, seen.status),
-        ("rows", fault.rows, seen.rows),
-        ("notes", sorted(fault.notes), sorted(seen.notes)),
+        ("status", right.status, seen.status),
+        ("rows", right.rows, seen.rows),
+        ("notes", sorted(right.notes), sorted(seen.notes)),
     ):
         if wanted != was:
             found.append(f"{what} {was}, not {wanted}")
-    if fault.status == 0 and not _alike(seen.values, sound_values(fmi), fault.off):
+    ends = [note.split()[1] for note in seen.notes]
+    if ends != sorted(ends, reverse=True):
+        found.append(f"units are freed before all are terminated: {', '.join(seen.notes)}")
+    if right.status == 0 and not _alike(seen.values, sound_values(fmi), right.off):
         found.append("the sound units' outputs are others than without the fault")
     if "Traceback" in seen.output:
         found.append("a traceback is told")
     return found
 
 
+def row_of(fault: Fault, fmi: int, way: str) -> tuple[str, bool]:
+    """Return a line of the table, of a run made for it, and whether all is right in it."""
+    if way in fault.left_out:
+        return f"| {fault.name} | {fmi} | {way} | | | | *left out: {fault.left_out[way]}* |", True
+    with tempfile.TemporaryDirectory() as folder:
+        seen = run_fault(fault, fmi, way, Path(folder))
+        lines = [line.replace(f"{folder}/", "") for line in seen.output.splitlines() if line.strip()]
+    wrong = "; ".join(faults_of(fault, fmi, way, seen))
+    told = next((line for line in lines if re.search(r"\bb\b", line) and "system.ssp failed" not in line), "")
+    counts = [sum(note.endswith(what) for note in seen.notes) for what in ("terminated", "freed")]
+    rows = "no folder" if seen.rows is None else seen.rows
+    flaw = f" **{wrong}**" if wrong else ""
+    cells = (fault.name, fmi, way, seen.status, rows, f"{counts[0]}, {counts[1]}", f"{told.strip()[:150]}{flaw}")
+    return f"| {' | '.join(map(str, cells))} |", not wrong
+
+
 def main() -> None:
     """Print the table of the faults whose names contain one of the arguments, all without any."""
-    words = sys.argv[1:]
-    print("| fault | FMI | status | rows | terminated, freed | told |\n|---|---|---|---|---|---|")
+    words, runs, wrong = sys.argv[1:], 0, 0
+    print("| fault | FMI | way | status | rows | terminated, freed | told |\n|---|---|---|---|---|---|---|")
     for fault in FAULTS:
         for fmi in fault.standards if not words or any(w in fault.name for w in words) else ():
-            with tempfile.TemporaryDirectory() as folder:
-                seen = run_fault(fault, fmi, Path(folder))
-                wrong = "; ".join(faults_of(fault, fmi, seen))
-                lines = [line.replace(folder, "") for line in seen.output.splitlines() if line.strip()]
-            told = next((line for line in lines if "b" in line.split(":")[0].split() or "unit b" in line), "")
-            ended = f"{sum('term' in n for n in seen.notes)}, {sum('freed' in n for n in seen.notes)}"
-            flaw = f" **{wrong}**" if wrong else ""
-            line = f"| {fault.name} | {fmi} | {seen.status} | {seen.rows} | {ended} | {told[:150]}{flaw} |"
-            print(line, flush=True)
-            if wrong:
-                print("\n".join(lines[:12])[:2500], file=sys.stderr)
+            for way in WAYS:
+                line, right = row_of(fault, fmi, way)
+                print(line, flush=True)
+                runs, wrong = runs + (way in fault.ways), wrong + (not right)
+    print(f"\n{runs} runs, {wrong} of them wrong")
 
 
 if __name__ == "__main__":

@@ -5,28 +5,37 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fault_table import FAULTS, Fault, faults_of, run_fault
+from fault_rows import FAULTS, WAYS, Fault
+from fault_table import faults_of, run_fault
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what a crash does depends on the system")
 
 
 def rows() -> list[Any]:
-    """Return the rows with their standards: of a fast one, one of the standards is in the fast tier, taking turns."""
+    """Return the rows with standard and way: of a fast one, one of the standards is in the fast tier, taking turns."""
     found: list[Any] = []
     for i, fault in enumerate(FAULTS):
         first = fault.standards[i % len(fault.standards)]
         for fmi in fault.standards:
-            marks = [] if fault.fast and fmi == first else [pytest.mark.slow]
-            found.append(pytest.param(fault, fmi, marks=marks, id=f"{fault.name}-{fmi}"))
+            for way in fault.ways:
+                marks = [] if way in fault.fast and fmi == first else [pytest.mark.slow]
+                found.append(pytest.param(fault, fmi, way, marks=marks, id=f"{fault.name}-{fmi}-{way}"))
     return found
 
 
-@pytest.mark.parametrize(("fault", "fmi"), rows())
-def test_a_fault_is_told_and_harms_nothing_else(fault: Fault, fmi: int, tmp_path: Path):
-    seen = run_fault(fault, fmi, tmp_path)
-    assert not faults_of(fault, fmi, seen), seen.output
+@pytest.mark.parametrize(("fault", "fmi", "way"), rows())
+def test_a_fault_is_told_and_harms_nothing_else(fault: Fault, fmi: int, way: str, tmp_path: Path):
+    seen = run_fault(fault, fmi, way, tmp_path)
+    assert not faults_of(fault, fmi, way, seen), seen.output
 
 
 def test_every_fault_is_there_once():
     names = [fault.name for fault in FAULTS]
     assert len(set(names)) == len(names) >= 40
+
+
+def test_a_way_is_left_out_with_its_reason_only():
+    for fault in FAULTS:
+        assert set(fault.left_out) | set(fault.differs) <= set(WAYS)
+        assert all(fault.left_out.values())
+        assert fault.ways
