@@ -72,7 +72,7 @@ def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
     """
     entry = find_unit(name)
     carried = closure(entry.block)
-    folder = cache_folder() / "fmus" / _content_key(entry, _form(fmi, scalar=scalar), carried)
+    folder = _cache() / _content_key(entry, _form(fmi, scalar=scalar), carried)
     wanted = folder / file_name(name, _form(fmi, scalar=scalar))
     if wanted.is_file():
         try:
@@ -82,6 +82,15 @@ def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
         else:
             return wanted
     return build(entry, fmi, folder, scalar=scalar)
+
+
+def is_of_cache(fmu: Path) -> bool:
+    """Return whether a file is one of those that `cached` returns."""
+    return fmu.absolute().is_relative_to(_cache())
+
+
+def _cache() -> Path:
+    return cache_folder().absolute() / "fmus"
 
 
 def build_block(

@@ -10,7 +10,7 @@ from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
 from handover.cosim.master.checkpoint import InvalidCheckpoint
 from handover.cosim.record.file_lock import FileLocked
 from handover.cosim.record.stream import complete_record
-from handover.fmus.build import cached
+from handover.fmus.build import cached, is_of_cache
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution.fmu_run import reopened
 from handover.scenarios.execution.resumption import Resumption
@@ -130,9 +130,12 @@ class InterruptedRun:
         return run.open()
 
     def _fmu(self, name: str, unit: str) -> Path:
-        """Return a unit's file, or the same unit built again where the folder of built units was cleared."""
+        """Return a unit's file; if it is gone, or damaged in the folder of built units, the unit built again."""
         path = Path(self._description["files"][name])
-        return path if path.is_file() else cached(unit, 3)
+        before = self._object("units").get(name, {}).get("sha256")
+        if path.is_file() and (sha256_of(path) == before or not is_of_cache(path)):
+            return path
+        return cached(unit, 3)
 
     def _check_fmus(self, task: Task) -> None:
         system = task.experiment.build(task.parameters, task.seed, lambda unit: task.fmus[unit])

@@ -236,6 +236,22 @@ def test_fmus_that_changed_are_refused_by_name(copy: Path, left: Path):
     assert_record_is_whole(copy)
 
 
+def test_a_built_unit_that_was_damaged_is_built_again_with_a_note(
+    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    unit = cached("IrReflex", 3)
+    data = json.loads((copy / "run.json").read_text())
+    data["files"]["reflex"] = str(unit)
+    (copy / "run.json").write_text(json.dumps(data))
+    sound = unit.read_bytes()
+    unit.write_bytes(sound[: len(sound) // 2])
+    result = call("resume", copy, "--no-report")
+    assert result.exit_code == 0, result.output
+    assert unit.read_bytes() == sound
+    assert sum(record.getMessage().startswith(f"{unit} is built again: ") for record in caplog.records) == 1
+
+
 def test_other_versions_are_refused_by_name(copy: Path):
     data = json.loads((copy / "run.json").read_text())
     data["versions"]["numpy"] = "1.0"
