@@ -189,6 +189,19 @@ class Instance(CheckedCalls):
         """The buffers that `get_outputs` reads."""
         return self._getters
 
+    def measure_cpu(self) -> None:
+        """Measure the CPU time of steps in its own process from now on, if it is isolated."""
+        self._process.measure_cpu()
+
+    @property
+    def cpu_address(self) -> int:
+        """Address of the CPU seconds that `take_cpu` takes, for C code; 0 where it is not isolated or measured."""
+        return self._process.cpu_address
+
+    def take_cpu(self) -> float:
+        """Return the CPU seconds of the steps in its own process since this was called last; 0 if it has none."""
+        return self._process.take_cpu()
+
     @property
     def native_step(self) -> NativeStep:
         """The call that `step` makes, for C code."""

@@ -1,6 +1,7 @@
 """Where an instance lives: in this process, or isolated in one of its own, which may end in any call."""
 
 import ctypes
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ class InstanceProcess:
 
     Attributes:
         own: that process, None for this one.
+        cpu_address: of the CPU seconds of steps in it that were not taken yet, see `measure_cpu`; 0 in this process.
 
     Raises:
         InvalidFmu: a process cannot be started.
@@ -34,6 +36,7 @@ class InstanceProcess:
     def __init__(self, name: str, fmu: Path, heartbeat: Heartbeat, *, isolated: bool) -> None:
         self._name, self._heartbeat = name, heartbeat
         self.own: UnitProcess | None = None
+        self.cpu_address = 0
         if isolated:
             heartbeat.isolated.add(name)
             try:
@@ -50,6 +53,19 @@ class InstanceProcess:
     def failed_call(self) -> str:
         """The call in which the last failure arose, if another one reported it; else empty."""
         return "" if self.own is None else self.own.failed_call
+
+    def measure_cpu(self) -> None:
+        """Measure the CPU time of steps in an isolated instance's process from now on."""
+        if self.own is not None:
+            self.cpu_address = self.own.measure_cpu()
+
+    def take_cpu(self) -> float:
+        """Return the CPU seconds of the steps in an isolated instance's process since this was called last, else 0."""
+        if not self.cpu_address:
+            return 0.0
+        cell = ctypes.c_double.from_address(self.cpu_address)
+        spent, cell.value = cell.value, 0.0
+        return spent if 0.0 <= spent < math.inf else 0.0  # a unit may have written over it
 
     def begin_step(self, fmi: int, component: Any, t: float, dt: float, no_rollback: bool) -> None:
         """Begin a step without waiting for its end; in this process do nothing."""

@@ -58,6 +58,8 @@ typedef struct {
     uint64_t tape_used;     /* bytes */
     uint64_t stopped_at;    /* offset of the record that was executed last */
     uint64_t heap_used;     /* offset of free memory, behind the tape */
+    double cpu;             /* seconds of CPU time of the steps that the master has not taken yet, */
+    uint32_t measures_cpu;  /* if it wants them */
     uint32_t log_used;
     char log[LOG_SIZE];
 } Shared;

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 typedef uint64_t W;
@@ -276,8 +277,9 @@ static int make_call(const Record *record, bool *plain) {
     }
 }
 
-static void play_tape(bool *ended) {
-    bool plain = true;
+/* Return whether a step was among the calls. */
+static bool play_tape(bool *ended) {
+    bool plain = true, stepped = false;
     for (uint64_t at = TAPE_AT, end = TAPE_AT + shared->tape_used; at < end;) {
         Record *record = address(at);
         if (record->batched && !plain)
@@ -289,15 +291,24 @@ static void play_tape(bool *ended) {
         if (is_copy)
             _exit(0);
         record->status = status;
-        *ended = entries[record->call].shape == UNLOAD;
+        enum shape shape = entries[record->call].shape;
+        *ended = shape == UNLOAD;
+        stepped |= shape == STEP_2 || shape == STEP_3;
         if (!succeeded(status) && !record->batched)
             break;
         at += size;
     }
     atomic_store(&shared->doing, -1);
+    return stepped;
 }
 
 static void note_copy(void) { is_copy = true; }
+
+static double cpu_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
 
 _Noreturn void serve(const Channel *with, size_t size) {
     channel = *with;
@@ -310,8 +321,11 @@ _Noreturn void serve(const Channel *with, size_t size) {
     for (bool ended = false;;) {
         while (!channel_wait(&channel, 1000))
             ;
-        play_tape(&ended);
+        double began = shared->measures_cpu ? cpu_seconds() : 0;
+        bool stepped = play_tape(&ended);
         fesetenv(&arithmetic); /* as the master puts back what a unit in its own process changes */
+        if (shared->measures_cpu && stepped)
+            shared->cpu += cpu_seconds() - began;
         add_lines_of_others();
         channel_give(&channel);
         if (ended)

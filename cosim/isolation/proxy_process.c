@@ -81,6 +81,12 @@ API int isolation_ending(const Connection *c, int *ended_with) {
 /* The call in which the last failure arose, where it is not the one that reported it; "" otherwise. */
 API const char *isolation_failed_call(const Connection *c) { return c->failed < 0 ? "" : names[c->failed]; }
 
+/* Let the process measure the CPU time of its steps; return where it adds it up, for the master to take away. */
+API double *isolation_measure_cpu(Connection *c) {
+    c->channel.shared->measures_cpu = 1;
+    return &c->channel.shared->cpu;
+}
+
 API bool isolation_is_stepping(const Connection *c) { return c->in_flight; }
 
 static bool has_ended(Connection *c, int options) {

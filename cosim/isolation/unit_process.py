@@ -146,6 +146,13 @@ class UnitProcess:
         """Whether a step was begun that nobody has waited for."""
         return self._library.isolation_is_stepping(self._connection)
 
+    def measure_cpu(self) -> int:
+        """Measure the CPU time of steps from now on; return the address of their seconds, to be taken away from there.
+
+        Waiting for the master does not count. Between a step's begin and its end only the process writes there.
+        """
+        return self._library.isolation_measure_cpu(self._connection)
+
     def kill(self) -> None:
         """End the process at once; a call that another thread waits for returns Fatal."""
         self._process.kill()
@@ -219,6 +226,7 @@ def _loaded(file: Path) -> ctypes.CDLL:
         "failed_call": (ctypes.c_char_p, (connection,)),
         "is_stepping": (ctypes.c_bool, (connection,)),
         "over": (None, (connection,)),
+        "measure_cpu": (ctypes.c_void_p, (connection,)),
         "close": (None, (connection,)),
         "begin_step_2": (None, (connection, ctypes.c_double, ctypes.c_double, ctypes.c_int)),
         "begin_step_3": (None, (connection, ctypes.c_double, ctypes.c_double, ctypes.c_int)),

@@ -55,9 +55,7 @@ class StepperFactory:
     def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
         """Load the units; the caller closes `cleanups`, also if this fails."""
         load = EventEnsemble if self.has_events else Ensemble
-        ensemble = load(self._system, heartbeat, cleanups, self._isolated)
-        ensemble.measures_cpu = self._options.cpu_times
-        return ensemble
+        return load(self._system, heartbeat, cleanups, self._isolated)
 
     def initialize(self, ensemble: Ensemble) -> None:
         """Take the units through initialisation mode; algebraic loops are solved."""
@@ -76,6 +74,8 @@ class StepperFactory:
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         """Return a stepper for initialised units, which is a compiled plan where that does the same."""
         control = self._options.adaptive
+        if self._options.cpu_times:
+            ensemble.measure_cpu()
         if isinstance(ensemble, EventEnsemble) or control is not None:
             log_fallback("steps may end anywhere")
         if isinstance(ensemble, EventEnsemble):

@@ -173,8 +173,12 @@ static void begin_step(const Plan *plan, const Operation *o) {
 }
 
 static void charge(Plan *plan, const Operation *o) {
-    double now = cpu_clock();
-    plan->spent[o->unit * plan->spent_capacity + plan->n_spent[o->unit]++] = now - plan->clock;
+    double now = cpu_clock(), spent = now - plan->clock;
+    if (o->charge.own) {
+        spent += *o->charge.own >= 0 && isfinite(*o->charge.own) ? *o->charge.own : 0; /* the unit may write there */
+        *o->charge.own = 0;
+    }
+    plan->spent[o->unit * plan->spent_capacity + plan->n_spent[o->unit]++] = spent;
     plan->clock = now;
 }
 

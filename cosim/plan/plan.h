@@ -80,6 +80,9 @@ typedef struct {
             bool *event_needed, *terminate, *early;
             double *last_time;
         } step;
+        struct {
+            double *own; /* CPU time of an isolated unit's process that was not charged yet */
+        } charge;
     };
 } Operation;
 

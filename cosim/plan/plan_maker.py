@@ -32,7 +32,7 @@ ALWAYS = -1
 
 SIZE = 72
 """Bytes of an operation."""
-_COPY, _CHECK, _ACCESS, _KEEP, _STEP, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", ""
+_COPY, _CHECK, _ACCESS, _KEEP, _STEP, _CHARGE, _PLAIN = "PPNiidd", "PNqqQ", "PPPNPNP", "PPNP", "PPdPPPP", "P", ""
 _TYPES = {
     np.dtype(name): number
     for number, name in enumerate(
@@ -118,9 +118,9 @@ def start_clock() -> bytes:
     return _packed(_PLAIN, _Kind.START_CLOCK, 0)
 
 
-def charge(unit: int) -> bytes:
-    """Charge the CPU time since the clock was last read to a unit."""
-    return _packed(_PLAIN, _Kind.CHARGE, unit)
+def charge(unit: int, own: int) -> bytes:
+    """Charge the CPU time since the clock was last read to a unit, and its own process's at address `own`, if not 0."""
+    return _packed(_CHARGE, _Kind.CHARGE, unit, own)
 
 
 def _packed(form: str, kind: _Kind, unit: int, *fields: Any, code: int = -1) -> bytes:
@@ -286,7 +286,8 @@ class PlanMaker:
 
     def _charge(self, slot: Slot) -> None:
         if self.has_clock:
-            self._note(charge(self._units[slot.unit]))
+            own = self._ensemble.instances[slot.unit].cpu_address
+            self._note(charge(self._units[slot.unit], own))
 
     def _access(self, unit: str, buffer: SignalBuffer, arrays: Views) -> None:
         instance = self._ensemble.instances[unit]

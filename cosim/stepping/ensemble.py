@@ -117,7 +117,7 @@ class Ensemble:
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self.measures_cpu = False
-        """Whether CPU time is taken of steps."""
+        """Whether CPU time is taken of steps; see `measure_cpu`."""
         self.extrapolation: LinearExtrapolation | None = None
         """Sets the inputs that are extrapolated; None where all are held."""
         self._feedings: dict[str, Feeding] = {}
@@ -306,6 +306,12 @@ class Ensemble:
         """Return the check that `publish` makes of a unit's outputs."""
         return self._finite[unit]
 
+    def measure_cpu(self) -> None:
+        """Take the CPU time of steps from now on."""
+        self.measures_cpu = True
+        for instance in self.instances.values():
+            instance.measure_cpu()
+
     @contextlib.contextmanager
     def stopwatch(self) -> Generator[Callable[[str], None], None, None]:
         """Yield a function that charges a unit with the CPU time since its last call, or since the start."""
@@ -315,7 +321,7 @@ class Ensemble:
             nonlocal began
             if self.measures_cpu:
                 ended = time.process_time()
-                self.cpu[unit].append(ended - began)
+                self.cpu[unit].append(ended - began + self.instances[unit].take_cpu())
                 began = ended
 
         yield charge

@@ -159,7 +159,8 @@ class IteratedStep:
             for slot in slots:
                 began = time.process_time()
                 self._step_one(t, slot, x)
-                spent[slot.unit] += time.process_time() - began
+                own = self._ensemble.instances[slot.unit].take_cpu()
+                spent[slot.unit] += time.process_time() - began + own
             return self._interface.read(t)
 
         try:
