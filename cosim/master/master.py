@@ -153,8 +153,8 @@ class Master:
     def cpu(self) -> "dict[str, array.array[float]]":
         """CPU seconds of every step, by unit, if the options ask for it.
 
-        With Gauss-Seidel, setting inputs and getting outputs are included. Of an isolated unit it is the time of its own
-        process, where setting and getting belong to the step, and of this one, which waits for it.
+        With Gauss-Seidel, setting inputs and getting outputs are included. Of an isolated unit, it is the time of its
+        own process, where setting and getting belong to the step, and of this one, which waits for it.
         """
         if isinstance(self._stepper, PlanStepper):
             self._stepper.publish_cpu_times()
