@@ -12,12 +12,13 @@ import os
 import sys
 import uuid
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
+from typing import Any
 
-from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.description import describe, with_start_values
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import FmuArchive, write_archive
 from handover.fmus import interpreter
@@ -60,17 +61,21 @@ class InvalidStep(ValueError):
         self.step = step
 
 
-def cached(name: str, fmi: int, *, scalar: bool = False) -> Path:
+def cached(name: str, fmi: int, *, scalar: bool = False, start: Mapping[str, Any] | None = None) -> Path:
     """Return a catalog unit's FMU; it is built if the cache has none of the present sources, see `build`.
 
     The cache is HANDOVER_CACHE, or the user's cache folder. Two processes may build the same unit concurrently. A file
     in it that is damaged is built again, with a line in the log.
 
+    `start` are start values that differ from those of the catalog's unit, see `Entry`: an FMU with a token of its own,
+    whose model description has them, and which starts from them in every host.
+
     Raises:
         UnknownUnit: no unit has this name.
+        DeclarationError: the unit cannot start from such a value.
         NoFmi2Form: FMI 2 was asked for, but the unit has binary ports.
     """
-    entry = find_unit(name)
+    entry = replace(find_unit(name), start=start or {})
     carried = closure(entry.block)
     folder = _cache() / _content_key(entry, _form(fmi, scalar=scalar), carried)
     wanted = folder / file_name(name, _form(fmi, scalar=scalar))
@@ -103,6 +108,7 @@ def build_block(
     name: str = "",
     scalar: bool = False,
     platforms: Sequence[str] | None = None,
+    start: Mapping[str, Any] | None = None,
 ) -> Path:
     """Build an FMU of any block class, wherever its module lies.
 
@@ -115,11 +121,12 @@ def build_block(
         name: the FMU's name; by default the class's.
         scalar: see `build`.
         platforms: see `build`.
+        start: start values that differ from those that the block declares, see `Entry`.
 
     Raises:
         what `build` raises.
     """
-    entry = Entry(name or block.rpartition(":")[2], block, step, summary)
+    entry = Entry(name or block.rpartition(":")[2], block, step, summary, start or {})
     return build(entry, fmi, out_dir, scalar=scalar, platforms=platforms)
 
 
@@ -140,7 +147,8 @@ def build(
     Raises:
         UnknownBlock: the entry's block does not exist.
         UnknownVersion, InvalidName, InvalidStep: the standard's version, the name or the step is invalid.
-        DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are invalid.
+        DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are invalid, or it cannot
+            start from the entry's start values.
         NoFmi2Form: FMI 2 was asked for, but the block has binary ports, or integers that start beyond 32 bits.
         UnknownPlatform: the runtime is not available for a platform.
         NotCompiled: there is no runtime and no compiler.
@@ -159,6 +167,7 @@ def build(
         "unit": entry.name,
         "block": entry.block,
         "form": form.value,
+        "start": entry.start,
         "token": model.token,
         "prefix": f"_fmu_{_digest(sources)[:16]}",
         "packages": [asdict(package) for package in packages],
@@ -193,7 +202,7 @@ def _form(fmi: int, *, scalar: bool) -> Form:
 
 def _model(entry: Entry, form: Form, token: str) -> Model:
     block = import_block(entry.block)
-    description = describe(block)
+    description = with_start_values(describe(block), entry.start)
     return Model(
         name=entry.name,
         summary=entry.summary or description.doc.partition("\n")[0],

@@ -4,7 +4,7 @@ It names the blocks' classes and does not import them, so that reading it loads 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib import import_module
 from typing import Any
@@ -39,12 +39,15 @@ class Entry:
         block: path of the block's class.
         step: its default communication step, in seconds.
         summary: one line for lists.
+        start: start values of parameters and inputs that differ from those that the block declares, by name: numbers,
+            truth values, texts, lists for arrays, and of enumerations the number.
     """
 
     name: str
     block: str
     step: Fraction
     summary: str
+    start: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
 _ENTRIES = (

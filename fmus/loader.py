@@ -58,7 +58,7 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     block = getattr(modules.load(module), name)
     for deferred in getattr(block, "deferred", ()):  # here, in the host's own thread: libcosim steps units in others
         modules.import_from(deferred)
-    return modules.load("handover.fmus.slave").Slave(block, unit["form"], memory)
+    return modules.load("handover.fmus.slave").Slave(block, unit["form"], unit["start"], memory)
 
 
 def warning(resources: str) -> str:

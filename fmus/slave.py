@@ -1,11 +1,11 @@
 """The Python side of an FMU's instance: what the C runtime calls (runtime/slave.c)."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from handover.cosim.blocks.block import InvalidAdvance, InvalidState
-from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.description import describe, with_start_values
 from handover.fmus.buffers import Buffers, join, split
 from handover.fmus.exchange import derivative_reader, input_reader, output_writer
 from handover.fmus.layout import Form, Layout
@@ -21,15 +21,22 @@ class Slave:
     Args:
         block: the block's class.
         form: a value of `Form`; it determines the value references.
+        start: start values that differ from those that the block declares, see `with_start_values`.
         memory: allocates the variables' memory, see `Buffers`.
     """
 
     _block: Any  # a handover.cosim.blocks.block.Block, perhaps also an EventfulBlock or a DifferentiableBlock
 
-    def __init__(self, block: type[Any], form: str, memory: Callable[[int], Any] | None = None) -> None:
+    def __init__(
+        self,
+        block: type[Any],
+        form: str,
+        start: Mapping[str, Any],
+        memory: Callable[[int], Any] | None = None,
+    ) -> None:
         self._type = block
         self._form = Form(form)
-        description = describe(block)
+        description = with_start_values(describe(block), start)
         self._buffers = Buffers(Layout(description), memory)
         self._clock = self._buffers.floats[:2]
         self._read = input_reader(self._buffers)

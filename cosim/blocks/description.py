@@ -1,7 +1,8 @@
 """Reads what a block class declares: ports, parameters, direct feedthrough, period, events, derivatives.
 
 `describe` is the one source of this for model descriptions, the FMU's runtime and documentation. It first checks the
-class's form, that is its attributes and methods, then reads the dataclasses of its ports.
+class's form, that is its attributes and methods, then reads the dataclasses of its ports. `with_start_values` gives
+parameters and inputs other start values than the class declares.
 """
 
 import dataclasses
@@ -13,8 +14,11 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, cast
 
+import numpy as np
+
 from handover.cosim.blocks.declarations import DeclarationError, declared_variables
-from handover.cosim.blocks.variable import Causality, Variable
+from handover.cosim.blocks.start_values import fault_of, numbers_of
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 
 _ATTRIBUTES = ("feedthrough", "period")
 _METHODS = ("outputs", "step", "get_state", "set_state")
@@ -91,6 +95,36 @@ def describe(block: type[Any]) -> Description:
         has_events=_has_events(block),
         has_derivatives=hasattr(block, "directional_derivative"),
     )
+
+
+def with_start_values(description: Description, start: Mapping[str, Any]) -> Description:
+    """Return a description in which parameters and inputs start from these values, by name; enumerations by number.
+
+    Raises:
+        DeclarationError: there is no parameter or input of a name, or it cannot start from the value.
+    """
+    settable = {v.name: v for v in description.parameters + description.inputs if v.kind is not Kind.BINARY}
+    for name, value in start.items():
+        if name not in settable:
+            fault = f"nothing of this name has a start value; these have one: {', '.join(settable)}"
+            raise DeclarationError(description.name, name, fault)
+        if fault := fault_of(settable[name], value):
+            raise DeclarationError(description.name, name, f"start {fault}")
+
+    def started(variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+        return tuple(_started(v, start[v.name]) if v.name in start else v for v in variables)
+
+    return dataclasses.replace(
+        description, parameters=started(description.parameters), inputs=started(description.inputs)
+    )
+
+
+def _started(v: Variable, value: Any) -> Variable:
+    if v.enumeration is not None:
+        value = v.enumeration(int(numbers_of(v, value)[0]))
+    elif v.shape:
+        value = np.asarray(value, dtype=np.float64)
+    return dataclasses.replace(v, start=value)
 
 
 def check_form(block: type[Any]) -> None:

@@ -1,0 +1,127 @@
+"""An FMU that is built with other start values than its block declares starts from them in every host."""
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy_host import Digests, FmpyHost
+from workshop import Workshop
+
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.fmu.description import describe_fmu
+from handover.fmus.build import build_block, cached
+
+HOST: Any = fmpy
+BLOCK = "sample_units.every_kind:EveryKind"
+START: dict[str, Any] = {
+    "gain": 3.5,
+    "p0": [4.0, 5.0, 1 / 3],
+    "n": 7,
+    "fast": True,
+    "mood": 5,
+    "label": "<other>",
+    "a": -0.25,
+    "k": 2,
+    "mood_in": 1,
+}
+
+
+def outputs(fmu: Path, values: dict[str, Any]) -> list[Digests]:
+    """Return the outputs at the start and after two steps, with values that are set."""
+    with FmpyHost(fmu) as host:
+        host.set(values)
+        host.enter()
+        host.leave()
+        rows = [host.outputs()]
+        for k in range(2):
+            host.step(k / 100, 1 / 100)
+            rows.append(host.outputs())
+    return rows
+
+
+@pytest.mark.parametrize(("fmi", "scalar"), [(2, False), (3, False), (3, True)])
+def test_a_unit_starts_from_the_values_that_it_was_built_with(
+    workshop: Workshop, tmp_path: Path, fmi: int, scalar: bool
+):
+    declared = workshop.scalar_fmu("every_kind:EveryKind") if scalar else workshop.fmu("every_kind:EveryKind", fmi)
+    built = build_block(BLOCK, fmi, tmp_path, scalar=scalar, start=START)
+    found = outputs(built, {})
+    assert found == outputs(declared, START)
+    assert all(a != b for a, b in zip(found, outputs(declared, {}), strict=True))
+
+
+def test_a_reset_unit_starts_from_them_again(tmp_path: Path):
+    built = build_block(BLOCK, 2, tmp_path, start=START)
+    with FmpyHost(built) as host:
+        host.enter()
+        wanted = host.outputs()
+        host.fmu.reset()
+        host.enter()
+        assert host.outputs() == wanted
+        host.fmu.reset()
+        host.set({"mood": 0})
+        host.enter()
+        assert host.outputs() != wanted
+
+
+def test_the_model_description_tells_them_and_the_token_is_its_own(workshop: Workshop, tmp_path: Path):
+    built = build_block(BLOCK, 2, tmp_path, start=START)
+    d, declared = describe_fmu(built), describe_fmu(workshop.fmu("every_kind:EveryKind", 2))
+    told = {n: p.start for n, p in {**d.parameters, **d.inputs}.items() if n in START}
+    assert told["mood"] == "5"
+    assert [float(x) for x in str(told["p0"]).split()] == START["p0"]
+    assert (told["label"], told["fast"], told["mood_in"]) == ("<other>", "true", "1")
+    assert d.token != declared.token
+    assert d.identifier == declared.identifier
+    with zipfile.ZipFile(built) as archive:
+        unit = json.loads(archive.read("resources/unit.json"))
+        page = archive.read("documentation/index.html").decode()
+    assert (unit["token"], unit["start"]) == (d.token, START)
+    assert "&lt;other&gt;" in page
+
+
+@pytest.mark.parametrize(
+    ("start", "fault"),
+    [
+        ({"moods": 5}, "EveryKind.moods: nothing of this name has a start value; these have one: gain, p0"),
+        ({"b": 1.0}, "EveryKind.b: nothing of this name"),
+        ({"mood": 2}, r"EveryKind.mood: start 2 is none of 0 \(calm\), 1 \(keen\), 5 \(wild\)"),
+        ({"gain": 11.0}, "EveryKind.gain: start 11.0 is out of range"),
+        ({"p0": [1.0]}, "EveryKind.p0: start"),
+        ({"label": 3}, "EveryKind.label: start 3 is not a string"),
+    ],
+)
+def test_what_a_unit_cannot_start_from_is_refused_and_nothing_is_written(
+    tmp_path: Path, start: dict[str, Any], fault: str
+):
+    with pytest.raises(DeclarationError, match=fault):
+        build_block(BLOCK, 3, tmp_path / "out", start=start)
+    assert not (tmp_path / "out").exists()
+
+
+def test_units_of_the_cache_with_and_without_stand_side_by_side():
+    plain, other = cached("HandAndObject", 2), cached("HandAndObject", 2, start={"motion": 2})
+    assert plain != other
+    assert (cached("HandAndObject", 2), cached("HandAndObject", 2, start={"motion": 2})) == (plain, other)
+    assert describe_fmu(plain).parameters["motion"].start != describe_fmu(other).parameters["motion"].start == "2"
+    assert cached("HandAndObject", 2, start={}) == plain
+
+
+def test_fmpy_simulates_such_a_unit_as_it_does_with_the_values_set():
+    start = {"task": 1}
+
+    def simulated(fmu: Path, values: dict[str, Any]) -> Any:
+        return HOST.simulate_fmu(str(fmu), stop_time=0.5, output_interval=0.016, start_values=values)
+
+    names = list(describe_fmu(cached("HandoverStateMachine", 2)).outputs)
+    built = simulated(cached("HandoverStateMachine", 2, start=start), {})
+    given = simulated(cached("HandoverStateMachine", 2), start)
+    declared = simulated(cached("HandoverStateMachine", 2), {})
+    assert built.dtype == given.dtype
+    assert len(names) > 3
+    assert built.tobytes() == given.tobytes()
+    assert not np.array_equal(built, declared)
