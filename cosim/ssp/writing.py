@@ -89,7 +89,7 @@ def add_dimensions(parent: ET.Element, shape: Sequence[int]) -> None:
 def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
     """Return the start values to bind, by port.
 
-    An enumeration that equals the FMU's start value is left out: libcosim ends its process at enumerations.
+    An enumeration that equals the FMU's start value is left out: see `bound_enumerations`.
     """
     ports = ports_of(unit.description)
     values = {name: (ports[name], value) for name, value in unit.start.items()}
@@ -98,6 +98,15 @@ def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
         for name, (port, value) in values.items()
         if port.kind is not Kind.ENUMERATION or port.start != str(int(numbers_of(port, value)[0]))
     }
+
+
+def bound_enumerations(unit: PlacedUnit) -> dict[str, int]:
+    """Return the enumerations that differ from the FMU's start values, by name, as numbers.
+
+    Other tools take no file that binds them: Ecos rejects it, libcosim ends its process.
+    """
+    values = bound_values(unit).items()
+    return {name: int(numbers_of(port, x)[0]) for name, (port, x) in values if port.kind is Kind.ENUMERATION}
 
 
 def parameter_set(unit: PlacedUnit, version: str, name: str) -> bytes:

@@ -1,11 +1,15 @@
 """The command `handover export`: a scenario as an SSP."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
-from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.ssp.writing import bound_enumerations, write_ssp
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import scenario_options
@@ -18,7 +22,8 @@ from handover.scenarios.results.run_folder import check_place
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 
 Its units are FMI 2 FMUs, or FMI 3 where FMI 2 cannot express them (pictures). The SSP is of version 1.0, or of 2.0 if a
-unit is of FMI 3. Parameters are bound in files of their own (SSV), one for each unit.
+unit is of FMI 3. Parameters are bound in files of their own (SSV), one for each unit; but enumerations, which other
+tools do not take there, are start values of the FMUs.
 """
 
 
@@ -41,9 +46,12 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
         if file.is_dir():
             raise UsageError(f"--ssp {file}: there is a folder of that name")
         check_place(file.parent)
-        fmus = select_fmus(experiment, replacement_fmus(experiment, replaced), exchangeable)
+        others = replacement_fmus(experiment, replaced)
+        fmus = select_fmus(experiment, others, exchangeable)
         instance = experiment()
         system = instance.build(values, seed, lambda unit: fmus[unit])
+        start_from_enumerations(system, {n: unit for n, unit in experiment.units.items() if n not in others})
+        warn_of_enumerations(system, others)
         try:
             write_ssp(system, file, experiment.name, instance.stop_time(values), experiment.parallel_step)
         except OSError as e:
@@ -51,9 +59,29 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
     click.echo(file)
 
 
-def exchangeable(unit: str) -> Path:
-    """Return the form of a catalog's unit that most tools load: FMI 2, or FMI 3 without arrays."""
+def exchangeable(unit: str, start: Mapping[str, Any] | None = None) -> Path:
+    """Return a catalog's unit as most tools load it, FMI 2 or FMI 3 without arrays; `start` as in `cached`."""
     try:
-        return cached(unit, 2)
+        return cached(unit, 2, start=start)
     except NoFmi2Form:
-        return cached(unit, 3, scalar=True)
+        return cached(unit, 3, scalar=True, start=start)
+
+
+def start_from_enumerations(system: System, built: Mapping[str, str]) -> None:
+    """Let enumerations that a system sets be start values of the FMUs, of the units that are built, by catalog's name.
+
+    Raises:
+        WiringError: the system has faults.
+    """
+    system.check()
+    for name, unit in built.items():
+        placed = system.units[name]
+        if start := bound_enumerations(placed):
+            system.units[name] = replace(placed, description=describe_fmu(exchangeable(unit, start)))
+
+
+def warn_of_enumerations(system: System, units: Collection[str]) -> None:
+    """Say which enumerations are left to parameter sets."""
+    for name in units:
+        if left := ", ".join(f"{name}.{parameter}" for parameter in bound_enumerations(system.units[name])):
+            click.echo(f"{left}: bound as an enumeration, which libcosim and Ecos do not take", err=True)

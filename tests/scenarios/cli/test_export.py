@@ -1,3 +1,4 @@
+import zipfile
 from fractions import Fraction
 from pathlib import Path
 
@@ -6,6 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
+from handover.cosim.fmu.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.ssp.ssp_file import SspFile
@@ -76,13 +78,38 @@ def test_what_cannot_be_exported_is_reported_and_nothing_is_written(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.ssp"]
 
 
+def test_enumerations_are_start_values_of_the_units_and_are_bound_nowhere(tmp_path: Path):
+    """Of the same units as elsewhere, but for the start values."""
+    file = tmp_path / "a.ssp"
+    result = call("export", CHEAP, "--ssp", file, "-p", "strategy=forward")
+    assert (result.exit_code, result.stderr) == (0, "")
+    with zipfile.ZipFile(file) as archive:
+        assert not [n for n in archive.namelist() if b"Enumeration" in archive.read(n) and n.endswith(".ssv")]
+    with SspFile(file) as ssp:
+        reflex, scene = ssp.system.units["reflex"], ssp.system.units["scene"]
+    assert "strategy" not in reflex.start
+    assert reflex.start
+    strategy = reflex.description.parameters["strategy"]
+    usual = describe_fmu(cached("IrReflex", 2))
+    assert dict(strategy.items)["FORWARD"] == int(str(strategy.start)) != int(str(usual.parameters["strategy"].start))
+    assert reflex.description.token != usual.token
+    assert scene.description.token == describe_fmu(cached("GraspScene", 2)).token
+
+
+def test_an_enumeration_that_is_none_of_its_items_is_refused(tmp_path: Path):
+    result = call("export", CHEAP, "--ssp", tmp_path / "a.ssp", "-p", "strategy=backward")
+    assert result.exit_code == 2, result.output
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_parameters_and_other_units_are_exported(tmp_path: Path):
     other = tmp_path / "Other.fmu"
     other.write_bytes(cached("IrReflex", 3, scalar=True).read_bytes())
     file = tmp_path / "new" / "a.ssp"
     result = call("export", CHEAP, "--ssp", file, "-p", "strategy=forward", "--unit", f"reflex={other}")
     assert result.exit_code == 0, result.output
-    assert result.output == f"{file}\n"
+    assert result.stdout == f"{file}\n"
+    assert result.stderr == "reflex.strategy: bound as an enumeration, which libcosim and Ecos do not take\n"
     with SspFile(file) as ssp:
         units = ssp.system.units
         assert (units["scene"].description.fmi, units["reflex"].description.fmi) == (2, 3)
