@@ -30,6 +30,8 @@ _MIN_DURATION = 0.3
 """Seconds that a reach takes at least."""
 _CLOSING = 0.1
 """Radians by which the gripper's angle must change for a person to see it."""
+_ROUNDING = 1e-9
+"""Seconds by which a sum of steps may miss a time that they fill: step sizes of hosts differ in their last digits."""
 
 
 class Activity(enum.IntEnum):
@@ -163,7 +165,7 @@ class FlyerPerson:
             return
         self._since += dt
         self._motion = self._p.motion_again if self._answered else self._p.motion
-        if self._since < self._reaction or not self._can(seen):
+        if self._since < self._reaction - _ROUNDING or not self._can(seen):
             return
         self._called, self._answered = False, True
         starts = {Motion.TAKE: Activity.REACH, Motion.GIVE: Activity.OFFER, Motion.PUSH: Activity.OFFER}
@@ -181,26 +183,26 @@ class FlyerPerson:
 
     def _reaches(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self._follow(*self._at_object(seen))
-        if self._clock >= self._duration:
+        if self._has_taken(self._duration):
             self._begin(Activity.GRASP, seen)
 
     def _grasps(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self.p, self.q = self._at_object(seen)
-        if self._clock >= self._p.grasp_time:
+        if self._has_taken(self._p.grasp_time):
             self._begin(Activity.PULL, seen)
             self.holding = True
 
     def _pulls(self, dt: float, seen: Perception) -> None:
         p = self._p
         self._move_along(dt, self._pull, p.pull_speed, p.pull_ramp, p.pull_distance)
-        if not self.holding or self._clock > p.patience:
+        if not self.holding or self._has_taken(p.patience):
             self._let_go(seen)
         elif self._has_seen(not seen.gripped, dt):
             self._begin(Activity.WITHDRAW, seen)
 
     def _offers(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self._follow(*self._at_palm(seen))
-        if self._clock >= self._duration:
+        if self._has_taken(self._duration):
             self._begin(Activity.PUSH, seen)
             self._axis = column(seen.G.R, 0)
 
@@ -215,26 +217,30 @@ class FlyerPerson:
                 self._let_go(seen)
             return
         empty = seen.angle < p.angle_object - 0.5 * _CLOSING
-        if self._has_seen(empty if gives else moved, dt) or self._clock > p.patience:
+        if self._has_seen(empty if gives else moved, dt) or self._has_taken(p.patience):
             self._begin(Activity.WITHDRAW, seen)
 
     def _lets_go(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
-        if self._clock >= self._p.grasp_time:
+        if self._has_taken(self._p.grasp_time):
             self._begin(Activity.WITHDRAW, seen)
 
     def _withdraws(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self._follow(*self._at_rest(seen))
-        if self._clock >= self._duration:
+        if self._has_taken(self._duration):
             self._begin(Activity.REST, seen)
 
     def _let_go(self, seen: Perception) -> None:
         self._begin(Activity.LET_GO, seen)
         self.holding = False
 
+    def _has_taken(self, duration: float) -> bool:
+        """Return whether the activity has lasted that long."""
+        return self._clock >= duration - _ROUNDING
+
     def _has_seen(self, there: bool, dt: float) -> bool:
         """Return whether something has been there for the time of a reaction."""
         self._since = self._since + dt if there else 0.0
-        return there and self._since >= self._reaction
+        return there and self._since >= self._reaction - _ROUNDING
 
     def _follow(self, p: Vector, q: Quaternion) -> None:
         """Follow a minimum-jerk course to a goal that may move."""

@@ -66,6 +66,18 @@ class Scene:
         return [a for a, b in zip(all_of_them, [None, *all_of_them], strict=False) if a is not b]
 
 
+def test_a_time_that_whole_steps_fill_ends_at_the_same_step_whatever_their_last_digits():
+    """Grasping takes 25 steps; hosts that take differences of times give steps that add up to a little less."""
+    courses: list[list[Activity]] = []
+    for dt in (DT, DT - 1e-16, DT + 1e-16):
+        scene = Scene(CALM)
+        for _ in range(400):
+            scene.go(dt, dt, closure=1.0, light=True)
+        courses.append([y.activity for y in scene.seen])
+    assert courses[0].count(Activity.GRASP) == 25
+    assert courses[0] == courses[1] == courses[2]
+
+
 def test_starts_as_declared():
     y = HandAndObject(Params()).outputs(0.0, Inputs())
     np.testing.assert_array_equal(y.p_WO, [-0.10, -0.57, 0.0])
