@@ -52,7 +52,8 @@ class Job:
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, cwd=folder, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         rows = json.loads(result.read_text())
-        return {name: [self._row(name, row[i]) for row in rows] for i, name in enumerate(self.units)}
+        outputs = [known(self.description(name).outputs) for name in self.units]
+        return {name: [_row(outputs[i], row[i]) for row in rows] for i, name in enumerate(self.units)}
 
     def description(self, unit: str) -> FmuDescription:
         """Return what a unit's FMU says of itself."""
@@ -85,16 +86,6 @@ class Job:
         initial = _by_kind(ports, placed.start)
         return {"name": name, "fmu": str(placed.fmu), "initial": initial, "driven": driven, "outputs": outputs}
 
-    def _row(self, unit: str, by_kind: Mapping[str, Sequence[Any]]) -> Row:
-        values = {kind: iter(numbers) for kind, numbers in by_kind.items()}
-        row: Row = {}
-        for port in known(self.description(unit).outputs):
-            for index in indices_of(port.shape):
-                value = next(values[KINDS[port.fmi_type]])
-                if port.fmi_type != "String":
-                    row[f"{port.name}[{','.join(map(str, index))}]" if index else port.name] = float(value)
-        return row
-
 
 def known(ports: Mapping[str, FmuPort]) -> list[FmuPort]:
     """Return the ports of types that libcosim knows."""
@@ -105,6 +96,17 @@ def without_enumerations(record: Record, d: FmuDescription) -> Record:
     """Return a unit's record with only the outputs that libcosim knows."""
     left_out = {name for name, port in d.outputs.items() if port not in known(d.outputs)}
     return Record([{n: x for n, x in row.items() if n not in left_out} for row in record.rows], [])
+
+
+def _row(ports: Sequence[FmuPort], by_kind: Mapping[str, Sequence[Any]]) -> Row:
+    values = {kind: iter(numbers) for kind, numbers in by_kind.items()}
+    row: Row = {}
+    for port in ports:
+        for index in indices_of(port.shape):
+            value = next(values[KINDS[port.fmi_type]])
+            if port.fmi_type != "String":
+                row[f"{port.name}[{','.join(map(str, index))}]" if index else port.name] = float(value)
+    return row
 
 
 def _by_kind(ports: Mapping[str, FmuPort], values: Mapping[str, Any]) -> dict[str, list[tuple[int, Any]]]:

@@ -28,8 +28,18 @@ from handover.scenarios.cli.command import main
 
 pytestmark = pytest.mark.slow
 
+in_libcosim = pytest.mark.skipif(
+    importlib.util.find_spec("libcosimpy") is None, reason="libcosimpy has wheels for few platforms"
+)
+in_ecos = pytest.mark.skipif(
+    importlib.util.find_spec("ecospy") is None or not interpreter.library(),
+    reason="ecospy has wheels for few platforms, and Ecos loads only a Python with a shared library",
+)
+
 SEED = 3
-EXCHANGED = sorted(set(SCENARIOS) - {"helix_handover"})
+WITH_PICTURES = "helix_handover"
+"""No form of its units that exchange pictures is one that libcosim or Ecos loads, see the last tests."""
+EXCHANGED = sorted(set(SCENARIOS) - {WITH_PICTURES})
 
 
 @dataclass(frozen=True)
@@ -95,7 +105,7 @@ def verdict_of(folder: Path, name: str) -> Verdict:
     return own_verdict(exported(folder, name), name)
 
 
-@pytest.mark.skipif(importlib.util.find_spec("libcosimpy") is None, reason="libcosimpy has wheels for few platforms")
+@in_libcosim
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: Path, name: str):
     file, wanted = exported(folder, name), verdict_of(folder, name)
@@ -111,8 +121,7 @@ def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: P
         np.testing.assert_allclose(x, wanted.values[n], rtol=1e-6, atol=1e-6, err_msg=n)
 
 
-@pytest.mark.skipif(importlib.util.find_spec("ecospy") is None, reason="ecospy has wheels for few platforms")
-@pytest.mark.skipif(not interpreter.library(), reason="this Python has no shared library that Ecos can load")
+@in_ecos
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path, name: str):
     """To the six decimals that Ecos writes."""
@@ -128,3 +137,17 @@ def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path,
         np.testing.assert_allclose(float(row[column]), x, rtol=1e-6, atol=2e-6, err_msg=n)
         compared += 1
     assert compared > 10
+
+
+@in_libcosim
+def test_libcosim_knows_no_connectors_of_pictures(folder: Path, tmp_path: Path):
+    job = Job({}, None, 1, ssp=exported(folder, WITH_PICTURES))
+    with pytest.raises(AssertionError, match="A valid connector type was not found"):
+        job.run(tmp_path)
+
+
+@in_ecos
+def test_ecos_takes_no_ssp_of_the_version_that_fmi_3_needs(folder: Path, tmp_path: Path):
+    file = exported(folder, WITH_PICTURES)
+    with pytest.raises(AssertionError, match=r"Unsupported SSP version: '2\.0'"):
+        Ecos(tmp_path).simulate(tmp_path, file, base_step(file), 1.0, "--parameterSet", WITH_PICTURES)
