@@ -20,7 +20,7 @@ def main(job_file: str, result_file: str) -> None:
     """Run a job."""
     job = json.loads(Path(job_file).read_text())
     log_output_level(CosimLogLevel.ERROR)
-    execution = CosimExecution.from_ssp_file(job["ssp"], job["step"]) if job["ssp"] else assembled(job)
+    execution = loaded(job) if job["ssp"] else assembled(job)
     slaves = {info.name.decode(): info.index for info in execution.slave_infos()}
     places = [slaves[unit["name"]] for unit in job["units"]]
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
@@ -35,6 +35,14 @@ def main(job_file: str, result_file: str) -> None:
         check(execution.step())
         rows.append([read(observer, i, unit["outputs"]) for i, unit in zip(places, job["units"], strict=True)])
     Path(result_file).write_text(json.dumps(rows))
+
+
+def loaded(job: Any) -> CosimExecution:
+    """Return the system of a job's SSP."""
+    try:
+        return CosimExecution.from_ssp_file(job["ssp"], job["step"])
+    except AssertionError:  # libcosimpy's, which does not say why
+        raise SystemExit(get_last_error_message()) from None
 
 
 def assembled(job: Any) -> CosimExecution:
