@@ -23,7 +23,7 @@ from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
-from handover.fmus.catalog import Entry, find_unit, import_block
+from handover.fmus.catalog import Entry, find_unit, import_class
 from handover.fmus.compile import cache_folder
 from handover.fmus.documentation import page
 from handover.fmus.fmi2_description import fmi2_description
@@ -201,7 +201,7 @@ def _form(fmi: int, *, scalar: bool) -> Form:
 
 
 def _model(entry: Entry, form: Form, token: str) -> Model:
-    block = import_block(entry.block)
+    block = import_class(entry.block)
     description = with_start_values(describe(block), entry.start)
     return Model(
         name=entry.name,

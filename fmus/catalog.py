@@ -1,15 +1,20 @@
-"""The catalog: robots, sensors and controllers that are available as FMUs.
+"""The catalog: robots, sensors and controllers that are available as FMUs, and blocks of other packages and modules.
 
-It names the blocks' classes and does not import them, so that reading it loads no physics engine.
+It names the blocks' classes and does not import them, so that reading it loads no physics engine. A package adds units
+by entry points of the group `handover.units`; any other block is named by its path, such as `my_arm:MyArm`.
 """
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from importlib import import_module
+from importlib import import_module, metadata
+from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import nearest
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.blocks.description import describe
+from handover.cosim.exceptions import nearest, one_line
 
 
 class UnknownUnit(LookupError):
@@ -21,12 +26,10 @@ class UnknownUnit(LookupError):
 
 
 class UnknownBlock(LookupError):
-    """There is no such block class; the message says what of its path is missing."""
+    """There is no such class, or it is no block; the message says what of its path is missing."""
 
     def __init__(self, path: str, fault: str) -> None:
-        super().__init__(
-            f"{path!r} is not the path of a block, such as 'handover.plants.helix.tendon_arm:TendonArm': {fault}"
-        )
+        super().__init__(f"{path}: {fault}")
         self.path, self.fault = path, fault
 
 
@@ -150,25 +153,69 @@ _ENTRIES = (
 UNITS: Mapping[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 
 
+GROUP = "handover.units"
+"""The group of entry points that name units; each is the path of a block's class."""
+
+_STEP = Fraction(1, 100)  # s, of a block that is not sampled
+
+
+@functools.cache
+def installed_units() -> Mapping[str, str]:
+    """Return the paths of other packages' blocks by their units' names, sorted; a name of `UNITS` stays that."""
+    found = {e.name: e.value for e in metadata.entry_points(group=GROUP)}
+    return {name: found[name] for name in sorted(found) if name not in UNITS}
+
+
 def find_unit(name: str) -> Entry:
-    """Return a unit's entry.
+    """Return the entry of a unit, by its name, or by its block's path such as `my_arm:MyArm`.
 
     Raises:
         UnknownUnit: there is no unit of this name.
+        UnknownBlock: there is no such class, its module cannot be loaded, or it is no block.
     """
-    if name not in UNITS:
-        raise UnknownUnit(name, list(UNITS))
-    return UNITS[name]
+    if name in UNITS:
+        return UNITS[name]
+    if ":" in name:
+        return own_unit(name)
+    if name in installed_units():
+        return own_unit(installed_units()[name], name=name)
+    raise UnknownUnit(name, [*UNITS, *installed_units()])
 
 
-def import_block(path: str) -> type[Any]:
+def own_unit(path: str, step: Fraction | None = None, name: str = "") -> Entry:
+    """Return an entry for the block of a path such as `spring:Spring`; its name is by default the class's.
+
+    Its step, in seconds, is that which is given, else the block's period, else 0.01.
+
+    Raises:
+        UnknownBlock: there is no such class, its module cannot be loaded, or it is no block.
+    """
+    try:
+        description = describe(import_class(path))
+    except DeclarationError as e:
+        raise UnknownBlock(path, str(e)) from e
+    summary = description.doc.partition("\n")[0].rstrip(".")
+    return Entry(name or path.rpartition(":")[2], path, step or description.period or _STEP, summary)
+
+
+def import_class(path: str) -> type[Any]:
     """Return the class that a path such as `handover.plants.helix.tendon_arm:TendonArm` names.
 
     Raises:
-        UnknownBlock: the module has no such class.
+        UnknownBlock: the module cannot be loaded, or has no such class.
     """
-    module, _, name = path.partition(":")
-    block = getattr(import_module(module), name, None)
-    if not isinstance(block, type):
-        raise UnknownBlock(path, f"module {module!r} has no class {name!r}")
-    return block
+    module_name, colon, name = path.partition(":")
+    if not colon:
+        raise UnknownBlock(path, "there is no ':' between module and class, as in my_arm:MyArm")
+    try:
+        module = import_module(module_name)
+    except Exception as e:  # a module may raise anything while it is loaded
+        fault = f"its module cannot be loaded: {type(e).__name__}: {one_line(e)}"
+        if isinstance(e, ModuleNotFoundError) and e.name == module_name:
+            fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}"
+        raise UnknownBlock(path, fault) from e
+    found = getattr(module, name, None)
+    if not isinstance(found, type):
+        classes = [n for n, c in vars(module).items() if isinstance(c, type) and c.__module__ == module_name]
+        raise UnknownBlock(path, f"module {module_name!r} has no class {name!r}; {nearest(name, classes)}")
+    return found

@@ -4,6 +4,7 @@ They are found by following the import statements in the sources, without runnin
 """
 
 import ast
+import hashlib
 import importlib.util
 import sys
 from collections.abc import Iterator
@@ -95,6 +96,19 @@ def closure(block: str) -> Carried:
                 is_package = spec.submodule_search_locations is not None
                 waiting += _imports(files[path], part if is_package else part.rpartition(".")[0])
     return Carried(dict(sorted(files.items())), tuple(sorted(environment)))
+
+
+def carried_digest(path: str) -> str:
+    """Return the SHA-256 of a class's module and of those that it imports, but for this package and installed ones.
+
+    Raises:
+        UnknownBlock: as `closure`.
+    """
+    digest = hashlib.sha256()
+    for name, file in closure(path).files.items():
+        if name.partition("/")[0] != OWN_PACKAGE:
+            digest.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def _with_packages(module: str) -> Iterator[str]:

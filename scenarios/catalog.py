@@ -1,14 +1,34 @@
-"""The catalog of robots and of their scenarios by name.
+"""The catalog of robots and of their scenarios by name, and those of other packages and modules.
 
-Scenarios are listed by import path, not imported: a run loads its own, and no other robot's.
+Scenarios are listed by import path, not imported: a run loads its own, and no other robot's. A package adds scenarios
+by entry points of the group `handover.scenarios`; any other is named by its path, such as `my_scene:TwoLinkReach`.
 """
 
-from collections.abc import Iterator, Mapping
+import functools
+import inspect
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
+from importlib import import_module, metadata
+from pathlib import Path
+from typing import Any, cast
 
+from handover.cosim.blocks.declarations import DeclarationError
+from handover.cosim.exceptions import one_line
+from handover.fmus.catalog import UnknownBlock, UnknownUnit, find_unit, import_class
+from handover.fmus.sources import carried_digest
 from handover.scenarios.experiment.experiment import Experiment
+
+GROUP = "handover.scenarios"
+"""The group of entry points that name scenarios; each is the path of a class."""
+
+
+class InvalidScenario(ValueError):
+    """What is named is no scenario, or lacks what a scenario must have; `faults` lists all of it."""
+
+    def __init__(self, path: str, faults: Sequence[str]) -> None:
+        super().__init__(f"{path}: {'; '.join(faults)}")
+        self.path, self.faults = path, tuple(faults)
 
 
 @dataclass(frozen=True)
@@ -87,3 +107,118 @@ class _Scenarios(Mapping[str, type[Experiment[Any]]]):
 SCENARIOS: Mapping[str, type[Experiment[Any]]] = _Scenarios(
     {name: path for system in SYSTEMS for name, path in system.paths.items()}
 )
+"""Those of this package."""
+
+
+@functools.cache
+def installed_scenarios() -> Mapping[str, str]:
+    """Return the paths of other packages' scenarios by name, sorted; a name of `SCENARIOS` stays this package's."""
+    found = {e.name: e.value for e in metadata.entry_points(group=GROUP)}
+    return {name: found[name] for name in sorted(found) if name not in SCENARIOS}
+
+
+def named_scenario(name: str) -> type[Experiment[Any]]:
+    """Return the scenario of a name, or of a path such as `my_scene:TwoLinkReach`, which Python's path finds.
+
+    Raises:
+        KeyError: no scenario has this name.
+        InvalidScenario: what the path names is none, or is not complete.
+    """
+    if name in SCENARIOS:
+        return SCENARIOS[name]
+    path = name if ":" in name else installed_scenarios()[name]
+    try:
+        scenario = import_class(path)
+    except UnknownBlock as e:
+        raise InvalidScenario(path, [e.fault]) from e
+    if faults := _faults_of(scenario):
+        raise InvalidScenario(path, faults)
+    return scenario
+
+
+def _faults_of(named: type[Any]) -> list[str]:
+    """Return what keeps a class from being a scenario that runs."""
+    if not issubclass(named, Experiment):
+        return [f"{named.__name__} is no scenario: it must be a subclass of Experiment"]
+    scenario = cast(type[Experiment[Any]], named)
+    faults = [f"it has no method {name!r}" for name in sorted(getattr(scenario, "__abstractmethods__", ()))]
+    try:
+        scenario.parameters()
+    except (DeclarationError, TypeError) as e:
+        faults.append(f"its parameters are invalid: {one_line(e)}")
+    if scenario.name in SCENARIOS and scenario is not SCENARIOS[scenario.name]:
+        faults.append(f"its name {scenario.name!r} is that of a scenario of this package; give it another")
+    units: Any = getattr(scenario, "units", None)
+    if not isinstance(units, Mapping):
+        return [*faults, "it has no 'units', a mapping such as {'arm': 'my_arm:MyArm'}"]
+    for place, unit in cast(Mapping[str, str], units).items():
+        try:
+            find_unit(unit)
+        except (UnknownUnit, UnknownBlock) as e:
+            faults.append(f"its unit {place!r}: {e}")
+    return faults
+
+
+@dataclass(frozen=True)
+class ScenarioSource:
+    """Where a scenario that is not this package's is found again.
+
+    Attributes:
+        scenario: its name, as installed packages have it, or its path, such as `my_scene:TwoLinkReach`.
+        folder: from which its module was imported; "" if it is installed.
+        sha256: of its module and of the modules beside it that this imports.
+    """
+
+    scenario: str
+    folder: str
+    sha256: str
+
+    @classmethod
+    def of(cls, name: str) -> "ScenarioSource | None":
+        """Return that of a scenario by its name or path; None for those of this package."""
+        if name in SCENARIOS:
+            return None
+        scenario = named_scenario(name)
+        return cls(name, _folder_of(scenario), carried_digest(f"{scenario.__module__}:{scenario.__qualname__}"))
+
+    def find(self) -> type[Experiment[Any]]:
+        """Return the scenario, from the folder where it was.
+
+        Raises:
+            KeyError, InvalidScenario: as `named_scenario`; also if the module of that name is another folder's.
+        """
+        search_folder(self.folder)
+        scenario = named_scenario(self.scenario)
+        if self.folder and (here := _folder_of(scenario)) != self.folder:
+            fault = f"its module was in {self.folder}; here a module of that name comes from {here or 'a package'}"
+            raise InvalidScenario(self.scenario, [fault])
+        return scenario
+
+
+def scenario_of(name: str, source: Mapping[str, Any]) -> type[Experiment[Any]] | None:
+    """Return the scenario of a run or campaign as its folder names it, None where it is not to be had here.
+
+    Args:
+        name: the scenario's.
+        source: a `ScenarioSource` as data; what else a run was of, an SSP or an FMU; or nothing, for this package's.
+    """
+    if not source:
+        return SCENARIOS.get(name)
+    try:
+        return ScenarioSource(**source).find()
+    except (TypeError, KeyError, InvalidScenario):
+        return None
+
+
+def search_folder(folder: Path | str) -> None:
+    """Let Python find modules in a folder, before all others; `""` names none."""
+    if folder and str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
+
+
+def _folder_of(scenario: type[Any]) -> str:
+    """Return the folder from which a class's module was imported, "" if that is where packages are installed."""
+    file = Path(inspect.getfile(scenario)).absolute()
+    depth = scenario.__module__.count(".") + (file.name == "__init__.py")
+    is_installed = {"site-packages", "dist-packages"} & set(file.parts)
+    return "" if is_installed else str(file.parents[depth])

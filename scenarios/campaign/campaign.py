@@ -13,6 +13,7 @@ from handover.scenarios.campaign.plan_check import PreparedPlan
 from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter
 from handover.scenarios.campaign.worker_pool import JobResult, OnRunCounts, RunCounts, RunJob, WorkerPool
+from handover.scenarios.catalog import ScenarioSource
 from handover.scenarios.results.run_folder import disk_errors_reported
 
 
@@ -56,6 +57,7 @@ class _CampaignState:
     def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: OnRunCounts) -> None:
         self.plan, self.folder, self.progress = plan, folder, progress
         self.table = TableWriter(plan, folder.table)
+        self._source = ScenarioSource.of(plan.scenario)
         self.runs = {run.name: run for run in plan.runs()}
         self._count = Counter[str]()
         self._kept = self._keep(self.runs.values())
@@ -113,6 +115,7 @@ class _CampaignState:
             fmus={unit: str(path) for unit, path in fmus.items()},
             runs=str(self.folder.runs.absolute()),
             options=self.plan.options,
+            modules="" if self._source is None else self._source.folder,
         )
 
     def _take(self, result: JobResult) -> None:

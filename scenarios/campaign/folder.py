@@ -16,7 +16,7 @@ from typing import Any
 
 from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
-from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.catalog import named_scenario
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
@@ -207,7 +207,7 @@ class CampaignFolder:
 
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Write `campaign.json`, before anything else is there: without it, the campaign could not be resumed."""
-        experiment = SCENARIOS[plan.scenario]
+        experiment = named_scenario(plan.scenario)
         display = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
         content = {**identity_of(plan, fmus), **display}
         if not (self.path / _FILE).exists() or self.read() != content:
@@ -257,7 +257,7 @@ def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFold
 
 
 def _stem(plan: CampaignPlan) -> str:
-    return plan.experiment or plan.scenario
+    return plan.experiment or named_scenario(plan.scenario).name
 
 
 def _new_folder(plan: CampaignPlan) -> CampaignFolder:

@@ -1,22 +1,27 @@
 """The identity of a campaign: a command resumes a folder only if all of it is the same."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
 from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.catalog import ScenarioSource
 from handover.scenarios.results.run_folder import sha256_of, versions
 
+_KINDS = {"units": "unit ", "master": "master's ", "versions": "version of ", "source": "scenario's "}
 _MAX_LENGTH = 60
 """Characters of a value that a message shows."""
 
 
 def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
     """Return all that a campaign's numbers depend on, as JSON data; the plan is a checked one."""
+    source = ScenarioSource.of(plan.scenario)
     options = {**plan.options.as_data(), "call_limit": plan.options.call_limit, "pace": plan.options.pace}
     return {
         "experiment": plan.experiment,
         "scenario": plan.scenario,
+        **({} if source is None else {"source": asdict(source)}),
         "points": [dict(point) for point in plan.points],
         "fixed": dict(plan.fixed),
         "repetitions": plan.repetitions,
@@ -52,7 +57,7 @@ def differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list
 
 def _of_entries(key: str, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:
     names = [*requested, *(name for name in stored if name not in requested)]
-    kind = {"units": "unit ", "fixed": "", "master": "master's ", "versions": "version of "}.get(key, "")
+    kind = _KINDS.get(key, "")
     differ = [name for name in names if stored.get(name) != requested.get(name)]
     return [_both(f"{kind}{name}", stored.get(name), requested.get(name)) for name in differ]
 

@@ -9,9 +9,10 @@ from typing import Any, NoReturn
 from handover.cosim.master.master import Master
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan
-from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
+from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
+from handover.scenarios.results.tolerated_faults import scenario_code
 
 _MAX_REPORTED = 8
 """Faults that are reported; there may be one for each point."""
@@ -83,7 +84,7 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
         UsageError: the plan names a unit that the scenario does not have, or the catalog's unit cannot be built.
     """
     experiment = find_scenario(plan.scenario)
-    others = replacement_fmus(experiment, [f"{name}={file}" for name, file in plan.units.items()])
+    others = replacements(experiment, [f"{name}={other}" for name, other in plan.units.items()])
     return select_fmus(experiment, others, lambda unit: cached(unit, 3))
 
 
@@ -93,11 +94,15 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     The system is that of the first point: parameters change what units do, not how they are wired.
 
     Raises:
-        InvalidFmu, WiringError, ScheduleError: they do not make it up.
+        InvalidFmu, WiringError, ScheduleError: they do not make it up. ScenarioFailed: the scenario's own code did.
     """
     experiment = find_scenario(plan.scenario)
     given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
-    system = experiment().build(parse_parameters(experiment, given), plan.seed, lambda unit: fmus[unit])
+    instance, parameters = experiment(), parse_parameters(experiment, given)
+    with scenario_code(instance):
+        system = instance.build(parameters, plan.seed, lambda unit: fmus[unit])
+        instance.evaluator(parameters)
+        instance.stop_time(parameters)
     Master(system, plan.options)
 
 
@@ -121,9 +126,10 @@ def _check_together(experiment: type[Experiment[Any]], parameters: Any, point: M
     def stop(_unit: str) -> NoReturn:
         raise _ParametersAccepted
 
+    instance = experiment()
     try:
-        with suppress(_ParametersAccepted):
-            experiment().build(parameters, 0, stop)
+        with scenario_code(instance), suppress(_ParametersAccepted):
+            instance.build(parameters, 0, stop)
     except InvalidParameter as e:
         where = f"at {', '.join(f'{name}={value}' for name, value in point.items())}: " if point else ""
         raise InvalidParameter([f"{where}{fault}" for fault in e.faults]) from e

@@ -12,8 +12,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.experiment.experiment import Experiment
 
 _MAX_METRICS = 4
 _MAX_INTERVALS = 150
@@ -67,6 +68,11 @@ class CampaignResults:
         """Name of the scenario."""
         return str(self.metadata["scenario"])
 
+    @cached_property
+    def experiment(self) -> type[Experiment[Any]] | None:
+        """The scenario; None if it is not to be had here."""
+        return scenario_of(self.scenario, self.metadata.get("source", {}))
+
     @property
     def planned(self) -> int:
         """Runs that the campaign is to have."""
@@ -94,7 +100,7 @@ class CampaignResults:
     @cached_property
     def declared(self) -> Mapping[str, Variable]:
         """The scenario's parameters by name; none if this version does not know the scenario."""
-        experiment = SCENARIOS.get(self.scenario)
+        experiment = self.experiment
         return {} if experiment is None else {v.name: v for v in experiment.parameters()}
 
     def is_number(self, parameter: str) -> bool:
@@ -115,8 +121,8 @@ class CampaignResults:
     @cached_property
     def headline(self) -> tuple[str, ...]:
         """Columns of the metrics that are shown first, in their order: those that any run has, without CPU time."""
-        experiment = SCENARIOS.get(self.scenario)
-        first = () if experiment is None else experiment.headline
+        experiment = self.experiment
+        first = () if experiment is None else experiment.headline or self.measured
         columns = [n if n in self.table.metrics else f"{n}_metric" for n in first]
         return tuple(n for n in columns if n in self.measured and not n.startswith(("cpu_", "pace_")))
 
@@ -128,7 +134,7 @@ class CampaignResults:
     @cached_property
     def measured(self) -> tuple[str, ...]:
         """Columns of the metrics that any run has a value of, the headline's first and those of the cost last."""
-        experiment = SCENARIOS.get(self.scenario)
+        experiment = self.experiment
         first = [] if experiment is None else list(experiment.headline)
 
         def place(name: str) -> tuple[int, int]:

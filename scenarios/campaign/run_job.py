@@ -13,10 +13,11 @@ import click
 
 from handover.cosim.exceptions import CosimError, InitializationError, ScheduleError, UnitFailure, WiringError, one_line
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.execution.selection import find_scenario, own_source
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
 from handover.scenarios.results.summary import ElapsedTime, unstarted_run, unstarted_summary
@@ -51,6 +52,7 @@ def _write_refusal(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
 
 
 def _task(job: RunJob, folder: Path) -> Task:
+    search_folder(job.modules)
     experiment = find_scenario(job.scenario)
     return Task(
         experiment=experiment(),
@@ -59,6 +61,7 @@ def _task(job: RunJob, folder: Path) -> Task:
         fmus={name: Path(path) for name, path in job.fmus.items()},
         folder=RunFolder(folder),
         options=job.options,
+        source=own_source(job.scenario),
         presented=False,
     )
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from handover.cosim.fmu.heartbeat import Heartbeat
-from handover.fmus.catalog import UNITS, import_block
+from handover.fmus.catalog import find_unit, import_class
 from handover.scenarios.campaign.run_job import (
     finish,
     job_result,
@@ -31,7 +31,7 @@ from handover.scenarios.campaign.run_job import (
     run_job,
 )
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
-from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.catalog import InvalidScenario, named_scenario
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
 from handover.scenarios.execution.crash import Crash
@@ -68,21 +68,25 @@ class RunServer:
                 job, folder = read_message(self._jobs)
             except EOFError:  # the worker has ended, maybe while it wrote a job
                 return
-            self._load(job.scenario)
+            self._load(job)
             write_message(self._results, self._run_job(job, Path(folder)))
 
     def _job_comes(self) -> bool:
         """Wait for a job, or the end of the stream; return False if none came in time."""
         return not self._forks or bool(select.select([self._jobs], [], [], IDLE)[0])
 
-    def _load(self, scenario: str) -> None:
-        """Load what the units of a scenario import, once for all its runs."""
-        if scenario in self._loaded or scenario not in SCENARIOS:
+    def _load(self, job: RunJob) -> None:
+        """Load what the units of a scenario import, once for all its runs; not what its author may change meanwhile."""
+        if job.modules or job.scenario in self._loaded:
             return
-        self._loaded.add(scenario)
-        for unit in SCENARIOS[scenario].units.values():
-            with contextlib.suppress(Exception):  # a run that needs it will report it
-                block = import_block(UNITS[unit].block)
+        self._loaded.add(job.scenario)
+        try:
+            units = named_scenario(job.scenario).units
+        except (KeyError, InvalidScenario):  # the run will report it
+            return
+        for unit in units.values():
+            with contextlib.suppress(Exception):  # likewise
+                block = import_class(find_unit(unit).block)
                 for module in getattr(block, "deferred", ()):
                     importlib.import_module(module)
         gc.collect()

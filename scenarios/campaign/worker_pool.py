@@ -22,6 +22,7 @@ class RunJob:
         name: of the run's folder in `runs`. While it runs, its files are in a folder of another name beside it, which
             is renamed when the run has ended, so that a folder of this name is complete.
         scenario, parameters, seed: what to run; parameters are texts `name=value`.
+        modules: folder in which the scenario's module is; "" if it is installed.
         fmus: the FMU of each unit.
         runs: the campaign's folder of runs.
         options: how units are run.
@@ -34,6 +35,7 @@ class RunJob:
     fmus: Mapping[str, str]
     runs: str
     options: MasterOptions
+    modules: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

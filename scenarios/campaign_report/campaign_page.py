@@ -24,7 +24,6 @@ from handover.scenarios.campaign_report.points import points_section, success_se
 from handover.scenarios.campaign_report.runs import failures_section, runs_section
 from handover.scenarios.campaign_report.settings import figures_section, setting_section
 from handover.scenarios.campaign_report.spread_section import spread_section
-from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.published.catalog import EXPERIMENTS
 from handover.scenarios.published.published_experiment import (
@@ -57,7 +56,7 @@ def _scenario(results: CampaignResults) -> str:
     """Describe the scenario by what the page's title lacks: below a paper's title its name, else what it does."""
     if results.metadata.get("experiment"):
         return f"Runs of the scenario {results.scenario}."
-    scenario = SCENARIOS.get(results.scenario)
+    scenario = results.experiment
     return str(results.metadata.get("title", "" if scenario is None else scenario.title))
 
 

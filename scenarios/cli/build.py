@@ -8,22 +8,19 @@ from pathlib import Path
 
 import click
 
-from handover.cosim.blocks.declarations import DeclarationError
-from handover.cosim.blocks.description import describe
-from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.exceptions import nearest
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import InvalidName, InvalidStep, build
-from handover.fmus.catalog import UNITS, Entry, UnknownBlock, import_block
+from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, InvalidText
 from handover.fmus.sources import closure
+from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
-
-_STEP = Fraction(1, 100)  # s, of a block that is not sampled
 
 
 def load_user_block(path: str, step: str | None) -> Entry:
@@ -34,18 +31,13 @@ def load_user_block(path: str, step: str | None) -> Entry:
     Raises:
         UsageError: there is no such class, its module cannot be loaded, it is no block, or the step is invalid.
     """
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
+    search_folder(Path.cwd())
     given = None if step is None else _seconds(step)
     try:
         closure(path)
-        period = describe(import_block(path)).period
-    except (UnknownBlock, DeclarationError) as e:
-        raise UsageError(f"{path}: {e}" if isinstance(e, DeclarationError) else str(e)) from e
-    except Exception as e:  # a module may raise anything while it is loaded
-        raise UsageError(f"{path}: its module cannot be loaded: {type(e).__name__}: {one_line(e)}") from e
-    return Entry(path.rpartition(":")[2], path, given or period or _STEP, "")
+        return own_unit(path, given)
+    except UnknownBlock as e:
+        raise UsageError(str(e)) from e
 
 
 def _seconds(text: str) -> Fraction:

@@ -15,9 +15,10 @@ from handover.fmus.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
+from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import check_place
+from handover.scenarios.results.tolerated_faults import scenario_code
 
 _HELP = """Write a SCENARIO as an SSP (System Structure and Parameterization), which other tools load.
 
@@ -46,14 +47,16 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
         if file.is_dir():
             raise UsageError(f"--ssp {file}: there is a folder of that name")
         check_place(file.parent)
-        others = replacement_fmus(experiment, replaced)
+        others = replacements(experiment, replaced)
         fmus = select_fmus(experiment, others, exchangeable)
         instance = experiment()
-        system = instance.build(values, seed, lambda unit: fmus[unit])
+        with scenario_code(instance):
+            system = instance.build(values, seed, lambda unit: fmus[unit])
+            stop = instance.stop_time(values)
         start_from_enumerations(system, {n: unit for n, unit in experiment.units.items() if n not in others})
         warn_of_enumerations(system, others)
         try:
-            write_ssp(system, file, experiment.name, instance.stop_time(values), experiment.parallel_step)
+            write_ssp(system, file, experiment.name, stop, experiment.parallel_step)
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
     click.echo(file)

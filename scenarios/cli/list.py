@@ -1,33 +1,63 @@
 """The command `handover list`: scenarios and units, their parameters and ports."""
 
+from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
+from rich.console import Console
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import nearest
-from handover.fmus.catalog import UNITS, Entry, import_block
-from handover.scenarios.catalog import SCENARIOS, SYSTEMS
+from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit, import_class, installed_units
+from handover.scenarios.catalog import (
+    SCENARIOS,
+    SYSTEMS,
+    InvalidScenario,
+    installed_scenarios,
+    named_scenario,
+    search_folder,
+)
 from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment
 
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
 @click.argument("name", required=False, metavar="[SCENARIO|UNIT]")
 def list_command(name: str | None) -> None:
-    """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT."""
+    """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT.
+
+    Either can be your own, named MODULE:CLASS, such as my_scene:TwoLinkReach for the class TwoLinkReach in my_scene.py;
+    modules are looked for in the working directory first.
+    """
     if name is None:
         print_catalog()
-    elif name in UNITS:
-        print_unit(UNITS[name])
-    elif name in SCENARIOS:
-        print_scenario(SCENARIOS[name])
+    elif (unit := _unit(name)) is not None:
+        print_unit(unit)
+    elif ":" in name or name in SCENARIOS or name in installed_scenarios():
+        print_scenario(find_scenario(name))
     else:
-        raise UsageError(f"no scenario or unit {name!r}: {nearest(name, [*SCENARIOS, *UNITS])}")
+        valid = [*SCENARIOS, *installed_scenarios(), *UNITS, *installed_units()]
+        raise UsageError(f"no scenario or unit {name!r}: {nearest(name, valid)}")
+
+
+def _unit(name: str) -> Entry | None:
+    """Return the unit of a name or a block's path, None if it is none."""
+    search_folder(Path.cwd())
+    if name in UNITS:
+        return UNITS[name]
+    try:
+        if ":" in name and issubclass(import_class(name), Experiment):
+            return None
+        return find_unit(name)
+    except UnknownUnit:
+        return None
+    except UnknownBlock as e:
+        raise UsageError(str(e)) from e
 
 
 def print_catalog() -> None:
@@ -42,9 +72,29 @@ def print_catalog() -> None:
         ):
             console.print(f"  {heading}", style="italic")
             print_rows(console, [("", name.ljust(width), summary) for name, summary in rows])
+    print_installed(console, width)
     if others := sorted(set(UNITS) - {unit for system in SYSTEMS for unit in system.units}):
         console.print("Units that no scenario uses", style="bold")
         print_rows(console, [("", name.ljust(width), UNITS[name].summary) for name in others])
+
+
+def print_installed(console: Console, width: int) -> None:
+    """Print the scenarios and units of other packages."""
+    scenarios = [(name, _title(name)) for name in installed_scenarios()]
+    units = list(installed_units().items())
+    if scenarios or units:
+        console.print("Of other packages", style="bold")
+    for heading, rows in (("scenarios", scenarios), ("units", units)):
+        if rows:
+            console.print(f"  {heading}", style="italic")
+            print_rows(console, [("", name.ljust(width), summary) for name, summary in rows])
+
+
+def _title(name: str) -> str:
+    try:
+        return named_scenario(name).title
+    except InvalidScenario as e:
+        return f"(not usable) {e}"
 
 
 def print_scenario(experiment: type[Experiment[Any]]) -> None:
@@ -53,14 +103,14 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
     console.print(f"{experiment.name}: {experiment.title}", style="bold")
     console.print("Parameters, to be set with -p name=value")
     print_rows(console, [(v.name, _plain(v.start), _allowed(v), v.description) for v in experiment.parameters()])
-    console.print("Units, to be replaced with --unit name=file.fmu")
+    console.print("Units, to be replaced with --unit name=file.fmu or name=module:Class")
     print_rows(console, list(experiment.units.items()))
 
 
 def print_unit(unit: Entry) -> None:
     """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
     console = open_console()
-    d = describe(import_block(unit.block))
+    d = describe(import_class(unit.block))
     step = "sampled every" if d.period is not None else "stepped by, for instance,"
     console.print(f"{unit.name}: {unit.summary}", style="bold")
     console.print(f"{step} {float(unit.step) * 1000:.4g} ms")

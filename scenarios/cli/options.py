@@ -76,7 +76,13 @@ _SCENARIO_OPTIONS = (
         "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
     ),
     click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers."),
-    click.option("--unit", "replaced", multiple=True, metavar="NAME=FILE", help="Replace a unit by another FMU."),
+    click.option(
+        "--unit",
+        "replaced",
+        multiple=True,
+        metavar="NAME=FILE|NAME=MODULE:CLASS",
+        help="Replace a unit by another FMU, or by one that is built of a block of your own.",
+    ),
 )
 
 

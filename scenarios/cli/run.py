@@ -22,9 +22,9 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.execution.selection import find_scenario, replacement_fmus, select_fmus
-from handover.scenarios.execution.ssp_run import NoParameters, is_ssp, open_experiment, source_of
-from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.execution.selection import find_scenario, own_source, replacements, select_fmus
+from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of
+from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.task import Task
@@ -168,8 +168,10 @@ def run(
         else:
             experiment = find_scenario(scenario)()
             values = parse_parameters(type(experiment), parameters)
-        folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{Path(scenario).stem}"))
-        fmus = select_fmus(type(experiment), replacement_fmus(type(experiment), replaced), lambda unit: cached(unit, 3))
+            source = own_source(scenario)
+        stem = Path(experiment.name).stem  # of a file, its name without suffix
+        folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{stem}"))
+        fmus = select_fmus(type(experiment), replacements(type(experiment), replaced), lambda unit: cached(unit, 3))
         task = Task(
             experiment=experiment,
             parameters=values,

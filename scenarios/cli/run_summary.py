@@ -31,7 +31,8 @@ def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder)
     console.print(f"{summary['scenario']} {verdict}: ", end="")
     console.print(summary["reason"], markup=False, soft_wrap=True)
     metrics = summary["metrics"]
-    rows = [(metrics[n]["description"] or n, format_metric(metrics[n])) for n in headline if n in metrics]
+    first = headline or result.outcome.metrics
+    rows = [(metrics[n]["description"] or n, format_metric(metrics[n])) for n in first if n in metrics]
     rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)

@@ -17,7 +17,7 @@ from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.selection import find_scenario, replacement_fmus
+from handover.scenarios.execution.selection import find_scenario, replacements
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
@@ -98,7 +98,7 @@ def sweep(
             repetitions=repeat,
             seed=seed,
             paired=paired,
-            units={name: str(file) for name, file in replacement_fmus(experiment, replaced).items()},
+            units=replacements(experiment, replaced),
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)

@@ -54,6 +54,7 @@ def one_line_errors() -> Generator[None, None, None]:
     from handover.fmus.compile import CompilationError, UnknownPlatform
     from handover.scenarios.experiment.parameters import InvalidParameter
     from handover.scenarios.results.run_folder import InvalidRunFolder
+    from handover.scenarios.results.tolerated_faults import ScenarioFailed
 
     try:
         yield
@@ -63,7 +64,9 @@ def one_line_errors() -> Generator[None, None, None]:
         raise RunNotWritten(str(e)) from e
     except ClusterLost as e:
         raise WorkersLost(str(e)) from e
-    except (CosimError, InvalidParameter, InvalidRunFolder, PoolError, NotCompiled, UnknownPlatform) as e:
+    except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed) as e:
+        raise UsageError(str(e)) from e
+    except (PoolError, NotCompiled, UnknownPlatform) as e:
         raise UsageError(str(e)) from e
     except CompilationError as e:
         raise UsageError(str(e).replace("\n", " ", 1)) from e

@@ -11,7 +11,7 @@ from handover.cosim.master.checkpoint import InvalidCheckpoint
 from handover.cosim.record.file_lock import FileLocked
 from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached, is_of_cache
-from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource
 from handover.scenarios.execution.fmu_run import reopened
 from handover.scenarios.execution.resumption import Resumption
 from handover.scenarios.execution.ssp_run import open_experiment
@@ -109,6 +109,8 @@ class InterruptedRun:
 
     def _experiment(self, opened: contextlib.ExitStack) -> Experiment[Any]:
         source, name = self._description["source"], self._description["scenario"]
+        if "scenario" in source:
+            return self._own_scenario(source)
         if not source:
             if name not in SCENARIOS:
                 raise InvalidRunFolder(
@@ -121,6 +123,21 @@ class InterruptedRun:
         if not file.is_file() or sha256_of(file) != source["sha256"]:
             raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
         return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
+
+    def _own_scenario(self, source: Mapping[str, Any]) -> Experiment[Any]:
+        """Return a scenario that is not this package's, if it is what it was."""
+        before = ScenarioSource(**source)
+        try:
+            experiment = before.find()
+        except KeyError:
+            missing = f"its scenario {before.scenario!r} is not installed here"
+            raise InvalidRunFolder(self.folder.path, missing) from None
+        except InvalidScenario as e:
+            raise InvalidRunFolder(self.folder.path, f"its scenario is not here: {e}") from e
+        if ScenarioSource.of(before.scenario) != before:
+            changed = f"the code of its scenario {before.scenario} is not what the run began with"
+            raise InvalidRunFolder(self.folder.path, f"{changed}; begin a new run")
+        return experiment()
 
     def _fmu_experiment(self, source: Mapping[str, Any]) -> Experiment[Any]:
         run, files = reopened(source)

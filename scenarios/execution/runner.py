@@ -29,7 +29,7 @@ from handover.scenarios.results.summary import (
     finished_summary,
 )
 from handover.scenarios.results.task import Task
-from handover.scenarios.results.tolerated_faults import GuardedEvaluator, ToleratedFaults
+from handover.scenarios.results.tolerated_faults import GuardedEvaluator, ToleratedFaults, scenario_code
 
 Progress = Callable[[float, float], None]
 """Is called with the simulated time and the time at which the run ends at the latest, in seconds."""
@@ -42,7 +42,7 @@ def run_task(
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
-            InvalidCheckpoint: before anything was written.
+            InvalidCheckpoint, ScenarioFailed: before anything was written.
         UnitHung, UnitCrashed: a unit does not return, or an isolated one ends its process, as it is loaded or
             initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
@@ -50,12 +50,14 @@ def run_task(
     """
     experiment, parameters = task.experiment, task.parameters
     spent = ElapsedTime() if resumption is None else resumption.spent
-    evaluator = GuardedEvaluator(
-        experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
-    )
-    failure: UnitFailure | None = None
     clock = spent.clock()
-    system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
+    with scenario_code(experiment):
+        evaluator = GuardedEvaluator(
+            experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
+        )
+        system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
+        experiment.stop_time(parameters)
+    failure: UnitFailure | None = None
     if task.options.algorithm is Algorithm.JACOBI and experiment.parallel_step is not None:
         system.set_step(experiment.parallel_step)
     if task.every is not None:

@@ -1,57 +1,101 @@
 """Finds what a command names: a scenario, and the FMUs that take the place of its units."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import nearest
-from handover.fmus.catalog import UNITS
-from handover.scenarios.catalog import SCENARIOS
+from handover.fmus.build import InvalidName
+from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit
+from handover.fmus.layout import DuplicateName
+from handover.fmus.model_description import AmbiguousName, InvalidText
+from handover.scenarios.catalog import (
+    SCENARIOS,
+    InvalidScenario,
+    ScenarioSource,
+    installed_scenarios,
+    named_scenario,
+    search_folder,
+)
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.experiment import Experiment
 
+_BLOCK = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+"""The path of a block, `my_arm:MyArm`; a drive's letter is followed by a slash."""
+
+_INVALID_BLOCKS = (UnknownUnit, UnknownBlock, InvalidName, DuplicateName, AmbiguousName, InvalidText)
+
 
 def find_scenario(name: str) -> type[Experiment[Any]]:
-    """Return the scenario of a name.
+    """Return the scenario of a name, or of a path such as `my_scene:TwoLinkReach`; the working directory is searched.
 
     Raises:
-        UsageError: there is none; the nearest names are given.
+        UsageError: there is none, and the nearest names are given; or it is not complete, and all that it lacks is.
     """
-    if name not in SCENARIOS:
+    search_folder(Path.cwd())
+    try:
+        return named_scenario(name)
+    except InvalidScenario as e:
+        raise UsageError(str(e)) from e
+    except KeyError:
+        valid = [*SCENARIOS, *installed_scenarios()]
         if name in UNITS:
-            raise UsageError(f"{name} is a unit, not a scenario: {', '.join(SCENARIOS)}")
-        raise UsageError(f"no scenario {name!r}: {nearest(name, SCENARIOS)}")
-    return SCENARIOS[name]
+            raise UsageError(f"{name} is a unit, not a scenario: {', '.join(valid)}") from None
+        own = "" if name in "".join(valid) else "; a scenario of your own is named MODULE:CLASS"
+        raise UsageError(f"no scenario {name!r}: {nearest(name, valid)}{own}") from None
 
 
-def replacement_fmus(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, Path]:
-    """Return the files in `NAME=FILE` texts, by the units whose place they take.
+def own_source(name: str) -> dict[str, Any]:
+    """Return what a run's folder keeps of a scenario that is not this package's, to find it again; else nothing."""
+    source = ScenarioSource.of(name)
+    return {} if source is None else asdict(source)
+
+
+def replacements(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, str]:
+    """Return what `NAME=FILE` and `NAME=MODULE:CLASS` texts put in the place of units, by the units' names.
 
     Raises:
         UsageError: a text is of another form, or names no unit of the scenario.
     """
-    files: dict[str, Path] = {}
+    others: dict[str, str] = {}
     for text in given:
-        name, equals, file = text.partition("=")
-        if not equals or not file:
-            raise UsageError(f"--unit {text!r} is not of the form NAME=FILE")
+        name, equals, other = text.partition("=")
+        if not equals or not other:
+            raise UsageError(f"--unit {text!r} is not of the form NAME=FILE or NAME=MODULE:CLASS")
         if name not in experiment.units:
             raise UsageError(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
-        if name in files:
+        if name in others:
             raise UsageError(f"--unit: {name} is given twice")
-        files[name] = Path(file)
-    return files
+        others[name] = other
+    return others
 
 
 def select_fmus(
-    experiment: type[Experiment[Any]], others: Mapping[str, Path], built: Callable[[str], Path]
+    experiment: type[Experiment[Any]], others: Mapping[str, str], built: Callable[[str], Path]
 ) -> dict[str, Path]:
-    """Return the FMU of each unit of a scenario: one of the others, or the catalog's unit, which `built` builds.
+    """Return the FMU of each unit of a scenario: a file that takes its place, or what `built` builds.
+
+    Args:
+        experiment: the scenario.
+        others: files of FMUs, or paths of blocks, by the units whose place they take.
+        built: builds a unit by its name or its block's path.
 
     Raises:
-        UsageError: the folder of built units cannot be used.
+        UsageError: a block does not exist or is none of which an FMU can be made, or the folder of built units cannot
+            be used.
     """
-    try:
-        return {name: others.get(name) or built(unit) for name, unit in experiment.units.items()}
-    except OSError as e:
-        raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+    fmus: dict[str, Path] = {}
+    for name, unit in experiment.units.items():
+        other = others.get(name, "")
+        if other and not _BLOCK.fullmatch(other):
+            fmus[name] = Path(other)
+            continue
+        try:
+            fmus[name] = built(other or unit)
+        except _INVALID_BLOCKS as e:
+            raise UsageError(f"unit {name}: {e}") from e
+        except OSError as e:
+            raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
+    return fmus

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -18,11 +17,6 @@ from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.results.run_folder import sha256_of
-
-
-@dataclass(frozen=True, kw_only=True)
-class NoParameters:
-    """An SSP's parameters are bound in it."""
 
 
 class UntilStop(Evaluator):
@@ -68,9 +62,7 @@ def system_experiment(
 
         name: ClassVar[str] = file_name
         title: ClassVar[str] = heading
-        parameters_type: ClassVar[type[Any]] = NoParameters
         units: ClassVar[Mapping[str, str]] = {}
-        headline: ClassVar[tuple[str, ...]] = ()
         is_seeded: ClassVar[bool] = False
         parallel_step: ClassVar[Fraction | None] = step
 
@@ -82,9 +74,6 @@ def system_experiment(
 
         def evaluator(self, parameters: Any) -> UntilStop:  # noqa: ARG002
             return UntilStop(stop)
-
-        def cycle(self) -> tuple[str, ...]:
-            return ()
 
         def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
             from handover.scenarios.reporting.run_figures import figures_of_outputs  # what draws takes long to load

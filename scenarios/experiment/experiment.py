@@ -5,6 +5,7 @@ point, and reports are made of what `time_figures`, `draw`, `replay` and `publis
 """
 
 import abc
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -104,24 +105,44 @@ _PARAMETERS = "parameters"
 AnyEvaluator = TypeVar("AnyEvaluator", bound=Evaluator)
 
 
+@dataclass(frozen=True, kw_only=True)
+class NoParameters:
+    """The parameters of an experiment that has none."""
+
+
 class Experiment(abc.ABC, Generic[AnyEvaluator]):
-    """A scenario. Subclasses name it, declare its parameters, wire its system and evaluate its runs."""
+    """A scenario. Subclasses declare its parameters and units, wire its system and evaluate its runs.
+
+    A subclass has to have `units`, `build`, `stop_time` and `evaluator`; the rest has defaults, and a section of the
+    report whose method is not overridden is left out.
+    """
 
     name: ClassVar[str]
-    """Its name on the command line: lower case, with underscores."""
+    """Its name in lists, results and reports: lower case, with underscores. By default, the class's, so written."""
     title: ClassVar[str]
-    """One line that says what happens in it, for lists and reports."""
-    parameters_type: ClassVar[type[Any]]
+    """One line that says what happens in it, for lists and reports. By default, the docstring's first line."""
+    parameters_type: ClassVar[type[Any]] = NoParameters
     """A dataclass of declared parameters, which `build`, `stop_time` and `evaluator` get as an instance."""
     units: ClassVar[Mapping[str, str]]
-    """The catalogued unit behind each of the system's units, by name in the system."""
-    headline: ClassVar[tuple[str, ...]]
-    """Names of the metrics that summaries list first, in this order; a run need not have all of them."""
+    """The unit behind each of the system's units, by name in the system: a name in the catalog, or the path of a block
+    as `my_module:MyBlock`."""
+    headline: ClassVar[tuple[str, ...]] = ()
+    """Names of the metrics that summaries list first, in this order; a run need not have all of them. By default, those
+    of the evaluator's outcome."""
     is_seeded: ClassVar[bool] = True
     """Whether it draws random numbers, which follow from the seed."""
     parallel_step: ClassVar[Fraction | None] = None
     """Communication step, s, of all units where they step in parallel (Jacobi): each then hands on its results a step
     late, which the loop must bear. None where it bears the steps that the units propose."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        if "name" not in vars(cls):
+            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()
+        if "title" not in vars(cls) and vars(cls).get("__doc__"):
+            cls.title = str(cls.__doc__).strip().partition("\n")[0].rstrip(".")
+        elif not hasattr(cls, "title"):
+            cls.title = cls.name.replace("_", " ")
 
     @classmethod
     def parameters(cls) -> tuple[Variable, ...]:
@@ -147,9 +168,9 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         """
         return self.evaluator(parameters)
 
-    @abc.abstractmethod
     def cycle(self) -> tuple[str, ...]:
-        """Return the units of one control cycle, whose CPU time per cycle is a metric."""
+        """Return the units of one control cycle, whose CPU time per cycle is a metric; none by default."""
+        return ()
 
     def time_figures(self, parameters: Any, record: Record) -> Sequence[TimeFigure]:  # noqa: ARG002
         """Return the figures over time, for the report and for papers; none by default.

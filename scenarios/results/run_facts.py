@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from handover.cosim.exceptions import one_line
 from handover.cosim.record.reader import Record
-from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.summary import MetricData, RunData, Summary, faults_of, unwritten_summary
@@ -25,7 +25,7 @@ class RunFacts:
     Attributes:
         folder: the run's.
         run, summary: contents of `run.json` and `summary.json`; for a run that was killed, a summary that says so.
-        experiment: the scenario, if the catalog has it; None for an SSP.
+        experiment: the scenario, if it is to be had here; None for an SSP.
         ended: whether the run wrote its summary.
     """
 
@@ -49,7 +49,7 @@ class RunFacts:
             summary = unwritten_summary(run)
         _check(folder, "summary.json", summary, Summary)
         _check_metrics(folder, cast(Mapping[str, Any], summary["metrics"]))
-        scenario = SCENARIOS.get(run["scenario"])
+        scenario = scenario_of(run["scenario"], run.get("source", {}))
         experiment = None if scenario is None else scenario()
         return cls(folder=folder, run=run, summary=summary, experiment=experiment, ended=ended)
 

@@ -8,11 +8,12 @@ import traceback
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Generic
+from typing import Any, Generic
 
 from handover.cosim.exceptions import CosimError, one_line
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.experiment import AnyEvaluator, Evaluator, Outcome
+from handover.scenarios.experiment.experiment import AnyEvaluator, Evaluator, Experiment, Outcome
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.pictures import CameraPicture
 
 _MAX_MESSAGE = 200  # characters
@@ -21,13 +22,49 @@ _MAX_MESSAGE = 200  # characters
 def fault_line(e: BaseException) -> str:
     """Return what was raised, and where, in one line: `ValueError: ... (replay.py, line 67)`."""
     frames = traceback.extract_tb(e.__traceback__)
-    ours = [f for f in frames if f"{__name__.partition('.')[0]}/" in f.filename.replace("\\", "/")] or frames
-    place = f" ({Path(ours[-1].filename).name}, line {ours[-1].lineno})" if ours else ""
+    where = ([f for f in frames if _is_users(f)] or [f for f in frames if _is_ours(f)] or frames)[-1:]
+    place = f" ({Path(where[0].filename).name}, line {where[0].lineno})" if where else ""
     message = one_line(e)
     if len(message) > _MAX_MESSAGE:  # of libraries such as Qhull: a page of advice
         message = f"{message[:_MAX_MESSAGE]}..."
     name = type(e).__name__
     return f"{name}{place}" if message == name else f"{name}: {message}{place}"
+
+
+def _is_ours(frame: traceback.FrameSummary) -> bool:
+    return f"{__name__.partition('.')[0]}/" in frame.filename.replace("\\", "/")
+
+
+def _is_users(frame: traceback.FrameSummary) -> bool:
+    """Return whether a frame is of a scenario that is neither this package's nor installed."""
+    parts = Path(frame.filename).parts
+    is_installed = {"site-packages", "dist-packages"} & set(parts) or frame.filename.startswith((_STANDARD, "<"))
+    return not is_installed and not _is_ours(frame)
+
+
+_STANDARD = str(Path(traceback.__file__).parent)
+"""The folder of the standard library."""
+
+
+class ScenarioFailed(ValueError):
+    """The code of a scenario that is not this package's raised something before the run began."""
+
+
+@contextmanager
+def scenario_code(experiment: Experiment[Any]) -> Generator[None, None, None]:
+    """Let a block call a scenario that is to set up a run.
+
+    Raises:
+        ScenarioFailed: it is not this package's, and raised what it is not to raise; the message says where.
+    """
+    try:
+        yield
+    except (CosimError, OSError, InvalidParameter):
+        raise
+    except Exception as e:  # anybody's code may raise anything
+        if type(experiment).__module__.partition(".")[0] == __name__.partition(".")[0]:
+            raise
+        raise ScenarioFailed(f"the scenario {experiment.name} failed as it was set up: {fault_line(e)}") from e
 
 
 class ToleratedFaults:

@@ -12,7 +12,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.blocks.description import describe
-from handover.fmus.catalog import UNITS, import_block
+from handover.fmus.catalog import UNITS, import_class
 
 ROUNDS, CALLS = 25, 200
 
@@ -24,7 +24,7 @@ def microseconds(call: Callable[[], Any], calls: int = CALLS) -> float:
 
 @pytest.mark.parametrize("name", ["FreeFlyer", "HandAndObject", "VslArm", "TendonArm"])
 def test_save_and_restore(name: str, benchmark: BenchmarkFixture):
-    kind = import_block(UNITS[name].block)
+    kind = import_class(UNITS[name].block)
     d = describe(kind)
     block, inputs, h = kind(d.params_type()), d.inputs_type(), float(UNITS[name].step)
     block.outputs(0.0, inputs)

@@ -18,7 +18,7 @@ from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System
 from handover.fmus.build import build_block, cached
-from handover.fmus.catalog import UNITS, import_block
+from handover.fmus.catalog import UNITS, import_class
 
 TOLERANCE = 1e-12
 """Absolute for values up to 1, relative beyond."""
@@ -67,7 +67,7 @@ def expect_same(found: Sequence[Mapping[str, float]], wanted: Record, first: int
 
 def description(unit: str) -> Description:
     """Return what a unit's block declares."""
-    return describe(import_block(UNITS[unit].block))
+    return describe(import_class(UNITS[unit].block))
 
 
 def variables(unit: str) -> dict[str, Variable]:

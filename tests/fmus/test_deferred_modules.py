@@ -11,10 +11,10 @@ DEFERRING = ("TendonArm", "ImpedanceController", "PoseController")
 
 _MAKE = """
 import importlib, sys
-from handover.fmus.catalog import UNITS, import_block
+from handover.fmus.catalog import UNITS, import_class
 
 entry = UNITS[sys.argv[1]]
-block = import_block(entry.block)
+block = import_class(entry.block)
 params = block.__init__.__annotations__["params"]
 for module in getattr(block, "deferred", ()):
     assert module not in sys.modules, f"{module} is loaded by the block's module already"

@@ -18,7 +18,7 @@ from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import describe_fmu
 from handover.fmus.build import cached
-from handover.fmus.catalog import UNITS, import_block
+from handover.fmus.catalog import UNITS, import_class
 from handover.fmus.layout import DuplicateName, Layout
 
 SAMPLED = "sampled:Sampled"
@@ -325,7 +325,7 @@ def test_a_failure_in_a_tick_is_a_failure_of_the_instance(workshop: Workshop):
 
 
 def test_no_port_of_a_sampled_block_has_the_clocks_name():
-    d = describe(import_block("sample_units.sampled:Sampled"))
+    d = describe(import_class("sample_units.sampled:Sampled"))
     inputs = (dataclasses.replace(d.inputs[0], name="sample_clock"),)
     with pytest.raises(DuplicateName, match="more than one variable is named sample_clock"):
         Layout(dataclasses.replace(d, inputs=inputs))
@@ -334,7 +334,7 @@ def test_no_port_of_a_sampled_block_has_the_clocks_name():
 
 def simulated(name: str, *, event_mode: bool) -> list[list[float]]:
     """Return the real outputs of a catalogued unit after each of some steps of its period, with inputs that vary."""
-    d = describe(import_block(UNITS[name].block))
+    d = describe(import_class(UNITS[name].block))
     rng, period = np.random.default_rng(1), float(d.period or 0)
     inputs = [port for port in describe_fmu(cached(name, 3)).inputs.values() if port.kind is Kind.REAL]
     host = CtypesHost(cached(name, 3), 3)

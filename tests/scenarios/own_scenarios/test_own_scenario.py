@@ -1,0 +1,196 @@
+"""A scenario outside of the package, from the tutorial's text: run, listed, swept, resumed, reported, exported."""
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tutorial import COMMAND, TUTORIAL, call, refused, succeeded, write_files
+
+from handover.cosim.record.reader import Record
+from handover.scenarios.campaign.table import CampaignTable
+
+SCENE = "reach:TwoLinkReach"
+SOFTER = """
+from control import Inputs, Outputs, Params, SpringToGoal
+
+
+class Softer(SpringToGoal):
+    def __init__(self, params: Params) -> None:
+        super().__init__(params)
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        y = super().outputs(t, u)
+        y.tau = 0.5 * y.tau
+        return y
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    write_files(folder)
+    return folder
+
+
+def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_path: Path):
+    printed = succeeded(here, "run", SCENE, "-p", "goal=0.4,0.3", "--out", "first")
+    assert "two_link_reach succeeded" in printed
+    assert "from the tip to the goal" in printed  # its metric, with no headline declared
+    record = Record(here / "first" / "signals.parquet")
+    assert np.linalg.norm(record["arm.p_WE"][-1] - [0.4, 0.3]) < 0.005
+    (here / "first" / "report.html").unlink()
+    succeeded(tmp_path, "report", str(here / "first"), "--figures")
+    page = (here / "first" / "report.html").read_text(encoding="utf-8")
+    assert "An arm of two links reaches for a point" in page
+    assert "where the tip is to come" in page
+
+
+def test_list_prints_scenario_controller_and_plant(here: Path):
+    printed = succeeded(here, "list", SCENE)
+    assert "An arm of two links reaches for a point" in printed
+    assert "where the tip is to come, in W" in printed
+    assert "SpringToGoal: tau = J^T k (p_WG - p_WE) - d v" in succeeded(here, "list", "control:SpringToGoal")
+
+
+def test_another_block_or_file_takes_a_units_place(here: Path):
+    (here / "softer.py").write_text(SOFTER)
+    succeeded(here, "run", SCENE, "--out", "stiff", "--no-report")
+    succeeded(here, "run", SCENE, "--unit", "controller=softer:Softer", "--out", "soft", "--no-report")
+    first = [Record(here / name / "signals.parquet")["controller.tau"][0] for name in ("stiff", "soft")]
+    np.testing.assert_allclose(first[1], 0.5 * first[0], rtol=1e-12)
+    built = succeeded(here, "build", "softer:Softer", "--fmi", "3", "--out", "fmus").strip()
+    succeeded(here, "run", SCENE, "--unit", f"controller={built}", "--out", "file", "--no-report")
+    signals = [(here / name / "signals.parquet").read_bytes() for name in ("soft", "file")]
+    assert signals[0] == signals[1]
+
+
+@pytest.mark.slow
+def test_a_run_that_was_interrupted_is_resumed_and_not_with_other_code(here: Path, tmp_path: Path):
+    options = ["-p", "goal=0.1,0.5", "--no-report"]
+    succeeded(here, "run", SCENE, *options, "--out", "whole")
+    run = subprocess.Popen(
+        [*COMMAND, "run", SCENE, *options, "--checkpoint", "0.2", "--pace", "1", "--out", "cut"], cwd=here
+    )
+    deadline = time.monotonic() + 120
+    while not any((here / "cut").glob("checkpoint*")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    run.send_signal(signal.SIGINT)
+    assert run.wait(60) == 1
+    before = (here / "reach.py").read_text()
+    (here / "reach.py").write_text(before + "\n# changed\n")
+    line = call(tmp_path, "resume", str(here / "cut")).stderr
+    assert "the code of its scenario reach:TwoLinkReach is not what the run began with" in line
+    (here / "reach.py").write_text(before)
+    succeeded(tmp_path, "resume", str(here / "cut"), "--no-report")
+    signals = [(here / name / "signals.parquet").read_bytes() for name in ("whole", "cut")]
+    assert signals[0] == signals[1]
+
+
+@pytest.mark.slow
+def test_a_sweep_goes_on_after_a_kill_and_its_report_is_written_from_elsewhere(here: Path, tmp_path: Path):
+    sweep = ["sweep", SCENE, "goal=0.3,0.6;0.4,0.2;-0.5,0.3", "--repeat", "2", "--workers", "2", "--out", "goals"]
+    killed = subprocess.Popen([*COMMAND, *sweep], cwd=here, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while not list(here.glob("goals/runs/*/summary.json")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.wait()
+    done = {p.parent.name: p.stat().st_mtime_ns for p in here.glob("goals/runs/0*/summary.json")}
+    assert done
+    printed = succeeded(here, *sweep)
+    assert "6 of 6 runs done" in printed
+    assert {name: (here / "goals/runs" / name / "summary.json").stat().st_mtime_ns for name in done} == done
+    table = CampaignTable.read(here / "goals" / "runs.parquet")
+    assert "distance" in table.metrics
+    succeeded(tmp_path, "report", str(here / "goals"))
+    page = (here / "goals" / "report.html").read_text(encoding="utf-8")
+    assert "An arm of two links reaches for a point" in page
+    run = next(here.glob("goals/runs/*/run.json"))
+    assert json.loads(run.read_text())["source"]["folder"] == str(here)
+    succeeded(tmp_path, "report", str(run.parent))
+
+
+@pytest.mark.slow
+def test_its_ssp_runs_like_it(here: Path):
+    succeeded(here, "export", SCENE, "--ssp", "reach.ssp")
+    succeeded(here, "run", "reach.ssp", "--out", "exported", "--no-report")
+    succeeded(here, "run", SCENE, "--out", "own", "--no-report")
+    ours, theirs = (Record(here / name / "signals.parquet") for name in ("own", "exported"))
+    n = min(len(ours.time), len(theirs.time))
+    np.testing.assert_array_equal(ours["arm.p_WE"][:n], theirs["arm.p_WE"][:n])
+
+
+def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(here: Path):
+    assert "did you mean TwoLinkReach?" in refused(here, "run", "reach:TwoLinkRech")
+    assert "there is no module 'reech'" in refused(here, "run", "reech:TwoLinkReach")
+    assert "control:SpringToGoal: SpringToGoal is no scenario" in refused(here, "run", "control:SpringToGoal")
+    assert "a scenario of your own is named MODULE:CLASS" in refused(here, "run", "two_link_reach")
+    assert "two_link_reach has no parameter 'goall'; did you mean goal?" in refused(
+        here, "run", SCENE, "-p", "goall=1,1"
+    )
+    assert "module 'control' has no class 'Spring'" in refused(
+        here, "run", SCENE, "--unit", "controller=control:Spring"
+    )
+    (here / "broken.py").write_text("import nowhere_to_be_found\n")
+    assert "No module named 'nowhere_to_be_found'" in refused(here, "sweep", "broken:Scene")
+
+
+def test_all_that_a_scenario_lacks_is_told_at_once(here: Path):
+    (here / "lacking.py").write_text(
+        "from reach import TwoLinkReach\nfrom handover.scenarios.experiment.experiment import Experiment\n\n\n"
+        "class Scene(Experiment):\n    name = 'ir_grasp'\n    units = {'arm': 'arm:TwoLinkArms', 'servo': 'Visual'}\n\n"
+        "    def build(self, parameters, seed, fmu):\n        raise ValueError\n\n\n"
+        "class Failing(TwoLinkReach):\n    def evaluator(self, parameters):\n        return parameters.gaol\n"
+    )
+    line = refused(here, "run", "lacking:Scene")
+    for fault in (
+        "it has no method 'evaluator'",
+        "it has no method 'stop_time'",
+        "its name 'ir_grasp' is that of a scenario of this package",
+        "did you mean TwoLinkArm?",
+        "there is no unit 'Visual'",
+    ):
+        assert fault in line
+    for command in ("run", "sweep"):
+        line = refused(here, command, "lacking:Failing")
+        assert "the scenario failing failed as it was set up: AttributeError" in line
+        assert "(lacking.py, line 15)" in line
+
+
+def test_an_installed_package_adds_scenarios_and_units_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    installed = tmp_path / "site-packages"
+    information = installed / "reaching-1.0.dist-info"
+    information.mkdir(parents=True)
+    write_files(installed)
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: reaching\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text(
+        "[handover.scenarios]\nreaching = reach:TwoLinkReach\n\n[handover.units]\nPlanarArm = arm:TwoLinkArm\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(installed))
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    printed = succeeded(empty, "list")
+    assert "reaching" in printed
+    assert "An arm of two links reaches for a point" in printed
+    assert "PlanarArm" in printed
+    succeeded(empty, "run", "reaching", "--out", "run", "--no-report")
+    assert json.loads((empty / "run" / "run.json").read_text())["source"]["folder"] == ""
+    succeeded(empty, "report", "run")
+    assert "TwoLinkArm" in succeeded(empty, "list", "reaching")
+    assert "joint angles" in succeeded(empty, "list", "PlanarArm")
+
+
+@pytest.mark.slow
+def test_the_readmes_commands_work_beside_the_tutorials_files(here: Path):
+    readme = (TUTORIAL.parents[1] / "README.md").read_text(encoding="utf-8")
+    lines = [line for line in readme.splitlines() if line.startswith("handover ")]
+    assert [line.split()[1] for line in lines] == ["list", "run", "sweep", "run", "export"]
+    for line in lines:
+        succeeded(here, *shlex.split(line)[1:])

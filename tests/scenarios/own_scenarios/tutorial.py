@@ -1,0 +1,41 @@
+"""The tutorial's files, as its text has them, and the command run beside them in a process of its own."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorial.md"
+_FILE = re.compile(r"^## \d+\. [^\n]*`(?P<name>\w+\.py)`\n.*?^```python\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
+COMMAND = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()"]
+
+
+def write_files(folder: Path) -> None:
+    """Write arm.py, control.py and reach.py into a folder."""
+    files = {m["name"]: m["code"] for m in _FILE.finditer(TUTORIAL.read_text(encoding="utf-8"))}
+    assert set(files) == {"arm.py", "control.py", "reach.py"}
+    for name, code in files.items():
+        (folder / name).write_text(code, encoding="utf-8")
+
+
+def call(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Call the command in a folder."""
+    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+def succeeded(folder: Path, *arguments: str) -> str:
+    """Call the command in a folder, assert that it succeeds, and return what it prints."""
+    done = call(folder, *arguments)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout
+
+
+def refused(folder: Path, *arguments: str) -> str:
+    """Call the command in a folder, assert that it refuses in one line and writes nothing, and return the line."""
+    before = {p.name for p in folder.iterdir()} | {"__pycache__"}
+    done = call(folder, *arguments)
+    assert done.returncode == 2, done.stderr + done.stdout
+    assert {p.name for p in folder.iterdir()} <= before
+    (line,) = done.stderr.strip().splitlines()
+    assert "Traceback" not in line
+    return line
