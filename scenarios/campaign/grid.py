@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.variable import Kind, Variable
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.scenarios.campaign.plan import MAX_RUNS
+from handover.scenarios.execution.unit_values import is_unit_value, unit_values
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_value, text_of, texts_by_name
 
@@ -17,16 +18,16 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
     """Return all combinations of the given parameters' values, the last parameter varying fastest.
 
     Values are `v1,v2,...`, of arrays `a,b,c;d,e,f;...`, or `START:STOP:N`, N evenly spaced numbers with both ends.
-    Where nothing is given, there is one point, which sets nothing.
+    `UNIT.NAME` is a unit's parameter. Where nothing is given, there is one point, which sets nothing.
 
     Raises:
         InvalidParameter: with every fault of the given texts.
     """
     known = {v.name: v for v in experiment.parameters()}
-    texts, faults = texts_by_name(experiment, given, "name=v1,v2,... or name=START:STOP:N")
+    texts, faults = _texts_by_name(experiment, given, "name=v1,v2,... or name=START:STOP:N")
     axes: dict[str, list[str]] = {}
     for name, values in texts.items():
-        axes[name], axis_faults = _axis(known[name], values)
+        axes[name], axis_faults = _axis(known[name], values) if name in known else _axis_of_unit(name, values)
         faults += [f"{name}: {fault}" for fault in axis_faults]
     points = math.prod(map(len, axes.values()))
     if points > MAX_RUNS:
@@ -44,16 +45,39 @@ def set_parameters(
     Raises:
         InvalidParameter: one is unknown, given twice, varied, or given several values.
     """
-    fixed, faults = texts_by_name(experiment, given)
+    fixed, faults = _texts_by_name(experiment, given, "name=value")
     both = [name for name in fixed if any(name in point for point in varied)]
     faults += [f"{name} is varied and set by -p; one of both is right" for name in both]
     known = {v.name: v for v in experiment.parameters()}
     for name, text in fixed.items():
-        if name not in both and _is_list(known[name], text):
+        if name in known and name not in both and _is_list(known[name], text):
             faults.append(f"-p {name} takes one value; to vary it, give it without -p: {name}={text}")
     if faults:
         raise InvalidParameter(faults)
     return fixed
+
+
+def _texts_by_name(
+    experiment: type[Experiment[Any]], given: Sequence[str], form: str
+) -> tuple[dict[str, str], list[str]]:
+    """Return the texts of the scenario's and of its units' parameters in the order in which they are given."""
+    texts, faults = texts_by_name(experiment, [text for text in given if not is_unit_value(text)], form)
+    try:
+        texts |= unit_values(experiment, given)
+    except InvalidParameter as e:
+        faults += e.faults
+    order = [text.partition("=")[0] for text in given]
+    return {name: texts[name] for name in dict.fromkeys(order) if name in texts}, faults
+
+
+def _axis_of_unit(name: str, text: str) -> tuple[list[str], list[str]]:
+    """Return the values of a unit's parameter as texts; what the unit takes is known only when its FMU is read."""
+    if text.count(":") == 2:
+        values, fault = _range(Variable(name=name, kind=Kind.REAL, causality=Causality.PARAMETER, start=0.0), text)
+        return values, [fault] if fault else []
+    values = text.split(";" if ";" in text else ",")
+    faults = [f"{value} is given twice" for value in dict.fromkeys(values) if value and values.count(value) > 1]
+    return values, [*faults, f"{text!r} has an empty item"] if "" in values else faults
 
 
 def _is_list(variable: Variable, text: str) -> bool:

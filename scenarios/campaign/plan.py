@@ -118,3 +118,12 @@ def run_seed(campaign: int, point: int | None, repetition: int) -> int:
     """
     key = (repetition,) if point is None else (point, repetition)
     return int(np.random.SeedSequence(campaign, spawn_key=key).generate_state(1, np.uint64)[0] >> np.uint64(11))
+
+
+def is_number(text: str) -> bool:
+    """Return whether a value of a unit's parameter, given as text, is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -10,8 +10,9 @@ from handover.cosim.master.master import Master
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
+from handover.scenarios.execution.unit_values import built_system, is_unit_value, set_values, split_parameters
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
+from handover.scenarios.experiment.parameters import InvalidParameter, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 _MAX_REPORTED = 8
@@ -63,9 +64,9 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
     for point in plan.points:
         try:
             given = {**plan.fixed, **point}
-            parameters = parse_parameters(experiment, [f"{name}={value}" for name, value in given.items()])
+            parameters, of_units = split_parameters(experiment, [f"{name}={value}" for name, value in given.items()])
             _check_together(experiment, parameters, point)
-            texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
+            texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()} | of_units
             points.append({name: texts[name] for name in point})
             fixed = {name: texts[name] for name in plan.fixed}
         except InvalidParameter as e:
@@ -91,18 +92,30 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     """Check that the FMUs make up the scenario's system: one that takes a unit's place may have other ports.
 
-    The system is that of the first point: parameters change what units do, not how they are wired.
+    The system is that of the first point: parameters change what units do, not how they are wired. Of units'
+    parameters, all values are checked.
 
     Raises:
         InvalidFmu, WiringError, ScheduleError: they do not make it up. ScenarioFailed: the scenario's own code did.
+        InvalidParameter: a unit does not take the value of a parameter.
     """
     experiment = find_scenario(plan.scenario)
     given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
-    instance, parameters = experiment(), parse_parameters(experiment, given)
+    instance = experiment()
+    parameters, _ = split_parameters(experiment, given)
     with scenario_code(instance):
-        system = instance.build(parameters, plan.seed, lambda unit: fmus[unit])
         instance.evaluator(parameters)
         instance.stop_time(parameters)
+    system = built_system(instance, parameters, plan.seed, fmus, {})
+    given_values = [item for values in (plan.fixed, *plan.points) for item in values.items() if is_unit_value(item[0])]
+    faults: dict[str, None] = {}
+    for name, value in dict.fromkeys(given_values):
+        try:
+            set_values(system, {name: value})
+        except InvalidParameter as e:
+            faults |= dict.fromkeys(e.faults)
+    if faults:
+        raise InvalidParameter(tuple(faults))
     Master(system, plan.options)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind, Variable
+from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.catalog import scenario_of
@@ -106,7 +107,9 @@ class CampaignResults:
     def is_number(self, parameter: str) -> bool:
         """Whether a parameter is a number, neither an array nor a name."""
         variable = self.declared.get(parameter)
-        return variable is not None and variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
+        if variable is None:  # of a unit: what its values look like
+            return all(is_number(values[parameter]) for values in self._values if parameter in values)
+        return variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
 
     def is_boolean(self, parameter: str) -> bool:
         """Whether a parameter is true or false."""

@@ -18,7 +18,7 @@ from handover.scenarios.execution.errors import one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.execution.selection import find_scenario, own_source
-from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
 from handover.scenarios.results.summary import ElapsedTime, unstarted_run, unstarted_summary
 from handover.scenarios.results.task import Task
@@ -31,7 +31,7 @@ def run_job(job: RunJob, folder: Path) -> None:
     """Run a job into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `run_task` and `parse_parameters`, without `_REFUSALS`. UsageError: there is no such scenario.
+        As `run_task` and `split_parameters`, without `_REFUSALS`. UsageError: there is no such scenario.
     """
     task, clock = _task(job, folder), ElapsedTime().clock()
     try:
@@ -54,9 +54,11 @@ def _write_refusal(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
 def _task(job: RunJob, folder: Path) -> Task:
     search_folder(job.modules)
     experiment = find_scenario(job.scenario)
+    parameters, values = split_parameters(experiment, job.parameters)
     return Task(
         experiment=experiment(),
-        parameters=parse_parameters(experiment, job.parameters),
+        parameters=parameters,
+        unit_values=values,
         seed=job.seed,
         fmus={name: Path(path) for name, path in job.fmus.items()},
         folder=RunFolder(folder),

@@ -15,11 +15,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from handover.cosim.blocks.variable import Kind, Variable
+from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan import CampaignPlan, is_number
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
+from handover.scenarios.catalog import scenario_of
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Metric
@@ -155,7 +156,15 @@ def _set_parameters(plan: CampaignPlan) -> list[Variable]:
     """Return the parameters that the plan sets at any point, those that are varied first."""
     known = {v.name: v for v in find_scenario(plan.scenario).parameters()}
     names = dict.fromkeys([*(name for point in plan.points for name in point), *plan.fixed])
-    return [known[name] for name in names]
+    return [known[name] if name in known else _of_unit(plan, name) for name in names]
+
+
+def _of_unit(plan: CampaignPlan, name: str) -> Variable:
+    """Return a unit's parameter: a real if all of its values are numbers, else a text."""
+    texts = [text for point in range(len(plan.points)) if (text := _text(plan, point, name)) is not None]
+    kind, start = (Kind.REAL, math.nan) if all(map(is_number, texts)) else (Kind.STRING, "")
+    described = "value of the unit's parameter"
+    return Variable(name=name, kind=kind, causality=Causality.PARAMETER, description=described, start=start)
 
 
 def _text(plan: CampaignPlan, point: int, name: str) -> str | None:
@@ -218,6 +227,8 @@ def _plan_of(metadata: Mapping[str, Any]) -> CampaignPlan | None:
     if metadata.get("versions") != versions():
         return None
     try:
+        if scenario_of(metadata["scenario"], metadata.get("source", {})) is None:
+            return None
         return checked_plan(CampaignPlan(**{name: metadata[name] for name in _PLAN_KEYS}))
     except (UsageError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):  # the page reports it
         return None

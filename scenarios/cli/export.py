@@ -16,7 +16,7 @@ from handover.scenarios.cli.options import scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
-from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.execution.unit_values import built_system, split_parameters
 from handover.scenarios.results.run_folder import check_place
 from handover.scenarios.results.tolerated_faults import scenario_code
 
@@ -41,7 +41,7 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
     """Write a SCENARIO as an SSP."""
     experiment = find_scenario(scenario)
     with Interruption(), one_line_errors():
-        values = parse_parameters(experiment, parameters)
+        values, of_units = split_parameters(experiment, parameters)
         if file.suffix.lower() != ".ssp":
             raise UsageError(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
         if file.is_dir():
@@ -51,8 +51,8 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
         fmus = select_fmus(experiment, others, exchangeable)
         instance = experiment()
         with scenario_code(instance):
-            system = instance.build(values, seed, lambda unit: fmus[unit])
             stop = instance.stop_time(values)
+        system = built_system(instance, values, seed, fmus, of_units)
         start_from_enumerations(system, {n: unit for n, unit in experiment.units.items() if n not in others})
         warn_of_enumerations(system, others)
         try:

@@ -73,7 +73,11 @@ class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (g
 
 _SCENARIO_OPTIONS = (
     click.option(
-        "-p", "parameters", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see `handover list SCENARIO`."
+        "-p",
+        "parameters",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Set a parameter of the scenario, see `handover list SCENARIO`; or of a unit: UNIT.NAME=VALUE.",
     ),
     click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers."),
     click.option(

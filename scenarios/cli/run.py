@@ -24,8 +24,8 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.execution.selection import find_scenario, own_source, replacements, select_fmus
 from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of
+from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
-from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.task import Task
 
@@ -158,6 +158,7 @@ def run(
     with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
         options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace), strict=strict)
         source: Mapping[str, Any] = {}
+        of_units: Mapping[str, str] = {}
         if is_ssp(scenario):
             experiment, values, source = _of_file(Path(scenario), stop, step, opened)
         elif is_fmu(scenario):
@@ -167,7 +168,7 @@ def run(
             source = alone.as_source(experiment.stop_time(values))
         else:
             experiment = find_scenario(scenario)()
-            values = parse_parameters(type(experiment), parameters)
+            values, of_units = split_parameters(type(experiment), parameters)
             source = own_source(scenario)
         stem = Path(experiment.name).stem  # of a file, its name without suffix
         folder = RunFolder(out or Path("runs") / time.strftime(f"%Y-%m-%d_%H%M%S_{stem}"))
@@ -177,6 +178,7 @@ def run(
             parameters=values,
             seed=seed,
             fmus=fmus,
+            unit_values=of_units,
             folder=folder,
             formats=tuple(dict.fromkeys(formats)),
             every=every,

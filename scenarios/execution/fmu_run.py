@@ -7,16 +7,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from handover.cosim.blocks.variable import Kind
-from handover.cosim.exceptions import WiringError, nearest
+from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.default_experiment import exact_seconds
-from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.system import PortName, System
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.input_file import columns_of, entries_of, read_inputs, value_of
+from handover.scenarios.execution.input_file import read_inputs
 from handover.scenarios.execution.ssp_run import UntilStop, naming_step, system_experiment
+from handover.scenarios.execution.unit_values import start_values
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import sha256_of
 
@@ -56,7 +53,9 @@ class FmuRun:
         system = System()
         unit = system.add("unit", self.path, period=self.step)
         d = system.units.pop(unit.name).description
-        start = self._start({**d.parameters, **d.inputs})
+        start, faults = start_values({**d.parameters, **d.inputs}, self.parameters)
+        if faults:
+            raise UsageError(f"{self.path}: {'; '.join(faults)}")
         system.units[d.identifier] = replace(unit, name=d.identifier, start=start)
         if self.inputs is not None:
             for port, series in read_inputs(self.inputs, d.inputs, start).items():
@@ -85,29 +84,6 @@ class FmuRun:
             raise UsageError(f"{self.path}: {reason}; --stop 10 lets it run from 0 to 10 s")
         return exact_seconds(proposed)
 
-    def _start(self, ports: Mapping[str, FmuPort]) -> dict[str, Any]:
-        entries, faults = columns_of(ports), list[str]()
-        start: dict[str, Any] = {}
-        seen: set[str] = set()
-        for text in self.parameters:
-            name, equals, value = (part.strip() for part in text.partition("="))
-            if not equals:
-                faults.append(f"{text!r} is not of the form NAME=VALUE")
-            elif name in seen:
-                faults.append(f"{name} is given twice")
-            elif name not in ports and name not in entries:
-                faults.append(f"no parameter or input {name!r}; {nearest(name, ports)}")
-            else:
-                port, k = (ports[name], None) if name in ports else entries[name]
-                try:
-                    _set(start, port, k, value)
-                except ValueError as e:
-                    faults.append(f"{name} = {value[:40]!r}: {e}")
-            seen.add(name)
-        if faults:
-            raise UsageError(f"{self.path}: {'; '.join(faults)}")
-        return start
-
 
 def reopened(source: Mapping[str, Any]) -> tuple[FmuRun, dict[Path, str]]:
     """Return the run that `as_source` was of, with its files and the SHA-256 that each had."""
@@ -122,24 +98,3 @@ def reopened(source: Mapping[str, Any]) -> tuple[FmuRun, dict[Path, str]]:
     )
     files = {run.path: source["sha256"]}
     return run, files if inputs is None else {**files, inputs: source["input_sha256"]}
-
-
-def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None:
-    """Set a port's start value from its text, or with a number the entry of that place only.
-
-    Raises:
-        ValueError: it is no value of the port.
-    """
-    if port.kind in (Kind.STRING, Kind.BINARY):
-        start[port.name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
-        return
-    if k is None:
-        values = [value_of(port, part) for part in text.split(",")]
-        if len(values) != port.size:
-            raise ValueError(f"{len(values)} values where {port.size} {'is' if port.size == 1 else 'are'} right")
-    else:
-        values = entries_of(port, start)
-        values[k] = value_of(port, text)
-    if port.kind is Kind.BOOLEAN:
-        values = [bool(value) for value in values]
-    start[port.name] = np.array(values).reshape(port.shape) if port.shape else values[0]

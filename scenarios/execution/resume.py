@@ -15,6 +15,7 @@ from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSourc
 from handover.scenarios.execution.fmu_run import reopened
 from handover.scenarios.execution.resumption import Resumption
 from handover.scenarios.execution.ssp_run import open_experiment
+from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
@@ -88,6 +89,7 @@ class InterruptedRun:
                 formats=tuple(description["formats"]),
                 every=None if every is None else Fraction(every),
                 source=description["source"],
+                unit_values=description.get("unit_values", {}),
                 options=self.resumption.options,
             )
         except InvalidRunFolder:
@@ -155,7 +157,7 @@ class InterruptedRun:
         return cached(unit, 3)
 
     def _check_fmus(self, task: Task) -> None:
-        system = task.experiment.build(task.parameters, task.seed, lambda unit: task.fmus[unit])
+        system = built_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values)
         here = {name: unit.description.path for name, unit in system.units.items()}
         before = {name: unit.get("sha256") for name, unit in self._object("units").items()}
         other = [f"{name} ({here[name]})" for name in here if before.get(name) != sha256_of(here[name])]

@@ -15,6 +15,7 @@ from handover.scenarios.execution.exit_status import status_of_run
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
+from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.experiment import Evaluator, Outcome
 from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of
@@ -55,8 +56,8 @@ def run_task(
         evaluator = GuardedEvaluator(
             experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
         )
-        system = experiment.build(parameters, task.seed, lambda unit: task.fmus[unit])
         experiment.stop_time(parameters)
+    system = built_system(experiment, parameters, task.seed, task.fmus, task.unit_values)
     failure: UnitFailure | None = None
     if task.options.algorithm is Algorithm.JACOBI and experiment.parallel_step is not None:
         system.set_step(experiment.parallel_step)

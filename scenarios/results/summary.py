@@ -98,8 +98,15 @@ def _iterations(count: IterationCount) -> dict[str, Metric]:
     }
 
 
-class Configuration(TypedDict):
-    """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`."""
+class _OfSomeConfigurations(TypedDict, total=False):
+    unit_values: dict[str, str]
+
+
+class Configuration(_OfSomeConfigurations):
+    """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`.
+
+    `unit_values` are there only if some are given, see `Task`.
+    """
 
     scenario: str
     parameters: dict[str, Any]
@@ -201,7 +208,9 @@ class ElapsedTime:
 
 def configuration(task: Task) -> Configuration:
     """Return what determines a run's signals."""
+    given: _OfSomeConfigurations = {"unit_values": dict(task.unit_values)} if task.unit_values else {}
     return Configuration(
+        **given,
         scenario=task.experiment.name,
         parameters={v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()},
         seed=task.seed if task.experiment.is_seeded else None,
@@ -337,7 +346,8 @@ def parameter_rows(task: Task) -> list[list[str]]:
 def _given_rows(task: Task) -> list[list[str]]:
     """Return the like of the start values that `Task.source` keeps as texts."""
     given: Sequence[str] = task.source.get("parameters", ())
-    return [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
+    rows = [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
+    return rows + [[name, text, "given value of the unit's parameter"] for name, text in task.unit_values.items()]
 
 
 def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:

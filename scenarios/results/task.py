@@ -18,6 +18,7 @@ class Task:
     Attributes:
         experiment, parameters, seed: the scenario, and what it is run with.
         fmus: the FMU of each unit.
+        unit_values: values of units' parameters, as texts by `UNIT.NAME`.
         folder: where its results are written.
         formats: further file formats of the record, see `RECORD_FORMATS`.
         every: simulated seconds between checkpoints; None for no checkpoints.
@@ -32,6 +33,7 @@ class Task:
     fmus: Mapping[str, Path]
     folder: RunFolder
     formats: Sequence[str] = ()
+    unit_values: Mapping[str, str] = field(default_factory=dict[str, str])
     every: Fraction | None = None
     source: Mapping[str, Any] = field(default_factory=dict[str, Any])
     options: MasterOptions = field(default_factory=MasterOptions)

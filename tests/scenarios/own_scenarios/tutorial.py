@@ -30,6 +30,12 @@ def succeeded(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
+def ran(folder: Path, *arguments: str) -> None:
+    """Call the command in a folder, and assert that a run ended, whether or not its task succeeded."""
+    done = call(folder, *arguments)
+    assert done.returncode in (0, 1), done.stderr + done.stdout
+
+
 def refused(folder: Path, *arguments: str) -> str:
     """Call the command in a folder, assert that it refuses in one line and writes nothing, and return the line."""
     before = {p.name for p in folder.iterdir()} | {"__pycache__"}

@@ -1,0 +1,165 @@
+"""Values of units' parameters from texts: of one FMU that runs by itself, or of any unit of a scenario's system.
+
+`-p servo.gain=0.5` sets the parameter `gain` of the unit `servo`, whatever FMU is in its place: it is checked against
+what that FMU declares, and replaces what the scenario would set. Values are in the FMU's own units of measurement.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import nearest
+from handover.cosim.fmu.description import FmuPort
+from handover.cosim.system.system import PlacedUnit, System
+from handover.scenarios.execution.input_file import columns_of, entries_of, value_of
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.results.tolerated_faults import scenario_code
+
+
+def start_values(ports: Mapping[str, FmuPort], given: Sequence[str]) -> tuple[dict[str, Any], list[str]]:
+    """Return start values by port, and what is wrong with the texts.
+
+    Args:
+        ports: the parameters or inputs that can be given.
+        given: texts `NAME=VALUE`; an array's values stand with commas between them, or `NAME[1]=VALUE` gives one.
+    """
+    entries, faults = columns_of(ports), list[str]()
+    start: dict[str, Any] = {}
+    seen: set[str] = set()
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            faults.append(f"{text!r} is not of the form NAME=VALUE")
+        elif name in seen:
+            faults.append(f"{name} is given twice")
+        elif name not in ports and name not in entries:
+            faults.append(f"no {_kinds(ports)} {name!r}; {nearest(name, ports)}")
+        else:
+            port, k = (ports[name], None) if name in ports else entries[name]
+            try:
+                _set(start, port, k, value)
+            except ValueError as e:
+                faults.append(f"{name} = {value[:40]!r}: {e}")
+        seen.add(name)
+    return start, faults
+
+
+def _kinds(ports: Mapping[str, FmuPort]) -> str:
+    return " or ".join(dict.fromkeys(p.causality.value for p in ports.values())) or "parameter"
+
+
+def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None:
+    """Set a port's start value from its text, or with a number the entry of that place only.
+
+    Raises:
+        ValueError: it is no value of the port.
+    """
+    if port.kind in (Kind.STRING, Kind.BINARY):
+        start[port.name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
+        return
+    if k is None:
+        values = [value_of(port, part) for part in text.split(",")]
+        if len(values) != port.size:
+            raise ValueError(f"{len(values)} values where {port.size} {'is' if port.size == 1 else 'are'} right")
+    else:
+        values = entries_of(port, start)
+        values[k] = value_of(port, text)
+    if port.kind is Kind.BOOLEAN:
+        values = [bool(value) for value in values]
+    start[port.name] = np.array(values).reshape(port.shape) if port.shape else values[0]
+
+
+def is_unit_value(text: str) -> bool:
+    """Return whether a text `NAME=VALUE` is of a unit's parameter, `UNIT.NAME=VALUE`, and not of the scenario's."""
+    return "." in text.partition("=")[0]
+
+
+def unit_values(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, str]:
+    """Return the values of units' parameters among the given texts, by `UNIT.NAME`.
+
+    Raises:
+        InvalidParameter: a text is of another form, names no unit of the scenario, or is given twice.
+    """
+    values: dict[str, str] = {}
+    faults: list[str] = []
+    for text in filter(is_unit_value, given):
+        name, equals, value = text.partition("=")
+        unit, _, port = name.partition(".")
+        if not equals or not port:
+            faults.append(f"{text!r} is not of the form UNIT.NAME=VALUE")
+        elif unit not in experiment.units:
+            faults.append(f"{experiment.name} has no unit {unit!r}; {nearest(unit, experiment.units)}")
+        elif name in values:
+            faults.append(f"{name} is given twice")
+        else:
+            values[name] = value
+    if faults:
+        raise InvalidParameter(faults)
+    return values
+
+
+def split_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) -> tuple[Any, dict[str, str]]:
+    """Return the scenario's parameters, and values of its units' parameters, from texts.
+
+    Raises:
+        InvalidParameter: with all faults of the texts.
+    """
+    faults: list[str] = []
+    values: dict[str, str] = {}
+    parameters: Any = None
+    try:
+        values = unit_values(experiment, given)
+    except InvalidParameter as e:
+        faults += e.faults
+    try:
+        parameters = parse_parameters(experiment, [text for text in given if not is_unit_value(text)])
+    except InvalidParameter as e:
+        faults += e.faults
+    if faults:
+        raise InvalidParameter(faults)
+    return parameters, values
+
+
+def built_system(
+    experiment: Experiment[Any], parameters: Any, seed: int, fmus: Mapping[str, Path], values: Mapping[str, str]
+) -> System:
+    """Return a scenario's system, with its units' parameters set as given.
+
+    Args:
+        experiment: the scenario.
+        parameters: its parameters.
+        seed: of its random numbers.
+        fmus: the FMU of each unit.
+        values: texts by `UNIT.NAME`, see `unit_values`.
+
+    Raises:
+        InvalidFmu: a file is none. InvalidParameter: a value is none that the unit takes; or as the scenario raises it.
+        ScenarioFailed: the code of a scenario that is not this package's failed.
+    """
+    with scenario_code(experiment):
+        system = experiment.build(parameters, seed, lambda unit: fmus[unit])
+    set_values(system, values)
+    return system
+
+
+def set_values(system: System, values: Mapping[str, str]) -> None:
+    """Set the units' parameters of a system, given as texts by `UNIT.NAME`.
+
+    Raises:
+        InvalidParameter: with each value that is none that its unit takes; nothing is set.
+    """
+    faults: list[str] = []
+    units: dict[str, PlacedUnit] = {}
+    for name, unit in system.units.items():
+        given = [f"{n.partition('.')[2]}={text}" for n, text in values.items() if n.partition(".")[0] == name]
+        start, of_unit = start_values(unit.description.parameters, given)
+        units[name] = replace(unit, start={**unit.start, **start}) if start else unit
+        faults += [f"unit {name}: {fault}" for fault in of_unit]
+    if faults:
+        raise InvalidParameter(faults)
+    system.units = units
