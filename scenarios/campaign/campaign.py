@@ -110,9 +110,9 @@ class _CampaignState:
         return RunJob(
             name=run.name,
             scenario=self.plan.scenario,
-            parameters=tuple(f"{name}={value}" for name, value in run.parameters.items()),
+            parameters=tuple(self.plan.texts(run.point)),
             seed=run.seed,
-            fmus={unit: str(path) for unit, path in fmus.items()},
+            fmus={unit: str(path) for unit, path in self.plan.fmus(run.point, fmus).items()},
             runs=str(self.folder.runs.absolute()),
             options=self.plan.options,
             modules="" if self._source is None else self._source.folder,

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.scenarios.campaign.identity import differences, identity_of
-from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
+from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
 from handover.scenarios.catalog import named_scenario
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
@@ -216,7 +216,7 @@ class CampaignFolder:
     def _copy(self, unit: str, file: Path, fmus: Mapping[str, Path]) -> Path:
         namesakes = [other for other in fmus.values() if other.name == file.name]
         ambiguous = len({sha256_of(other) for other in namesakes}) > 1
-        copy = self.fmus.absolute() / (f"{unit}_{file.name}" if ambiguous else file.name)
+        copy = self.fmus.absolute() / (safe_name(f"{unit}_{file.name}") if ambiguous else file.name)
         if not copy.is_file() or sha256_of(copy) != sha256_of(file):
             unfinished = copy.with_name(copy.name + ".part")
             try:

@@ -3,12 +3,14 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.scenarios.campaign.plan import MAX_RUNS
+from handover.scenarios.execution.selection import replacements
 from handover.scenarios.execution.unit_values import is_unit_value, unit_values
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_value, text_of, texts_by_name
@@ -55,6 +57,42 @@ def set_parameters(
     if faults:
         raise InvalidParameter(faults)
     return fixed
+
+
+def split_units(
+    experiment: type[Experiment[Any]], given: Sequence[str]
+) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
+    """Return what takes units' places in all runs, and where several are given, `NAME=A,B`, what to vary them by.
+
+    Raises:
+        UsageError: as `replacements`.
+        InvalidParameter: an item is empty or given twice, or a parameter of the scenario has the unit's name.
+    """
+    fixed: dict[str, str] = {}
+    choices: dict[str, tuple[str, ...]] = {}
+    faults: list[str] = []
+    for name, text in replacements(experiment, given).items():
+        items = tuple(text.split(","))
+        if len(items) == 1 or Path(text).is_file():
+            fixed[name] = text
+            continue
+        choices[name] = items
+        if "" in items:
+            faults.append(f"--unit {name}: {text!r} has an empty item")
+        faults += [f"--unit {name}: {item} is given twice" for item in dict.fromkeys(items) if items.count(item) > 1]
+        if name in {v.name for v in experiment.parameters()}:
+            faults.append(
+                f"--unit {name}: {experiment.name} has a parameter of that name, which a table could not tell"
+            )
+    if faults:
+        raise InvalidParameter(faults)
+    return fixed, choices
+
+
+def vary_units(points: Sequence[Mapping[str, str]], choices: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
+    """Return each point with all combinations of units; points stay together that differ in parameters only."""
+    combinations = [dict(zip(choices, items, strict=True)) for items in itertools.product(*choices.values())]
+    return [{**units, **point} for units in combinations for point in points]
 
 
 def _texts_by_name(

@@ -28,6 +28,7 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
         "seed": plan.seed,
         "paired": plan.paired,
         "scenes": list(plan.scenes),
+        **({"varied_units": list(plan.varied_units)} if plan.varied_units else {}),
         "units": {name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
         "master": options,
         "versions": versions(),

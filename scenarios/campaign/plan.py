@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -50,7 +51,8 @@ class CampaignPlan:
         paired: whether all points of a repetition share a seed, so that their runs can be compared one by one.
         scenes: if paired, parameters whose values have seeds of their own: points that differ in them share no seeds,
             so that their runs can be counted together.
-        units: files of FMUs that take the place of units, by the units' names.
+        units: what takes the place of units in all runs, by the units' names: files of FMUs, or paths of blocks.
+        varied_units: units that points give other FMUs; a point names the file or the block by the unit's name.
         options: how units are run.
         experiment: name of the published experiment that it belongs to; "" if to none.
     """
@@ -63,6 +65,7 @@ class CampaignPlan:
     paired: bool = False
     scenes: Sequence[str] = ()
     units: Mapping[str, str] = field(default_factory=dict[str, str])
+    varied_units: Sequence[str] = ()
     options: MasterOptions = field(default_factory=MasterOptions)
     experiment: str = ""
 
@@ -70,6 +73,16 @@ class CampaignPlan:
     def size(self) -> int:
         """Number of runs."""
         return len(self.points) * self.repetitions
+
+    def texts(self, point: int) -> list[str]:
+        """Return the parameters of a point's runs, as texts `name=value`."""
+        given = {**self.fixed, **self.points[point]}
+        return [f"{name}={value}" for name, value in given.items() if name not in self.varied_units]
+
+    def fmus(self, point: int, fmus: Mapping[str, Path]) -> dict[str, Path]:
+        """Return the FMU of each unit at a point, out of a campaign's FMUs, in which varied units have `unit_key`."""
+        own = {unit: fmus[unit_key(unit, self.points[point][unit])] for unit in self.varied_units}
+        return {name: path for name, path in fmus.items() if "=" not in name} | own
 
     def runs(self) -> tuple[PlannedRun, ...]:
         """Return the runs, point by point.
@@ -107,8 +120,18 @@ class CampaignPlan:
         number = str(point).zfill(max(3, len(str(len(self.points) - 1))))
         values = "_".join(f"{name}={value}" for name, value in self.points[point].items())
         end = f"_r{repetition:04d}"
-        begin = _UNSAFE.sub("-", f"{number}_{values}" if values else number)
+        begin = safe_name(f"{number}_{values}" if values else number)
         return begin[: _MAX_NAME_LENGTH - len(end)] + end
+
+
+def safe_name(text: str) -> str:
+    """Return a file's name that every system takes, like the text."""
+    return _UNSAFE.sub("-", text)
+
+
+def unit_key(unit: str, given: str) -> str:
+    """Return the name of an FMU among a campaign's, of a unit that is varied."""
+    return f"{unit}={given}"
 
 
 def run_seed(campaign: int, point: int | None, repetition: int) -> int:

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from handover.cosim.master.master import Master
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan
+from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan, unit_key
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.execution.unit_values import built_system, is_unit_value, set_values, split_parameters
 from handover.scenarios.experiment.experiment import Experiment
@@ -61,12 +62,13 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
     faults: dict[str, None] = {}
     fixed: dict[str, str] = {}
     points: list[dict[str, str]] = []
-    for point in plan.points:
+    for number, point in enumerate(plan.points):
         try:
-            given = {**plan.fixed, **point}
-            parameters, of_units = split_parameters(experiment, [f"{name}={value}" for name, value in given.items()])
+            chosen = {unit: point[unit] for unit in plan.varied_units}
+            parameters, of_units = split_parameters(experiment, plan.texts(number))
             _check_together(experiment, parameters, point)
-            texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()} | of_units
+            texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
+            texts |= {**of_units, **chosen}
             points.append({name: texts[name] for name in point})
             fixed = {name: texts[name] for name in plan.fixed}
         except InvalidParameter as e:
@@ -79,44 +81,57 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
 
 
 def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
-    """Return the FMU of each unit: that of the plan, or the catalog's.
+    """Return the FMU of each unit: that of the plan, or the catalog's. Of units that are varied, all by `unit_key`.
 
     Raises:
         UsageError: the plan names a unit that the scenario does not have, or the catalog's unit cannot be built.
     """
     experiment = find_scenario(plan.scenario)
     others = replacements(experiment, [f"{name}={other}" for name, other in plan.units.items()])
-    return select_fmus(experiment, others, lambda unit: cached(unit, 3))
+    fmus: dict[str, Path] = {}
+    for chosen in dict.fromkeys(tuple(point[unit] for unit in plan.varied_units) for point in plan.points):
+        varied = dict(zip(plan.varied_units, chosen, strict=True))
+        found = select_fmus(experiment, {**others, **varied}, lambda unit: cached(unit, 3))
+        fmus |= {unit_key(name, varied[name]) if name in varied else name: path for name, path in found.items()}
+    return fmus
 
 
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     """Check that the FMUs make up the scenario's system: one that takes a unit's place may have other ports.
 
-    The system is that of the first point: parameters change what units do, not how they are wired. Of units'
-    parameters, all values are checked.
+    The system is that of the first point, or of the first with such units: parameters change what units do, not how
+    they are wired. Of units' parameters, all values are checked.
 
     Raises:
         InvalidFmu, WiringError, ScheduleError: they do not make it up. ScenarioFailed: the scenario's own code did.
         InvalidParameter: a unit does not take the value of a parameter.
     """
     experiment = find_scenario(plan.scenario)
-    given = [f"{name}={value}" for name, value in {**plan.fixed, **plan.points[0]}.items()]
     instance = experiment()
-    parameters, _ = split_parameters(experiment, given)
+    parameters, _ = split_parameters(experiment, plan.texts(0))
     with scenario_code(instance):
         instance.evaluator(parameters)
         instance.stop_time(parameters)
-    system = built_system(instance, parameters, plan.seed, fmus, {})
-    given_values = [item for values in (plan.fixed, *plan.points) for item in values.items() if is_unit_value(item[0])]
+    first: dict[tuple[str, ...], int] = {}
+    for number, point in enumerate(plan.points):
+        first.setdefault(tuple(point[unit] for unit in plan.varied_units), number)
+    for number in first.values():
+        system = built_system(instance, parameters, plan.seed, plan.fmus(number, fmus), {})
+        _check_unit_values(system, plan)
+        Master(system, plan.options)
+
+
+def _check_unit_values(system: System, plan: CampaignPlan) -> None:
+    """Check each value of a unit's parameter that the plan has."""
+    given = [item for values in (plan.fixed, *plan.points) for item in values.items() if is_unit_value(item[0])]
     faults: dict[str, None] = {}
-    for name, value in dict.fromkeys(given_values):
+    for name, value in dict.fromkeys(given):
         try:
             set_values(system, {name: value})
         except InvalidParameter as e:
             faults |= dict.fromkeys(e.faults)
     if faults:
         raise InvalidParameter(tuple(faults))
-    Master(system, plan.options)
 
 
 def _check_size(plan: CampaignPlan) -> None:

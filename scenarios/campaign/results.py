@@ -107,7 +107,7 @@ class CampaignResults:
     def is_number(self, parameter: str) -> bool:
         """Whether a parameter is a number, neither an array nor a name."""
         variable = self.declared.get(parameter)
-        if variable is None:  # of a unit: what its values look like
+        if variable is None:  # of a unit: by what its values look like
             return all(is_number(values[parameter]) for values in self._values if parameter in values)
         return variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
 

@@ -161,6 +161,9 @@ def _set_parameters(plan: CampaignPlan) -> list[Variable]:
 
 def _of_unit(plan: CampaignPlan, name: str) -> Variable:
     """Return a unit's parameter: a real if all of its values are numbers, else a text."""
+    if name in plan.varied_units:
+        described = "FMU or block in the unit's place"
+        return Variable(name=name, kind=Kind.STRING, causality=Causality.PARAMETER, description=described, start="")
     texts = [text for point in range(len(plan.points)) if (text := _text(plan, point, name)) is not None]
     kind, start = (Kind.REAL, math.nan) if all(map(is_number, texts)) else (Kind.STRING, "")
     described = "value of the unit's parameter"
@@ -229,7 +232,8 @@ def _plan_of(metadata: Mapping[str, Any]) -> CampaignPlan | None:
     try:
         if scenario_of(metadata["scenario"], metadata.get("source", {})) is None:
             return None
-        return checked_plan(CampaignPlan(**{name: metadata[name] for name in _PLAN_KEYS}))
+        varied_units = metadata.get("varied_units", ())
+        return checked_plan(CampaignPlan(**{name: metadata[name] for name in _PLAN_KEYS}, varied_units=varied_units))
     except (UsageError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):  # the page reports it
         return None
 

@@ -27,6 +27,11 @@ Run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
 
 \b
+Your own
+  handover new scenario Reach            writes a start: scenario, plant, controller, tests
+  handover run reach:Reach               one of your own, MODULE:CLASS, from the working directory
+
+\b
 Exchange
   handover build TendonArm --fmi both    units for other tools
   handover export ir_grasp --ssp x.ssp   a scenario for other tools
@@ -103,6 +108,11 @@ COMMANDS = (
         "list",
         "handover.scenarios.cli.list:list_command",
         short_help="List scenarios and units, or what one of them takes and gives.",
+    ),
+    DeferredCommand(
+        "new",
+        "handover.scenarios.cli.new:new",
+        short_help="Write a start for a unit, a controller or a scenario of your own.",
     ),
     DeferredCommand(
         "paper",

@@ -9,7 +9,7 @@ import click
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.grid import parse_grid, set_parameters
+from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_units, vary_units
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import pool_config, run_campaign_command
@@ -17,7 +17,7 @@ from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.selection import find_scenario, replacements
+from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
@@ -26,6 +26,8 @@ _HELP = """Run a SCENARIO many times: all combinations of the given values, each
 NAME=VALUES is a list or a range of numbers:
   alpha=0.1,0.2,0.4       these values; those of arrays stand between ;
   alpha=0.1:0.4:4         START:STOP:N, 4 evenly spaced values with both ends
+  servo.alpha_0=0.1,0.2   a parameter of the unit servo, whatever FMU it is
+  --unit servo=a.fmu,b.fmu  the unit itself, by files or MODULE:CLASS
 
 \b
 Examples
@@ -90,7 +92,8 @@ def sweep(
         raise UsageError(f"{scenario}: a scenario can be swept, an FMU can be run by itself")
     experiment = find_scenario(scenario)
     with one_line_errors():
-        points = parse_grid(experiment, grid)
+        units, choices = split_units(experiment, replaced)
+        points = vary_units(parse_grid(experiment, grid), choices)
         plan = CampaignPlan(
             scenario=scenario,
             points=points,
@@ -98,7 +101,8 @@ def sweep(
             repetitions=repeat,
             seed=seed,
             paired=paired,
-            units=replacements(experiment, replaced),
+            units=units,
+            varied_units=tuple(choices),
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
         )
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)

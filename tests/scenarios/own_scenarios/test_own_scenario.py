@@ -191,6 +191,6 @@ def test_an_installed_package_adds_scenarios_and_units_by_name(tmp_path: Path, m
 def test_the_readmes_commands_work_beside_the_tutorials_files(here: Path):
     readme = (TUTORIAL.parents[1] / "README.md").read_text(encoding="utf-8")
     lines = [line for line in readme.splitlines() if line.startswith("handover ")]
-    assert [line.split()[1] for line in lines] == ["list", "run", "sweep", "run", "export"]
+    assert [line.split()[1] for line in lines] == ["list", "run", "sweep", "run", "sweep", "export"]
     for line in lines:
         succeeded(here, *shlex.split(line)[1:])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tutorial import ran, refused, succeeded, write_files
+from tutorial import call, ran, refused, succeeded, write_files
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.table import CampaignTable
@@ -72,3 +72,44 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(here: Path):
     assert "controller.stiffness is varied and set by -p" in refused(
         here, "sweep", SCENE, "controller.stiffness=3,4", "-p", "controller.stiffness=5"
     )
+
+
+SOFT = """
+from control import Inputs, Outputs, Params, SpringToGoal
+
+
+class Soft(SpringToGoal):
+    def __init__(self, params: Params) -> None:
+        super().__init__(params)
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        return Outputs(tau=0.5 * super().outputs(t, u).tau)
+"""
+
+
+def test_a_sweep_varies_the_unit_itself(here: Path):
+    (here / "soft.py").write_text(SOFT)
+    (here / "else").mkdir()
+    succeeded(here, "build", "soft:Soft", "--fmi", "3", "--out", "else")
+    units = "controller=control:SpringToGoal,else/Soft.fmi3.fmu"
+    sweep = ["sweep", SCENE, "arm.mass=1,2", "--unit", units, "-p", "patience=0.1", "--paired", "--out", "swept"]
+    printed = succeeded(here, *sweep)
+    assert "else/Soft.fmi3.fmu" in printed
+    table = CampaignTable.read(here / "swept" / "runs.parquet")
+    assert list(table.column("controller")) == ["control:SpringToGoal"] * 2 + ["else/Soft.fmi3.fmu"] * 2
+    assert list(table.column("arm.mass")) == [1.0, 2.0] * 2
+    first = [torque(run) for run in sorted((here / "swept" / "runs").iterdir())]
+    np.testing.assert_allclose(first[2], 0.5 * first[0], rtol=1e-12)
+    assert "has all of its runs; nothing was run" in call(here, *sweep).stderr
+    (here / "swept" / "runs.parquet").unlink()
+    succeeded(here / "else", "report", "../swept")
+    assert CampaignTable.read(here / "swept" / "runs.parquet").rows == table.rows
+
+
+def test_units_that_cannot_be_varied_are_told_and_nothing_is_written(here: Path):
+    line = refused(here, "sweep", SCENE, "--unit", "controller=control:SpringToGoal,", "--out", "other")
+    assert "--unit controller: 'control:SpringToGoal,' has an empty item" in line
+    done = call(here, "sweep", SCENE, "--unit", "controller=control:SpringToGoal,arm:TwoLinkArm", "--out", "other")
+    assert done.returncode == 2
+    assert "controller has no input 'q'" in done.stderr
+    assert not (here / "other").exists()

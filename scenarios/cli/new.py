@@ -1,0 +1,94 @@
+"""The command `handover new`: a unit, a controller or a scenario to start from, with a test."""
+
+import keyword
+import re
+from pathlib import Path
+from string import Template
+
+import click
+
+from handover.fmus.catalog import UNITS
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.results.run_folder import check_place, disk_errors_reported
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+_HELP = """Write a working start for a unit, a controller or a scenario of your own, with its test.
+
+NAME is the class's, such as TwoLinkArm, whose module is two_link_arm.py; or the module's. A scenario comes with a plant
+and a controller in files of their own. Files that are there are not overwritten.
+
+\b
+Examples
+  handover new scenario Reach            reach.py, reach_plant.py, reach_controller.py, tests
+  handover run reach:Reach
+  handover new controller Gentle         gentle.py, test_gentle.py
+  handover run reach:Reach --unit controller=gentle:Gentle
+"""
+
+
+@click.command("new", help=_HELP, short_help="Write a start for a unit, a controller or a scenario of your own.")
+@click.argument("kind", type=click.Choice(["unit", "controller", "scenario"]))
+@click.argument("name")
+@click.option(
+    "--out", type=click.Path(path_type=Path), default=Path("."), help="Folder for the files.  [default: this one]"
+)
+def new(kind: str, name: str, out: Path) -> None:
+    """Write a working start for a unit, a controller or a scenario."""
+    with one_line_errors():
+        class_name, module = _names(name)
+        files = _files(kind, class_name, module)
+        check_place(out)
+        if there := [file for file in files if (out / file).exists()]:
+            raise UsageError(f"{out}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} there already")
+        with disk_errors_reported(out):
+            out.mkdir(parents=True, exist_ok=True)
+            for file, text in files.items():
+                (out / file).write_text(text, encoding="utf-8")
+    for file in files:
+        click.echo(out / file)
+    path = f"{module}:{class_name}"
+    what = {
+        "unit": f"handover list {path}",
+        "controller": f"handover run SCENARIO --unit NAME={path}",
+        "scenario": f"handover run {path}",
+    }[kind]
+    click.echo(f"try: {what}; its test: python -m pytest test_{module}.py", err=True)
+
+
+def _names(name: str) -> tuple[str, str]:
+    """Return the names of the class and of its module.
+
+    Raises:
+        UsageError: they would be no names in Python, or taken.
+    """
+    if not _NAME.fullmatch(name) or name.endswith("_"):
+        raise UsageError(f"{name!r} is no name: letters, digits and underscores are right, such as TwoLinkArm")
+    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
+    class_name = name if name[0].isupper() else "".join(part.capitalize() for part in name.split("_"))
+    if keyword.iskeyword(module):
+        raise UsageError(f"{module!r} is a keyword of Python, which no module can be called")
+    if class_name in UNITS or module in SCENARIOS:
+        raise UsageError(f"{name!r} is in the catalog already, see `handover list`; give another name")
+    return class_name, module
+
+
+def _files(kind: str, class_name: str, module: str) -> dict[str, str]:
+    """Return the texts of the files by name."""
+    if kind != "scenario":
+        return _pair(kind, class_name, module)
+    return {
+        **_pair("scenario", class_name, module),
+        **_pair("unit", f"{class_name}Plant", f"{module}_plant"),
+        **_pair("controller", f"{class_name}Controller", f"{module}_controller"),
+    }
+
+
+def _pair(kind: str, class_name: str, module: str) -> dict[str, str]:
+    def text(template: str) -> str:
+        source = (_TEMPLATES / f"{template}.py.txt").read_text(encoding="utf-8")
+        return Template(source).substitute(Class=class_name, module=module)
+
+    return {f"{module}.py": text(kind), f"test_{module}.py": text(f"test_{kind}")}
