@@ -35,6 +35,7 @@ Your own
 Exchange
   handover build TendonArm --fmi both    units for other tools
   handover export ir_grasp --ssp x.ssp   a scenario for other tools
+  handover info Their.fmu                what is in it: ports, steps, capabilities
   handover check Their.fmu               what is wrong with an FMU, whoever made it
 
 \b
@@ -103,6 +104,9 @@ COMMANDS = (
         "export",
         "handover.scenarios.cli.export:export_command",
         short_help="Write a SCENARIO as an SSP, for other tools.",
+    ),
+    DeferredCommand(
+        "info", "handover.scenarios.cli.info:info", short_help="Tell what is in an FMU or an SSP, from any tool."
     ),
     DeferredCommand(
         "list",

@@ -36,8 +36,11 @@ tools do not take there, are start values of the FMUs.
 )
 @click.argument("scenario")
 @click.option("--ssp", "file", required=True, type=click.Path(path_type=Path), metavar="FILE", help="File to write.")
+@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
 @scenario_options
-def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: int, replaced: Sequence[str]) -> None:
+def export_command(
+    scenario: str, file: Path, parameters: Sequence[str], seed: int, replaced: Sequence[str], *, force: bool
+) -> None:
     """Write a SCENARIO as an SSP."""
     experiment = find_scenario(scenario)
     with Interruption(), one_line_errors():
@@ -46,6 +49,8 @@ def export_command(scenario: str, file: Path, parameters: Sequence[str], seed: i
             raise UsageError(f"--ssp {file}: a name that ends with .ssp is right; other tools know the file by it")
         if file.is_dir():
             raise UsageError(f"--ssp {file}: there is a folder of that name")
+        if file.exists() and not force:
+            raise UsageError(f"--ssp {file}: it is there already; --force replaces it")
         check_place(file.parent)
         others = replacements(experiment, replaced)
         fmus = select_fmus(experiment, others, exchangeable)

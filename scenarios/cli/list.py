@@ -1,15 +1,13 @@
 """The command `handover list`: scenarios and units, their parameters and ports."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 from rich.console import Console
 
 from handover.cosim.blocks.description import describe
-from handover.cosim.blocks.start_values import range_of
-from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit, import_class, installed_units
 from handover.scenarios.catalog import (
@@ -21,6 +19,7 @@ from handover.scenarios.catalog import (
     search_folder,
 )
 from handover.scenarios.cli.console import open_console, print_rows
+from handover.scenarios.cli.port_tables import allowed, plain, port_rows, variable_data
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment
@@ -28,18 +27,29 @@ from handover.scenarios.experiment.experiment import Experiment
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
 @click.argument("name", required=False, metavar="[SCENARIO|UNIT]")
-def list_command(name: str | None) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for programs.")
+def list_command(name: str | None, *, as_json: bool) -> None:
     """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT.
 
     Either can be your own, named MODULE:CLASS, such as my_scene:TwoLinkReach for the class TwoLinkReach in my_scene.py;
     modules are looked for in the working directory first.
     """
     if name is None:
-        print_catalog()
+        if as_json:
+            click.echo(json.dumps(catalog_data(), indent=2))
+        else:
+            print_catalog()
     elif (unit := _unit(name)) is not None:
-        print_unit(unit)
+        if as_json:
+            click.echo(json.dumps(unit_data(unit), indent=2))
+        else:
+            print_unit(unit)
     elif ":" in name or name in SCENARIOS or name in installed_scenarios():
-        print_scenario(find_scenario(name))
+        scenario = find_scenario(name)
+        if as_json:
+            click.echo(json.dumps(scenario_data(scenario), indent=2))
+        else:
+            print_scenario(scenario)
     else:
         valid = [*SCENARIOS, *installed_scenarios(), *UNITS, *installed_units()]
         raise UsageError(f"no scenario or unit {name!r}: {nearest(name, valid)}")
@@ -102,7 +112,7 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
     console = open_console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold")
     console.print("Parameters, to be set with -p name=value")
-    print_rows(console, [(v.name, _plain(v.start), _allowed(v), v.description) for v in experiment.parameters()])
+    print_rows(console, [(v.name, plain(v.start), allowed(v), v.description) for v in experiment.parameters()])
     console.print("Units, to be replaced with --unit name=file.fmu or name=module:Class")
     print_rows(console, list(experiment.units.items()))
 
@@ -117,25 +127,34 @@ def print_unit(unit: Entry) -> None:
     for heading, variables in (("Parameters", d.parameters), ("Inputs", d.inputs), ("Outputs", d.outputs)):
         if variables:
             console.print(heading, style="bold")
-            print_rows(console, [(v.name, _type_of(v), _start_of(v), _allowed(v), v.description) for v in variables])
+            print_rows(console, port_rows(variables))
 
 
-def _allowed(v: Variable) -> str:
-    return " | ".join(n.lower() for n, _ in v.items) if v.items else range_of(v)
+def catalog_data() -> dict[str, Any]:
+    """Return names and titles of all scenarios and units, as JSON can hold them."""
+    scenarios = {name: scenario.title for name, scenario in SCENARIOS.items()}
+    units = {name: unit.summary for name, unit in UNITS.items()}
+    return {
+        "scenarios": scenarios | {name: _title(name) for name in installed_scenarios()},
+        "units": units | dict(installed_units()),
+    }
 
 
-def _type_of(v: Variable) -> str:
-    shape = f"[{','.join(map(str, v.shape))}]" if v.shape else ""
-    unit = v.unit.symbol if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
-    return f"{v.type_name}{shape} {unit}".rstrip()
+def scenario_data(experiment: type[Experiment[Any]]) -> dict[str, Any]:
+    """Return a scenario's parameters and units, as JSON can hold them."""
+    parameters = [variable_data(v) for v in experiment.parameters()]
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "parameters": parameters,
+        "units": dict(experiment.units),
+    }
 
 
-def _start_of(v: Variable) -> str:
-    text = "" if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else _plain(v.start)
-    return text if len(text) <= 40 else text[:37] + "..."
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, np.ndarray):
-        return ",".join(f"{x:g}" for x in value.reshape(-1).tolist())
-    return f"{value:g}" if isinstance(value, float) else str(getattr(value, "name", value)).lower()
+def unit_data(unit: Entry) -> dict[str, Any]:
+    """Return a unit's parameters and ports, as JSON can hold them; its step is in seconds."""
+    d = describe(import_class(unit.block))
+    named = {"parameters": d.parameters, "inputs": d.inputs, "outputs": d.outputs}
+    variables = {kind: [variable_data(v) for v in of_kind] for kind, of_kind in named.items()}
+    facts = {"name": unit.name, "summary": unit.summary, "step": float(unit.step), "sampled": d.period is not None}
+    return {**facts, **variables}

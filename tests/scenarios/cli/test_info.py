@@ -1,0 +1,94 @@
+"""`handover info`, `handover list --json` and what they tell of FMUs, SSPs, units and scenarios."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from handover.fmus.build import cached
+from handover.scenarios.cli.command import main
+
+
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def data_of(*arguments: str | Path) -> Any:
+    result = call(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.output)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmus_ports_steps_and_capabilities(fmi: int):
+    file = cached("Thrusters", fmi)
+    data = data_of("info", file)
+    assert (data["name"], data["fmi"], data["step"], data["sampled"]) == ("Thrusters", fmi, 0.016, False)
+    assert data["capabilities"]["saves_state"]
+    parameters = {p["name"]: p for p in data["parameters"]}
+    assert parameters["f_max"]["start"] == [0.55, 0.39, 0.45]
+    assert parameters["lag"] == {
+        "name": "lag",
+        "type": "real",
+        "shape": [],
+        "unit": "s",
+        "start": 0.02,
+        "minimum": 0.0,
+        "maximum": 10.0,
+        "items": None,
+        "description": "time constant of the first-order lag",
+    }
+    printed = call("info", file).output
+    assert f"Thrusters: an FMU of FMI {fmi}.0" in printed
+    assert "16 ms is proposed" in printed
+    assert "its state can be saved" in printed
+    assert "time constant of the first-order lag" in printed
+
+
+def test_an_ssps_units_and_connections(tmp_path: Path):
+    file = tmp_path / "grasp.ssp"
+    assert call("export", "ir_grasp", "--ssp", file).exit_code == 0
+    data = data_of("info", file)
+    assert data["stop"] == 90.0
+    assert data["units"]["reflex"]["model"] == "IrReflex"
+    assert ["reflex.p_WH_cmd", "scene.p_WH_cmd"] in data["connections"]
+    printed = call("info", file).output
+    assert "ir_grasp: a system of 2 units, until 90 s" in printed
+    assert "reflex.sigma_cmd" in printed
+
+
+def test_what_has_no_information_is_refused_in_one_line(tmp_path: Path):
+    for file, told in (
+        (tmp_path / "none.fmu", "there is no such file"),
+        (tmp_path / "grasp.zip", "a file that ends with .fmu or .ssp is right"),
+    ):
+        result = call("info", file)
+        assert result.exit_code == 2
+        assert told in result.output
+        assert "Traceback" not in result.output
+
+
+def test_list_as_data():
+    catalog = data_of("list")
+    assert catalog["scenarios"]["ir_grasp"].startswith("a soft hand grasps")
+    assert "VslArm" in catalog["units"]
+    scenario = data_of("list", "ir_grasp")
+    assert scenario["units"] == {"scene": "GraspScene", "reflex": "IrReflex"}
+    strategy = next(p for p in scenario["parameters"] if p["name"] == "strategy")
+    assert (strategy["start"], strategy["items"]) == ("REFLEX", ["REFLEX", "BLIND", "FORWARD"])
+    unit = data_of("list", "Thrusters")
+    assert unit["step"] == 0.016
+    assert [p["name"] for p in unit["outputs"]] == ["f_B", "tau_B", "saturated"]
+
+
+def test_an_export_replaces_a_file_only_when_told_to(tmp_path: Path):
+    file = tmp_path / "grasp.ssp"
+    file.write_text("something")
+    result = call("export", "ir_grasp", "--ssp", file)
+    assert result.exit_code == 2
+    assert "it is there already; --force replaces it" in result.output
+    assert file.read_text() == "something"
+    assert call("export", "ir_grasp", "--ssp", file, "--force").exit_code == 0
+    assert file.stat().st_size > 1000
