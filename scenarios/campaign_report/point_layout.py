@@ -129,11 +129,16 @@ def _numbers(
     steps = np.diff(np.unique(values))
     if values.min() > 0.0 and len(steps) and steps.max() > _UNEVEN * steps.min():
         places = np.log10(values)
-        ticks = [(float(p), f"{v:g}") for p, v in zip(places, values, strict=True)]
+        ticks = [(float(p), _tick(v)) for p, v in zip(places, values, strict=True)]
         return dict(zip(texts, places.tolist(), strict=True)), ticks, float(np.diff(np.unique(places)).min()), title
     step = float(steps.min()) if len(steps) else 1.0
-    few = [(float(v), f"{v:g}") for v in values] if len(steps) and steps.min() > 0.07 * np.ptp(values) else None
+    few = [(float(v), _tick(v)) for v in values] if len(steps) and steps.min() > 0.07 * np.ptp(values) else None
     return dict(zip(texts, values.tolist(), strict=True)), few, step, title
+
+
+def _tick(value: float) -> str:
+    """Return a number at an axis, to four digits: 33.33 of thirds of 100."""
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:g}"
 
 
 def _list(results: CampaignResults) -> PointLayout:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign_report.point_layout import PointLayout
-from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, digits_after_point, display_unit
 from handover.scenarios.reporting.html import Cell, plot_html, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -22,13 +22,14 @@ def points_section(results: CampaignResults) -> Section | None:
         return None
     metrics = results.shown_metrics
     units = {m: display_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
+    digits = {m: digits_after_point([results.median(point, m) * units[m].factor for point in points]) for m in metrics}
     units_of_varied = _units_of_varied(results)
     rows = [
         (
             *_values(results, point, units_of_varied),
             str(len(point.rows)),
             *_success(point),
-            *(_median(results, point, m, units[m]) for m in metrics),
+            *(_median(results, point, m, units[m], digits[m]) for m in metrics),
         )
         for point in points
     ]
@@ -74,19 +75,15 @@ def _success(point: PointResults) -> tuple[Cell, Cell]:
     return Cell(f"{point.successes} of {len(point.done)}", point.successes), Cell(line, point.rate)
 
 
-def _median(results: CampaignResults, point: PointResults, metric: str, unit: DisplayUnit) -> Cell:
+def _median(results: CampaignResults, point: PointResults, metric: str, unit: DisplayUnit, digits: int) -> Cell:
     median, span = results.median(point, metric), results.median_interval(point, metric)
     if math.isnan(median):
         return Cell("–", math.nan)
-    line = f"{median * unit.factor:.4g}"
+    line = f"{median * unit.factor:.{digits}f}"
     if span is not None:
-        line += f" ({_short(span.low * unit.factor)} to {_short(span.high * unit.factor)})"
+        low, high = (f"{x * unit.factor:.{max(digits - 1, 0)}f}" for x in (span.low, span.high))
+        line += f" ({low} to {high})"
     return Cell(line, median)
-
-
-def _short(x: float) -> str:
-    """Format a number to three digits, or four where three would cut its integer part."""
-    return f"{x:.3g}" if abs(x) < 999.5 else f"{x:.4g}"
 
 
 _SCREEN = 15

@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, digits_after_point, display_unit
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -30,7 +30,8 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
     units = {n: display_unit(table.unit(n), table.column(n)) for n in (*metrics, "cpu_seconds")}
     columns = {n: table.column(n) for n in varied}
     set_to = {n: display_unit(table.unit(n), x) if x.dtype == np.float64 else None for n, x in columns.items()}
-    rows = [_row(row, set_to, units, folder) for row in table.rows[:_MAX_ROWS]]
+    digits = {n: digits_after_point(table.column(n) * unit.factor) for n, unit in units.items()}
+    rows = [_row(row, set_to, units, digits, folder) for row in table.rows[:_MAX_ROWS]]
     header = (
         "run",
         *(n.replace("_", " ") for n in varied),
@@ -43,7 +44,7 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
     left = len(table) - len(rows)
     note = f"The first {len(rows)} of {len(table)} runs; all are in runs.parquet. " if left > 0 else ""
     if not any(_page_of(name, folder) for name in table.column("run")):
-        note += f"handover report {folder.name}/runs/NAME writes the page of a run."
+        note += f"handover report {folder.name} --runs writes the pages of all runs, and links them here."
     html = Markup(
         "<div class='controls'><label>Show runs with <input type='search' data-filters='all-runs' "
         "placeholder='words, such as failed'></label>"
@@ -70,14 +71,18 @@ def _page_of(name: str, folder: Path) -> str:
 
 
 def _row(
-    row: dict[str, Any], set_to: Mapping[str, DisplayUnit | None], units: Mapping[str, DisplayUnit], folder: Path
+    row: dict[str, Any],
+    set_to: Mapping[str, DisplayUnit | None],
+    units: Mapping[str, DisplayUnit],
+    digits: Mapping[str, int],
+    folder: Path,
 ) -> Sequence[str | Markup | Cell]:
     return (
         run_html(row["run"], folder),
         *(_parameter(row[name], unit) for name, unit in set_to.items()),
         Cell(str(row["seed"]), row["seed"]),
         _verdict(row),
-        *(_number(row[name], unit) for name, unit in units.items()),
+        *(_number(row[name], unit, digits[name]) for name, unit in units.items()),
     )
 
 
@@ -99,10 +104,10 @@ def _verdict(row: dict[str, Any]) -> Markup:
     return Markup("<span class='{}' title='{}'>{}</span>").format(kind, row["reason"] or "", verdict)
 
 
-def _number(value: float | None, unit: DisplayUnit) -> Cell:
+def _number(value: float | None, unit: DisplayUnit, digits: int) -> Cell:
     if value is None or not math.isfinite(value):
         return Cell("–", math.nan)
-    return Cell(f"{value * unit.factor:.4g}", value)
+    return Cell(f"{value * unit.factor:.{digits}f}", value)
 
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")

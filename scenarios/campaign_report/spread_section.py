@@ -1,4 +1,7 @@
-"""Plot of a campaign's metrics: each run as a mark, each point as a box, one metric at a time to choose from."""
+"""Plot of a campaign's metrics: each run as a mark, one metric at a time to choose from.
+
+A point of many runs has a box too; of few, quartiles say less than the runs themselves.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,6 +19,8 @@ from handover.scenarios.reporting.html import json_html, plot_html
 from handover.scenarios.reporting.page import Section
 
 _SUCCESS, _OTHER = "circle", "x-thin"
+_MIN_BOXED = 12
+"""Runs of a point from which on it has a box; below, each quarter of them is one or two."""
 _ENDED = {True: "succeeded", False: "failed", None: "not done"}
 
 
@@ -41,9 +46,15 @@ def spread_section(results: CampaignResults, layout: PointLayout) -> Section | N
         choices[0]["told"],
         plot_html(figure, plot_height(layout) + 60, f"{first} by point"),
         json_html(choices, "choices"),
-        "A mark is a run: a disc succeeded, a cross did not. Boxes: quartiles and median; whiskers: extremes.",
+        _note(results),
     )
     return Section(anchor="metrics", title="Metrics", html=html, scripts=("campaign.js",))
+
+
+def _note(results: CampaignResults) -> str:
+    boxed = any(len(p.rows) >= _MIN_BOXED for p in results.points)
+    boxes = f" Boxes, of {_MIN_BOXED} runs and more: quartiles and median; whiskers: extremes." if boxed else ""
+    return f"A mark is a run: a disc succeeded, a cross did not.{boxes}"
 
 
 Strip = tuple[int, bool, list[int], list[float]]
@@ -132,10 +143,13 @@ def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Se
 
 
 def _box(points: Sequence[Floats]) -> dict[str, Any]:
-    """Return what Plotly needs for a box at each point."""
+    """Return what Plotly needs for a box at each point; None at those of few runs."""
     shares = {"lowerfence": 0.0, "q1": 0.25, "median": 0.5, "q3": 0.75, "upperfence": 1.0}
     kept = [x[np.isfinite(x)] for x in points]
-    return {n: _plain([np.quantile(x, share) if len(x) else np.nan for x in kept]) for n, share in shares.items()}
+    return {
+        n: _plain([np.quantile(x, share) if len(x) >= _MIN_BOXED else np.nan for x in kept])
+        for n, share in shares.items()
+    }
 
 
 def _plain(values: Any) -> list[float | None]:

@@ -5,23 +5,27 @@ from pathlib import Path
 import click
 
 from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.results.run_folder import RunFolder, check_place
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
 
 The page is made of what is in DIR, also of a run that was interrupted or killed, or that another version wrote: a run's
 record, or a campaign's table, is completed first, and the page shows what there is.
+
+With --runs, each run of a campaign gets its page, too, to which the campaign's page links; each takes some 5 MB.
 """
 
 
 @click.command("report", help=_HELP, short_help="Write the page of a run or of a campaign.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--figures", is_flag=True, help="Draw the figures again, too, as PNG and SVG, into DIR/figures.")
+@click.option("--runs", is_flag=True, help="Write the pages of a campaign's runs, too, into DIR/runs/NAME.")
 @click.option(
     "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
 )
-def report(folder: Path, figures: bool, file: Path | None) -> None:
+def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
     """Write the page of a run or of a campaign."""
     with one_line_errors():
         if not folder.is_dir():
@@ -34,20 +38,36 @@ def report(folder: Path, figures: bool, file: Path | None) -> None:
             check_place(folder)
         campaign = CampaignFolder(folder)
         if campaign.is_there:
-            _write_of_campaign(campaign, page, figures)
+            _write_of_campaign(campaign, page, figures, runs)
         elif not RunFolder.of_run(folder).is_there:
             raise UsageError(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
+        elif runs:
+            raise UsageError(f"{folder} is the folder of a run; --runs is for that of a campaign")
         else:
             _write_of_run(RunFolder.of_run(folder), page, figures)
     click.echo(f"report: {page}")
 
 
-def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool) -> None:
-    from handover.scenarios.campaign.table_writer import rebuild_table
+def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool, runs: bool) -> None:
+    from handover.scenarios.campaign.table_writer import rebuild_table  # pyarrow is slow to import
     from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 
     rebuild_table(campaign)
+    if runs:
+        _write_of_runs(campaign)
     (write_campaign_report if figures else write_campaign_page)(campaign, page)
+
+
+def _write_of_runs(campaign: CampaignFolder) -> None:
+    """Write the pages of a campaign's runs; a line for each that cannot be made."""
+    for name in CampaignTable.read(campaign.table).column("run").tolist():
+        run = RunFolder.of_run(campaign.runs / name)
+        if not run.is_there:  # it was lost
+            continue
+        try:
+            _write_of_run(run, run.report, figures=False)
+        except InvalidRunFolder as e:
+            click.echo(f"{name}: {e}", err=True)
 
 
 def _write_of_run(run: RunFolder, page: Path, figures: bool) -> None:

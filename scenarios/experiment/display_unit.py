@@ -1,10 +1,16 @@
-"""Display units of plots and tables: mm for small lengths, degrees for angles, kPa for high pressures."""
+"""Display units of plots and tables: mm for small lengths, degrees for angles, kPa for high pressures.
+
+rad/s stays: it is the unit of a pole's frequency as of an angular velocity, and the former in °/s is misread.
+"""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+_SMALL = ("°", "mm", "mm²", "ms", "g")
+"""Units of which less than a thousandth is rarely of interest."""
 
 
 @dataclass(frozen=True)
@@ -19,11 +25,30 @@ class DisplayUnit:
         return f"{quantity} ({self.symbol})" if self.symbol else quantity
 
     def text(self, value: float) -> str:
-        """Return a value with its unit, to four digits."""
+        """Return a value with its unit, to four digits; small ones of small units to two digits or three decimals.
+
+        So 40.68° stands beside 0.060°, not beside 0.05991°.
+        """
         if not math.isfinite(value):
             return "–"
         space = "" if self.symbol.startswith("°") else " "
-        return f"{value * self.factor:.4g}{space}{self.symbol}".rstrip()
+        shown = value * self.factor
+        small = self.symbol in _SMALL and 0.0 < abs(shown) < 1.0
+        digits = f"{shown:.{max(3, 1 - math.floor(math.log10(abs(shown))))}f}" if small else f"{shown:.4g}"
+        return f"{digits}{space}{self.symbol}".rstrip()
+
+
+def digits_after_point(values: ArrayLike) -> int:
+    """Return with how many digits after the point to show all numbers of a column: the largest has four digits.
+
+    The smallest that is not zero keeps one, unless that takes more than six after the point.
+    """
+    magnitudes = np.abs(np.asarray(values, dtype=np.float64))
+    shown = magnitudes[np.isfinite(magnitudes) & (magnitudes > 0.0)]
+    if not shown.size:
+        return 0
+    largest, smallest = (math.floor(math.log10(float(x))) for x in (shown.max(), shown.min()))
+    return max(0, 3 - largest, min(-smallest, 6))
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
@@ -32,12 +57,12 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     finite = magnitudes[np.isfinite(magnitudes)]
     largest = float(finite.max()) if finite.size else 0.0
     smaller = {"m": (1.0, 1e3, "mm"), "m2": (1e-2, 1e6, "mm²"), "s": (0.1, 1e3, "ms"), "kg": (0.5, 1e3, "g")}
-    if unit in smaller and largest < smaller[unit][0]:
+    if unit in smaller and largest < smaller[unit][0] and not (unit == "s" and largest == 0.0):
         return DisplayUnit(smaller[unit][1], smaller[unit][2])
     if unit == "s" and largest >= 3.6e4:
         return DisplayUnit(1 / 3600, "h")
-    if unit in ("rad", "rad/s"):
-        return DisplayUnit(180.0 / math.pi, unit.replace("rad", "°"))
+    if unit == "rad":
+        return DisplayUnit(180.0 / math.pi, "°")
     if unit == "B":
         return DisplayUnit(1e-6, "MB")
     if unit == "Pa" and largest >= 1e3:

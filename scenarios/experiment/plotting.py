@@ -120,7 +120,7 @@ def draw_time_plot(axes: Axes, plot: TimePlot, time: Floats) -> None:
 
 
 def name_phases(axes: Axes, phases: Sequence[Phase], per_point: float) -> None:
-    """Write the names of phases over axes: level where they fit, else upright with a line to the phase.
+    """Write the names of phases over axes: level where they fit; a name that fits nowhere once, upright with a line.
 
     `per_point` is the time, s, that a point on paper stands for. Without room for all, the shortest phases go unnamed.
     """
@@ -160,14 +160,18 @@ def name_phases(axes: Axes, phases: Sequence[Phase], per_point: float) -> None:
 
 
 def _named(phases: Sequence[Phase], per_point: float) -> tuple[list[Phase], list[Phase]]:
-    """Return the phases whose names fit over them, and those whose names stand upright."""
-    level: list[Phase] = []
-    upright: list[Phase] = []
-    for phase in phases:
-        if phase.name:
-            fits = _LETTER * len(phase.name) * per_point < phase.end - phase.begin
-            (level if fits else upright).append(phase)
-    return level, upright
+    """Return the phases whose names fit over them, and of each other name the longest phase, named upright.
+
+    The page's script names phases by the same rule (`phases.js`).
+    """
+    named = [p for p in phases if p.name]
+    level = [p for p in named if _LETTER * len(p.name) * per_point < p.end - p.begin]
+    written = {p.name for p in level}
+    longest: dict[str, Phase] = {}
+    for phase in sorted(named, key=lambda p: p.begin - p.end):
+        if phase.name not in written:
+            longest.setdefault(phase.name, phase)
+    return level, list(longest.values())
 
 
 def _height_of_names(phases: Sequence[Phase], per_point: float) -> float:

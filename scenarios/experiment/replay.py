@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.time_plot import Phase
 
 
 class Mesh(NamedTuple):
@@ -141,7 +142,8 @@ class Replay:
         lines, bodies: what moves; each has as many rows as the record, or one.
         fixed: lines that stay, of shape (1, n, 3), such as a path to follow or a table's edge.
         eye: direction in W from the scene to the viewer at first; the distance follows from what is shown.
-        phases: an enumeration's signal whose value is shown beside the time; "" for none.
+        phases: what is shown beside the time: phases as in the plots (`phases_of`), or the signal of an enumeration
+            whose value it is; "" for nothing.
         notes: sentences below the scene.
         window: minimum and maximum corner of what is shown, shape (2, 3), m; None: everything that is drawn.
     """
@@ -150,6 +152,6 @@ class Replay:
     bodies: Sequence[Body] = ()
     fixed: Sequence[Line] = ()
     eye: tuple[float, float, float] = (1.3, 1.3, 0.6)
-    phases: str = ""
+    phases: str | Sequence[Phase] = ""
     notes: Sequence[str] = field(default_factory=tuple[str, ...])
     window: Floats | None = None

@@ -140,12 +140,15 @@ class TimeFigure:
 def phases_of(record: Record, signal: str, names: Mapping[int, str] | None = None) -> tuple[Phase, ...]:
     """Return the spans of time in which a signal kept its value, named; adjacent spans of one name are one phase.
 
-    `names` are by the signal's value, by default the items of its enumeration.
+    `names` are by the signal's value, by default the items of its enumeration. A signal of which nothing is known (NaN)
+    has no phases.
 
     Raises:
         KeyError: no such signal was recorded.
     """
     values, time = record[signal], record.time
+    if not np.isfinite(values).any():
+        return ()
     if names is None:
         names = {value: name.replace("_", " ").lower() for value, name in record.items(signal).items()}
     changes = np.flatnonzero(np.diff(values)) + 1

@@ -26,37 +26,38 @@ from handover.scenarios.free_flyer.parameters import HandoverParameters, Impedan
 
 _BEYOND = 2.0
 """Range of the plots, over the thrusters' maximum output: a command may be twenty times as much."""
+_ROOM = 1.1
+"""Range of the plots over the largest value, where that is smaller."""
 _QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N·m"))
 
 CAPTION = "Force and torque on the robot in B; dotted: as commanded, where the thrusters give less, cut off far beyond."
 
 
 def plot_thrust(record: Record, controllers: Sequence[str], phases: Sequence[Phase]) -> list[TimePlot]:
-    """Return force and torque on the robot in B; commands of several controllers are added, as the thrusters do.
+    """Return force and torque on the robot along each axis of B; commands of several controllers are added.
 
-    The axes show what the thrusters give; commands run out of them.
+    So do the thrusters. The axes of a quantity show one range, that of what the thrusters give; commands run out of it.
     """
     plots: list[TimePlot] = []
     for what, name, unit in _QUANTITIES:
         given = record[f"thrusters.{what}_B"]
         commanded = np.sum([record[f"{controller}.{what}_cmd"] for controller in controllers], axis=0)
-        limit = _BEYOND * float(np.abs(given).max(initial=0.0))
-        is_beyond = float(np.abs(commanded).max(initial=0.0)) > limit > 0.0
-        curves: list[Curve] = []
-        for i, axis in enumerate("xyz"):
-            curves.append(Curve(label=f"{axis}, given", values=given[:, i], group=axis))
-            text = f"{axis}, commanded"
-            curves.append(Curve(label=text, values=commanded[:, i], held=True, stroke="dotted", group=axis))
-        plots.append(
+        most, asked = (float(np.abs(x[np.isfinite(x)]).max(initial=0.0)) for x in (given, commanded))
+        limit = min(_ROOM * max(most, asked), _BEYOND * most if most > 0.0 else np.inf)
+        plots += [
             TimePlot(
-                title=f"{name} of the thrusters in B",
-                quantity=name.lower(),
+                title=f"{name} of the thrusters {'along' if what == 'f' else 'about'} {axis} of B",
+                quantity=f"{name.lower()}, {axis}",
                 unit=unit,
-                curves=curves,
+                curves=(
+                    Curve(label="given", values=given[:, i]),
+                    Curve(label="commanded", values=commanded[:, i], held=True, stroke="dotted"),
+                ),
                 phases=phases,
-                limits=(-limit, limit) if is_beyond else (None, None),
+                limits=(-limit, limit) if limit > 0.0 else (None, None),
             )
-        )
+            for i, axis in enumerate("xyz")
+        ]
     return plots
 
 
@@ -92,7 +93,7 @@ def figures_of_handover(parameters: HandoverParameters, record: Record) -> list[
             "which the robot would act; forces on gripper and hand, shaded by who holds the object.",
             plots=[_angle(record, phases), _speed(parameters, record, phases), _forces(record)],
         ),
-        TimeFigure(name="thrust", caption=CAPTION, plots=plot_thrust(record, ("impedance", "pose"), phases)),
+        TimeFigure(name="thrust", caption=CAPTION, plots=plot_thrust(record, ("impedance", "pose"), phases), columns=2),
     ]
 
 
@@ -180,13 +181,13 @@ def _threshold(parameters: HandoverParameters, record: Record, phases: Sequence[
     """
     published = paper_values("free_flyer", "published")
     pull, push = (float(published[f"velocity_{who}"][parameters.behaviour]) for who in ("hand", "gripper"))
-    holder = [record.items("person.holder")[code] for code in record["person.holder"].tolist()]
+    holder, items = record["person.holder"].tolist(), record.items("person.holder")
     values = np.full(len(record.time), np.nan)
     speed = np.nan
     for phase in phases:
         first, last = np.searchsorted(record.time, (phase.begin, phase.end)).tolist()
         if phase.name == _WATCHING[0]:
-            speed = pull if holder[first] == "GRIPPER" else push
+            speed = pull if items[holder[first]] == "GRIPPER" else push
         if phase.name in _WATCHING:
             values[first : last + 1] = speed
     return values
@@ -232,8 +233,14 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
         ),
         TimeFigure(
             name="thrust",
-            caption=f"{CAPTION} Above: the push on the gripper in W.",
-            plots=[_push(parameters, record, phases), *plot_thrust(record, ("impedance",), phases)],
+            caption=CAPTION,
+            plots=plot_thrust(record, ("impedance",), phases),
+            columns=2,
+        ),
+        TimeFigure(
+            name="push",
+            caption="The push on the gripper in W.",
+            plots=[_push(parameters, record, phases)],
         ),
     ]
 

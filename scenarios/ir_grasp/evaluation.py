@@ -24,8 +24,16 @@ object's and the fingers' width, so that it is still where they closed."""
 
 _COST = "cost f of thumb and ring, [Luberto] eq. (4), as the hand began to close"
 
+IN_COST = (0, 2)
+"""Thumb and ring, the fingers in the cost, as indices of distances."""
+
 _AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
 _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
+
+
+def _where_below(values: Floats, ceiling: float) -> Floats:
+    """Return values, NaN where they are at a ceiling that stands for nothing seen."""
+    return np.where(values < ceiling, values, np.nan)
 
 
 class GraspEvaluator(Evaluator):
@@ -107,11 +115,14 @@ class GraspEvaluator(Evaluator):
         self.moments["before closing"] = t
         self._stop = signals.text("reflex.stop").lower().replace("_", " ")
         began = min((self._entered[p] for p in _REFINING if p in self._entered), default=t)
-        seen, true = signals["reflex.distance"], signals["scene.range"]
+        seen = _where_below(signals["reflex.distance"], ReflexParams().distance_max)
+        true = _where_below(signals["scene.range"], OUT_OF_RANGE)
+        cost, blind = float(signals["reflex.cost"]), bool(np.isnan(seen[list(IN_COST)]).any())
+        what_of_cost = f"{_COST} (thumb or ring sees nothing)" if blind else _COST
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
         stop = int(signals["reflex.stop"])
         metrics = {
-            "final_cost": Metric(float(signals["reflex.cost"]), "m2", _COST),
+            "final_cost": Metric(math.nan if blind else cost, "m2", what_of_cost),
             "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
             "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
@@ -119,8 +130,8 @@ class GraspEvaluator(Evaluator):
         }
         for i, finger in enumerate(("thumb", "index", "ring")):
             what = f"{finger} to object as the hand began to close"
-            unseen = " (sees nothing)" if seen[i] >= ReflexParams().distance_max else ""
-            unmet = " (meets nothing)" if true[i] >= OUT_OF_RANGE else ""
+            unseen = " (sees nothing)" if np.isnan(seen[i]) else ""
+            unmet = " (meets nothing)" if np.isnan(true[i]) else ""
             metrics[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{what}, by [Luberto] eq. (11){unseen}")
             metrics[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{what}, true along the beam{unmet}")
         self._at_closing = metrics

@@ -23,6 +23,7 @@ from handover.scenarios.experiment.time_plot import (
     TimePlot,
     phases_of,
 )
+from handover.scenarios.ir_grasp.evaluation import IN_COST
 from handover.scenarios.ir_grasp.parameters import Parameters
 
 FINGER_NAMES = ("thumb", "index", "ring")
@@ -30,30 +31,36 @@ FINGER_COLOURS = COLOURS[:3]
 """Colours of the fingers' curves, of the fingers in the scene and in the replay."""
 _PHASE_NAMES = {
     0: "reach",
-    1: "look",
-    2: "look",
-    3: "look",
+    1: "check",
+    2: "check",
+    3: "check",
     4: "probe",
     5: "step",
     6: "close",
     7: "pull",
     8: "shake",
-    9: "",
+    9: "done",
 }
-"""Phase names as plotted: a look may include approaching and recovering motions."""
+"""Phase names as plotted and in the replay: a check may include approaching and recovering motions."""
 _WRIST = ("reflex.p_WH_cmd", "scene.p_WH")
 """The wrist's position as commanded and as measured."""
 _MIN_COST = 0.1
 """Smaller costs are drawn as this, mm², since a logarithmic axis has no zero."""
 
 
+def phases_of_grasp(record: Record) -> tuple[Phase, ...]:
+    """Return the reflex's phases by the names that plots and replay show."""
+    return phases_of(record, "reflex.phase", _PHASE_NAMES)
+
+
 def figures_of_grasp(parameters: Parameters, record: Record) -> list[TimeFigure]:
     """Return the figures of distances (seen and true) with the cost, and of commanded and measured motion."""
-    phases = phases_of(record, "reflex.phase", _PHASE_NAMES)
+    phases = phases_of_grasp(record)
     caption = (
         "Distances as the controller sees them, [Luberto] eq. (11), and along the beams in truth (dotted), where "
         "there are any in the sensors' range, and the cost f of thumb and ring, [Luberto] eq. (4), in mm² (1e-6 m²), "
-        f"in which a finger that sees nothing counts with {1000 * ReflexParams().distance_max:.0f} mm. Dashed: target "
+        "dotted while one of the two sees nothing, which then counts with "
+        f"{1000 * ReflexParams().distance_max:.0f} mm, and left out while neither sees anything. Dashed: target "
         "distance, and cost at which the hand closes."
     )
     return [
@@ -96,13 +103,19 @@ def _distances(parameters: Parameters, record: Record, phases: Sequence[Phase]) 
 def _cost(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
     reflex = ReflexParams()
     closes = reflex.threshold_literal if parameters.literal else reflex.threshold
+    cost = np.maximum(1e6 * record["reflex.cost"], _MIN_COST)
+    seeing = np.count_nonzero(record["reflex.distance"][:, IN_COST] < reflex.distance_max, axis=1)
+    partly = "cost f, while thumb or ring sees nothing"
     return TimePlot(
         title="Cost of thumb and ring, [Luberto] eq. (4)",
         quantity="cost f",
         unit="mm²",
         phases=phases,
         logarithmic=True,
-        curves=(Curve(label="cost f", values=np.maximum(1e6 * record["reflex.cost"], _MIN_COST), held=True),),
+        curves=(
+            Curve(label="cost f", values=np.where(seeing == 2, cost, np.nan), held=True),
+            Curve(label=partly, values=np.where(seeing == 1, cost, np.nan), held=True, stroke="dotted", group="cost f"),
+        ),
         levels=(Level(label="the hand closes", value=1e6 * closes),),
     )
 

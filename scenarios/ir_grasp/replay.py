@@ -9,7 +9,13 @@ from handover.plants.ir_grasp.hand import FINGERS, PALM, finger_points, sensor_r
 from handover.plants.ir_grasp.objects import outlines
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, merged, prism
 from handover.scenarios.ir_grasp.parameters import Parameters
-from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES, PALM_COLOUR, THING_COLOUR
+from handover.scenarios.ir_grasp.plots import (
+    FINGER_COLOURS,
+    FINGER_NAMES,
+    PALM_COLOUR,
+    THING_COLOUR,
+    phases_of_grasp,
+)
 
 _BEAM = "#8357a8"
 _HEIGHT, _PALM_LOW, _PALM_HIGH, _THING_HIGH = 0.025, 0.012, 0.038, 0.055
@@ -27,7 +33,7 @@ def replay_grasp(parameters: Parameters, record: Record) -> Replay:
         ],
         lines=[*fingers, *beams],
         eye=(-0.35, -0.7, 1.35),
-        phases="reflex.phase",
+        phases=phases_of_grasp(record),
         notes=("The scene is planar; heights above the table are for display only. Beams end at what they meet.",),
     )
 

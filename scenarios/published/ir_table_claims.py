@@ -202,12 +202,9 @@ def _within_runs(runs: IrTableRuns) -> Claim:
 def _centred(runs: IrTableRuns) -> Claim:
     """Judge that thumb and ring end about as far from the object."""
     printed = [abs(thumb - ring) for p in POSES for thumb, ring in _by_object(runs, p)]
-    unlike = np.concatenate(
-        [
-            np.abs(runs.metric("final_distance_thumb", REFLEX, p) - runs.metric("final_distance_ring", REFLEX, p))
-            for p in POSES
-        ]
-    )
+    names = [f"final_distance_{finger}" for finger in _IN_COST]
+    unlike = np.concatenate([np.abs(np.subtract(*runs.together(names, REFLEX, p))) for p in POSES])
+    unlike = unlike[np.isfinite(unlike)]  # of the runs in which both see the object
     sentence = "Thumb and ring are well centred with respect to the object."
     apart, where, interval = f"{_span(printed)} apart", "table II, sec. V-D", time_interval(unlike)
     if interval is None:
@@ -228,8 +225,11 @@ def _centred(runs: IrTableRuns) -> Claim:
 def _index_further(runs: IrTableRuns) -> Claim:
     further: list[bool] = []
     for perturbed in POSES:
-        index, *others = (runs.metric(f"final_distance_{f}", REFLEX, perturbed) for f in ("index", *_IN_COST))
-        further += (index > np.maximum(*others)).tolist()
+        names = [f"final_distance_{finger}" for finger in ("index", *_IN_COST)]
+        index, *others = runs.together(names, REFLEX, perturbed)
+        farthest = np.maximum(*others)
+        seen = np.isfinite(farthest)  # an index that sees nothing is further than fingers that see the object
+        further += (np.isnan(index[seen]) | (index[seen] > farthest[seen])).tolist()
     interval = success_interval(sum(further), len(further)) if further else None
     return Claim(
         claim="The index is always further from the object than thumb and ring, in most of the tasks.",

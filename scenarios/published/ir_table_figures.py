@@ -78,8 +78,8 @@ def _distances(runs: IrTableRuns, folder: Path) -> Figure:
         _legend(panels[0])
     caption = (
         "Distances between fingertips and object at the last step of the IR-guided grasp: points are our runs, as the "
-        "sensors measure them (65 mm: sees nothing), squares the figures of [Luberto] table II. Thumb and ring enter "
-        "the cost; their target of 10 mm was taken from the table's nominal poses."
+        "sensors measure them (none where a finger sees nothing), squares the figures of [Luberto] table II. Thumb and "
+        "ring enter the cost; their target of 10 mm was taken from the table's nominal poses."
     )
     return Figure("final_distances", caption)
 

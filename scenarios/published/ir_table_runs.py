@@ -106,6 +106,11 @@ class IrTableRuns:
         values = [row[name] for row in self.rows(arm, perturbed, things)]
         return np.array([v for v in values if v is not None and not math.isnan(v)], dtype=np.float64)
 
+    def together(self, names: Sequence[str], arm: Arm, perturbed: bool) -> NDArray[np.float64]:
+        """Return metrics of the same runs, shape (metrics, runs), NaN where a run has none."""
+        rows = self.rows(arm, perturbed)
+        return np.array([[math.nan if row[n] is None else row[n] for row in rows] for n in names], dtype=np.float64)
+
     def rows(self, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(Thing)) -> list[dict[str, Any]]:
         """Return the rows of runs of an arm in a pose that came to their end."""
         names = [thing.name.lower() for thing in things]

@@ -137,7 +137,6 @@ def _distances(runs: IrTableRuns, perturbed: bool) -> ComparisonTable:
         title=f"Table II, {POSES[perturbed]} poses: distances at the last step (mm)",
         header=header,
         rows=rows,
-        note="Ours: medians of the IR-guided runs with bootstrapped intervals, 95 %, as the sensors measure them; "
-        "65 mm stands for a finger that sees nothing. Thumb and ring enter the cost. The poses of an object are "
-        "taken together.",
+        note="Ours: medians of the IR-guided runs in which the finger sees the object, with bootstrapped intervals, "
+        "95 %, as the sensors measure them. Thumb and ring enter the cost. The poses of an object are taken together.",
     )

@@ -54,9 +54,7 @@ def rows_table(
     sortable: bool = False,
     cards: bool = False,
 ) -> Markup:
-    """Return a table as HTML, which scrolls within itself where a page is narrow.
-
-    A sortable table may be wider than the page's text, as wide as the window.
+    """Return a table as HTML: as wide as the page's text at most, and scrolls within itself where it needs more.
 
     Args:
         header: names of the columns.
@@ -76,9 +74,8 @@ def rows_table(
     attributes = [kind + label for kind, label in zip(kinds, labels, strict=True)]
     body = Markup("\n").join(Markup("<tr>{}</tr>").format(_cells(row, attributes)) for row in rows)
     return Markup(
-        "<div class='scroll{}'><table{}>{}<thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table></div>"
+        "<div class='scroll'><table{}>{}<thead><tr>{}</tr></thead><tbody>\n{}\n</tbody></table></div>"
     ).format(
-        " broad" if sortable else "",
         Markup(" class='sortable'") if sortable else Markup(" class='cards'") if cards else Markup(),
         Markup("<caption>{}</caption>").format(caption) if caption else Markup(),
         heads,

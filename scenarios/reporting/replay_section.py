@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.replay import Body, Line, Replay
+from handover.scenarios.experiment.time_plot import Phase, phases_of
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import Section, asset
 
@@ -32,15 +33,11 @@ def frame_rows(time: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.unique([0, *nearest.tolist(), last]).astype(np.int64)
 
 
-def phase_changes(record: Record, signal: str) -> list[tuple[float, str]]:
+def phase_changes(record: Record, phases: str | Sequence[Phase]) -> list[tuple[float, str]]:
     """Return when each phase begins, s, and its name in words; nothing for the signal ""."""
-    if not signal:
-        return []
-    values, names = record[signal], record.items(signal)
-    begins = np.append(0, np.flatnonzero(np.diff(values)) + 1)
-    return [
-        (float(record.time[k]), names.get(int(values[k]), str(values[k])).replace("_", " ").lower()) for k in begins
-    ]
+    if isinstance(phases, str):
+        phases = phases_of(record, phases) if phases else ()
+    return [(p.begin, p.name) for p in phases]
 
 
 _MARGIN = 0.04
@@ -160,11 +157,18 @@ def _corners(drawn: Drawn) -> tuple[Floats, Floats]:
     return shown.min(axis=0), shown.max(axis=0)
 
 
+def _chip(drawn: Sequence[Drawn], label: str) -> str:
+    """Return the background of a legend's chip: stripes of all colours that its label has in the scene."""
+    colours = list(dict.fromkeys(d.colour for d in drawn if d.label == label))
+    ends = [f"{100 * k / len(colours):.4g}% {100 * (k + 1) / len(colours):.4g}%" for k in range(len(colours))]
+    stripes = ", ".join(f"{colour} {end}" for colour, end in zip(colours, ends, strict=True))
+    return colours[0] if len(colours) == 1 else f"linear-gradient(90deg, {stripes})"
+
+
 def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str]) -> Markup:
-    colours = {d.label: d.colour for d in reversed(drawn)}  # of the first that has the label
     chips = [
         f'<button type="button" aria-pressed="true" data-label="{escape(name)}">'
-        f'<i style="background: {escape(colours[name])}"></i>{escape(name)}</button>'
+        f'<i style="background: {escape(_chip(drawn, name))}"></i>{escape(name)}</button>'
         for name in dict.fromkeys(d.label for d in drawn)
     ]
     speeds = [f'<option value="{s}"{" selected" if s == "1" else ""}>{s}&times;</option>' for s in _SPEEDS]

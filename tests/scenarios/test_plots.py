@@ -62,7 +62,7 @@ def check(plots: list[TimePlot], record: Record) -> None:
 @pytest.mark.parametrize("name", FAST)
 def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: dict[str, Run]):
     done = runs[name]
-    assert 3 <= len(done.plots) <= 11
+    assert 3 <= len(done.plots) <= 15
     check(list(done.plots.values()), done.record)
     assert all(any(np.isfinite(c.values).any() for c in p.curves) for p in done.plots.values())
 
@@ -113,21 +113,38 @@ def test_fingers_that_see_nothing_are_not_drawn(runs: dict[str, Run]):
         seen = done.curve(title, f"{finger}, as seen").values
         assert np.array_equal(np.isnan(seen), done.record["reflex.distance"][:, i] >= 0.065)
     assert done.plots["Cost of thumb and ring, [Luberto] eq. (4)"].logarithmic
-    assert min(done.curve("Cost of thumb and ring, [Luberto] eq. (4)", "cost f").values) > 0.0
+
+
+def test_a_cost_is_drawn_as_measured_only_while_thumb_and_ring_see(runs: dict[str, Run]):
+    done = runs["ir_grasp"]
+    title = "Cost of thumb and ring, [Luberto] eq. (4)"
+    measured, partly = done.plots[title].curves
+    seeing = (done.record["reflex.distance"][:, [0, 2]] < 0.065).sum(axis=1)
+    assert {0, 1, 2} == set(seeing.tolist())
+    assert np.array_equal(np.isfinite(measured.values), seeing == 2)
+    assert np.array_equal(np.isfinite(partly.values), seeing == 1)
+    assert partly.stroke == "dotted"
+    assert "sees nothing" in partly.label
+    assert np.nanmin(measured.values) > 0.0
+    assert np.nanmax(partly.values) < 3025.0
 
 
 def test_commands_far_beyond_the_thrusters_run_out_of_the_axes(runs: dict[str, Run]):
     done = runs["flyer_robot_to_human"]
-    force = done.plots["Force of the thrusters in B"]
-    commanded = done.curve(force.title, "x, commanded").values
+    plots = [done.plots[f"Force of the thrusters along {axis} of B"] for axis in "xyz"]
+    commanded = done.curve(plots[0].title, "commanded").values
     asked = done.record["impedance.f_cmd"] + done.record["pose.f_cmd"]
     assert commanded == pytest.approx(asked[:, 0])
-    low, high = force.limits
     given = float(np.abs(done.record["thrusters.f_B"]).max())
-    if np.abs(asked).max() > 2.0 * given:
-        assert (low, high) == (-2.0 * given, 2.0 * given)
-    else:
-        assert (low, high) == (None, None)
+    limit = min(1.1 * max(given, float(np.abs(asked).max())), 2.0 * given)
+    assert all(plot.limits == pytest.approx((-limit, limit)) for plot in plots)
+
+
+def test_no_plot_of_a_push_has_more_than_three_curves(runs: dict[str, Run]):
+    plots = runs["flyer_impedance"].plots.values()
+    assert max(len(plot.curves) for plot in plots) == 3
+    noisy = [plot for plot in plots if plot.title.startswith(("Force of", "Torque of"))]
+    assert [[c.label for c in plot.curves] for plot in noisy] == [["given", "commanded"]] * 6
 
 
 @pytest.mark.parametrize("name", FAST)

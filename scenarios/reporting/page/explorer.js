@@ -3,6 +3,7 @@
 "use strict";
 (() => {
   const MOST_AXES = 6, HEIGHT = 230;
+  const STROKES = ["solid", "dash", "dot"];  // of an array's elements: what coincides is seen
   const root = document.querySelector(".explorer");
   if (!root) return;
   const {span, signals} = page.data(root);
@@ -49,12 +50,15 @@
     };
     if (rows.length > 1) layout.xaxis.anchor = `y${rows.length}`;
     const data = [];
-    let colour = 0;
+    let colour = 0, of = 0;
     rows.forEach((row, k) => {
       const n = k ? k + 1 : "";
       layout[`yaxis${n}`] = axisOf(row, k, rows.length);
       for (const s of row.signals)
-        for (const c of s.columns) data.push(traceOf(s, c, `y${n}`, `var(--c${colour++ % 9})`));
+        s.columns.forEach((c, i) => {
+          if (s.columns.length <= 3 || i % 3 === 0) of = colour++ % 9;  // of many elements three have one, as in plots
+          data.push(traceOf(s, c, `y${n}`, `var(--c${of})`, STROKES[i % 3]));
+        });
     });
     return {data, layout};
   }
@@ -74,13 +78,13 @@
 
   const tidy = name => name.toLowerCase().replaceAll("_", " ");
 
-  function traceOf(s, c, yaxis, color) {
+  function traceOf(s, c, yaxis, color, dash) {
     const constant = !("t" in c);
     const x = constant ? span : floats(c.t), y = constant ? [c.value, c.value] : floats(c.y);
     const named = Object.keys(s.items).length > 0;
     const trace = {
       type: "scatter", mode: "lines", x, y, yaxis, name: s.name + (c.of ? `[${c.of}]` : ""),
-      line: {shape: constant || c.held ? "hv" : "linear", width: 1.6, color},
+      line: {shape: constant || c.held ? "hv" : "linear", width: 1.6, color, dash},
       hovertemplate: named ? "%{text}" : `%{y:.5~g}${s.unit ? " " + s.unit : ""}`,
     };
     if (named) trace.text = Array.from(y, v => tidy(s.items[v] ?? String(v)));

@@ -1,4 +1,5 @@
-// Shades the phases of time plots and names them: `layout.meta.phases` is a list of {from, to, name}.
+// Shades the phases of time plots and names them: `layout.meta.phases` is a list of {from, to, name}. Names are level
+// where they fit; a name that fits nowhere stands once, upright, over its longest phase (as in plotting.py).
 "use strict";
 (() => {
   const LETTER = 6.6, UPRIGHT = 15, MARGINS = 70, BUTTONS = 150, HIGH = 22;  // px
@@ -11,18 +12,39 @@
     const spans = phases.filter(p => p.to > low && p.from < high);
     layout.shapes = [...(layout.shapes ?? []), ...phases.flatMap((p, k) => k % 2 ? [shade(p)] : [])];
     let up = 0, right = 0;  // px that the longest upright name takes, and from the left how far names reach
-    layout.annotations = [...(layout.annotations ?? []), ...spans.flatMap(p => {
-      const from = Math.max(p.from, low), to = Math.min(p.to, high), wide = (to - from) * pixels;
-      const middle = ((from + to) / 2 - low) * pixels, level = wide > LETTER * p.name.length + 6;
-      if (!level && wide < UPRIGHT) return [];
-      right = Math.max(right, middle + (level ? LETTER * p.name.length : UPRIGHT) / 2);
-      if (level) return [name(p, (from + to) / 2, 0)];
-      up = Math.max(up, LETTER * p.name.length - 14);
-      return [name(p, (from + to) / 2, -90)];
-    })];
+    const {level, upright} = named(spans, low, high, pixels);
+    const put = (p, angle, wide) => {
+      right = Math.max(right, p.middle * pixels + wide / 2);
+      return name(p, low + p.middle, angle);
+    };
+    layout.annotations = [
+      ...(layout.annotations ?? []),
+      ...level.map(p => put(p, 0, LETTER * p.name.length)),
+      ...upright.map(p => {
+        up = Math.max(up, LETTER * p.name.length - 14);
+        return put(p, -90, UPRIGHT);
+      }),
+    ];
     if (right > (high - low) * pixels - BUTTONS) up += HIGH;  // Plotly's buttons come over what stands there
     layout.margin = {...layout.margin, t: 30 + up};
     div.dataset.more = up;
+  }
+
+  // Returns the phases that are named level and upright, each with its middle, s after `low`. Where upright names would
+  // lie over each other, the longer phase keeps its own.
+  function named(spans, low, high, pixels) {
+    const seen = spans.filter(p => p.name).map(p => {
+      const from = Math.max(p.from, low), to = Math.min(p.to, high);
+      return {name: p.name, middle: (from + to) / 2 - low, long: to - from};
+    });
+    const level = seen.filter(p => p.long * pixels > LETTER * p.name.length + 6);
+    const written = new Set(level.map(p => p.name)), upright = [];
+    for (const p of seen.sort((a, b) => b.long - a.long)) {
+      if (written.has(p.name)) continue;
+      written.add(p.name);
+      if (upright.every(other => Math.abs(other.middle - p.middle) * pixels >= UPRIGHT)) upright.push(p);
+    }
+    return {level, upright};
   }
 
   function shade(p) {

@@ -2,16 +2,20 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pytest
-from campaigns import campaign_metadata, folder_of, table_of
+from campaigns import campaign_metadata, folder_of, results_of, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
+from handover.scenarios.campaign_report.point_layout import layout_of
+from handover.scenarios.campaign_report.spread_section import spread_section
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.results.run_folder import InvalidRunFolder
 
@@ -127,3 +131,28 @@ def test_of_a_damaged_folder_nothing_is_written(tmp_path: Path, file: str, conte
     with pytest.raises(InvalidRunFolder, match=fault):
         write_campaign_page(folder)
     assert not folder.report.exists()
+
+
+def test_numbers_of_a_column_have_one_precision(tmp_path: Path):
+    table = table_of(POINTS, final_distance_thumb=[0.04068, 0.04068, 0.00005991, 0.00005991])
+    page = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
+    for anchor in ("points", "runs"):
+        part = page.partition(f'id="{anchor}"')[2].partition("</section>")[0]
+        assert ">40.68<" in part
+        assert ">0.06<" in part
+        assert "0.05991" not in part.replace("data-key='5.991e-05'", "")
+
+
+def test_few_runs_are_points_and_many_have_a_box_too():
+    for repetitions, boxed in ((5, False), (12, True)):
+        values = np.linspace(0.01, 0.02, 2 * repetitions).tolist()
+        results = results_of("ir_grasp", POINTS, repetitions, final_distance_thumb=values)
+        section = spread_section(results, layout_of(results))
+        assert section is not None
+        assert ("Boxes" in section.html) is boxed
+        drawn = re.search(r'<script type="application/json">(.*?)</script>', section.html, re.DOTALL)
+        assert drawn is not None
+        (box, *strips) = json.loads(drawn[1])["data"]
+        assert box["type"] == "box"
+        assert all((median is not None) is boxed for median in box["median"])
+        assert sum(len(strip["x"]) for strip in strips) == 2 * repetitions

@@ -76,3 +76,15 @@ def test_pages_of_runs_are_linked_where_they_are(campaign: CampaignFolder, tmp_p
     (campaign.runs / name / "report.html").touch()
     write_campaign_page(campaign, page)
     assert f"<a href='runs/{name.replace('=', '%3D')}/report.html'>" in page.read_text(encoding="utf-8")
+
+
+def test_tables_are_no_wider_than_the_text(browser: Browser, campaign: CampaignFolder):
+    with opened(browser, campaign.report, width=1600) as page:
+        beyond = page.evaluate(
+            """[...document.querySelectorAll(".scroll")].map(table => {
+                const [inner, outer] = [table, document.querySelector("main")].map(e => e.getBoundingClientRect());
+                return Math.max(outer.left - inner.left, inner.right - outer.right);
+            })"""
+        )
+        assert len(beyond) >= 4
+        assert max(beyond) < 1.0

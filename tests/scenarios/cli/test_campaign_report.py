@@ -2,12 +2,14 @@
 
 import os
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
-from campaigns import campaign_metadata, folder_of, table_of
+from campaigns import campaign_metadata, carried_out, folder_of, table_of
 from click.testing import CliRunner
 
 from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.cli.command import main
 
 POINTS = [{"strategy": "reflex"}, {"strategy": "blind"}]
@@ -35,3 +37,20 @@ def test_figures_are_drawn_if_they_are_asked_for(campaign: CampaignFolder):
     assert not campaign.figures.exists()
     assert report(campaign.path, "--figures")[0] == 0
     assert {p.name for p in campaign.figures.iterdir()} == {"success_by_point.png", "success_by_point.svg"}
+
+
+def test_pages_of_the_runs_are_written_and_linked_if_they_are_asked_for(tmp_path: Path):
+    plan = CampaignPlan(scenario="ir_grasp", points=[{"strategy": "blind"}], repetitions=2)
+    lost = "000_strategy=blind_r0001"
+    campaign = carried_out(plan, tmp_path / "c", lost=[lost])
+    assert report(campaign.path)[0] == 0
+    assert "handover report c --runs" in campaign.report.read_text(encoding="utf-8")
+    assert report(campaign.path, "--runs") == (0, f"report: {campaign.report}\n")
+    run = campaign.runs / "000_strategy=blind_r0000"
+    assert "ir_grasp: " in (run / "report.html").read_text(encoding="utf-8")
+    page = campaign.report.read_text(encoding="utf-8")
+    assert f"<a href='runs/{quote(run.name)}/report.html'>" in page
+    assert quote(lost) not in page
+    status, told = report(run, "--runs")
+    assert (status, told.count("\n")) == (2, 1)
+    assert "--runs is for that of a campaign" in told

@@ -21,8 +21,12 @@ def signals(
     touching: int = 3,
     p_WH: float = -0.1,
     index: tuple[float, float] = (0.05, 0.05),
+    thumb: float = 0.01,
 ) -> Signals:
-    """Return what a hand along x, and an object at a place in its frame, would show; the index: as seen, and truly."""
+    """Return what a hand along x, and an object at a place in its frame, would show.
+
+    The index's distances are as seen, and true; the thumb's is as seen.
+    """
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {"scene": {}, "reflex": {}}
     ports: dict[str, dict[str, FmuPort]] = {"scene": {}, "reflex": {}}
 
@@ -38,7 +42,7 @@ def signals(
         show("scene", name, Kind.REAL, value)
     show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
     show("scene", "touching", Kind.INTEGER, touching)
-    for name, value in (("distance", [0.01, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
+    for name, value in (("distance", [thumb, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
         show("reflex", name, Kind.REAL, value)
     show("reflex", "p_WH_cmd", Kind.REAL, [p_WH, 0.0])
     show("reflex", "steps", Kind.INTEGER, 4)
@@ -101,6 +105,21 @@ def test_a_finger_that_sees_nothing_is_distinguished_from_one_at_the_end_of_its_
     assert stop_reasons(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
     assert stop_reasons(0.06, 0.07)[0].endswith("by [Luberto] eq. (11)")
     assert stop_reasons(0.06, 0.07)[1].endswith("along the beam")
+
+
+def test_what_a_finger_does_not_see_is_no_number():
+    def at_closing(seen: float, true: float, thumb: float = 0.01) -> dict[str, float]:
+        closing = signals(Phase.CLOSE, index=(seen, true), thumb=thumb)
+        metrics = follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics
+        return {name: metric.value for name, metric in metrics.items()}
+
+    seen = at_closing(0.06, 0.07)
+    assert (seen["final_distance_index"], seen["true_distance_index"]) == (0.06, 0.07)
+    assert seen["final_cost"] == 1e-5
+    unseen = at_closing(0.065, 0.2)
+    assert np.isnan([unseen["final_distance_index"], unseen["true_distance_index"]]).all()
+    assert unseen["final_cost"] == 1e-5  # the index is not in it
+    assert np.isnan(at_closing(0.06, 0.07, thumb=0.065)["final_cost"])
 
 
 def test_an_object_that_one_finger_pushes_along_is_not_held():

@@ -9,6 +9,8 @@ import pytest
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.reporting.replay_section import MAX_FRAMES, frame_rows, phase_changes
 
 
@@ -34,3 +36,12 @@ def test_phases_are_reported_when_they_begin(tmp_path: Path):
     record = Record(tmp_path / "s")
     assert phase_changes(record, "servo.phase") == [(0.0, "wait"), (2.0, "given up")]
     assert phase_changes(record, "") == []
+
+
+def test_a_replay_takes_the_phases_of_the_plots(grasp: Path):
+    record = Record(grasp / "signals.parquet")
+    replay = IrGrasp().replay(Parameters(), record)
+    names = {name for _, name in phase_changes(record, replay.phases)}
+    plotted = {p.name for plot in IrGrasp().plots(Parameters(), record) for p in plot.phases}
+    assert names == plotted
+    assert {"check", "probe", "close", "done"} <= names

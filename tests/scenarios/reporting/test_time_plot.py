@@ -110,3 +110,20 @@ def test_of_many_short_phases_the_names_that_fit_are_written(tmp_path: Path):
         places = [float(name.xy[0]) + float(name.get_position()[0]) * 10.0 / 480.0 for name in names]
         assert 0.0 <= min(places) <= max(places) <= 10.0
         assert min(b - a for a, b in pairwise(places)) >= 8.4 * 10.0 / 480.0
+
+
+def test_a_name_that_fits_over_one_phase_is_not_repeated_upright_over_short_ones(tmp_path: Path):
+    edges = [0.0, 20.0, 20.5, 40.0, 40.5, 59.0, 59.5, 60.0]
+    phases = phases_at(edges, ["check", "probe", "check", "probe", "check", "step", "probe"])
+    with figure(tmp_path / "phases", 1) as (axes,):
+        axes.set_xlim(0.0, 60.0)
+        name_phases(axes, phases, 60.0 / 500.0)
+        upright = [text for text in axes.texts if isinstance(text, Annotation)]
+        assert sorted(text.get_text() for text in upright) == ["probe", "step"]
+        assert [text.get_text() for text in axes.texts if text not in upright] == ["check"] * 3
+
+
+def test_a_signal_of_which_nothing_is_known_has_no_phases(tmp_path: Path):
+    table = pa.table({"time": np.arange(3.0), "servo.phase": np.full(3, np.nan)})
+    pq.write_table(table, tmp_path / "s.parquet")
+    assert phases_of(Record(tmp_path / "s.parquet"), "servo.phase") == ()

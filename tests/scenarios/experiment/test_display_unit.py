@@ -1,0 +1,45 @@
+"""Values as one reads them: in a fitting unit, with as many digits as mean something."""
+
+import math
+
+import pytest
+
+from handover.scenarios.experiment.display_unit import digits_after_point, display_unit
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (2.661, "rad/s", "2.661 rad/s"),
+        (math.radians(40.68), "rad", "40.68°"),
+        (math.radians(0.05991), "rad", "0.060°"),
+        (math.radians(0.0005991), "rad", "0.00060°"),
+        (0.0, "rad", "0°"),
+        (0.0123456, "m", "12.35 mm"),
+        (-0.0004343, "m", "-0.434 mm"),
+        (0.0, "s", "0 s"),
+        (0.0161, "s", "16.1 ms"),
+        (0.009961, "1", "0.009961"),
+        (0.06389, "m/s", "0.06389 m/s"),
+        (math.nan, "m", "–"),
+    ],
+)
+def test_a_value_is_reported_in_its_unit(value: float, unit: str, text: str):
+    assert display_unit(unit, value).text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("values", "digits"),
+    [
+        ([40.68, 0.05991], 2),
+        ([3025.0, 7.88], 0),
+        ([3025.0, 0.5], 1),
+        ([12.345, math.nan, 0.0], 2),
+        ([1e-4, 2e-4], 7),
+        ([5.0, 1e-9], 6),
+        ([math.nan], 0),
+        ([], 0),
+    ],
+)
+def test_numbers_of_a_column_have_the_same_digits_after_the_point(values: list[float], digits: int):
+    assert digits_after_point(values) == digits
