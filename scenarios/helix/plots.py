@@ -60,8 +60,12 @@ def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigu
 
 
 def _known(record: Record, values: Floats) -> Floats:
-    """Return values of the controller, NaN before it has seen ball and arm, when they are meaningless."""
-    return np.where(record["servo.phase"] > 0, values, np.nan)
+    """Return values of the controller, NaN before it has seen ball and arm, when they are meaningless.
+
+    Those of a controller without phases are all kept.
+    """
+    waits = record["servo.phase"] <= 0
+    return np.where(waits, np.nan, values)
 
 
 def _distance(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> TimePlot:

@@ -126,10 +126,10 @@ def _forearm(record: Record) -> list[Line]:
 
 def _estimates(record: Record) -> list[Line]:
     """Return the controller's estimates of ball and gripper, from when it has them."""
-    known = (record["servo.phase"] > 0)[:, None]
+    waits = (record["servo.phase"] <= 0)[:, None]
     named = (("ball, estimated", "servo.p_WO_est"), ("gripper, estimated", "servo.p_WG_est"))
     return [
-        Line(label=label, colour=_ESTIMATE, points=np.where(known, record[signal], np.nan)[:, None], width=5.0)
+        Line(label=label, colour=_ESTIMATE, points=np.where(waits, np.nan, record[signal])[:, None], width=5.0)
         for label, signal in named
     ]
 

@@ -16,6 +16,7 @@ from handover.scenarios.experiment.experiment import Evaluator, Experiment, Figu
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.experiment.plotting import draw_time_figures
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, TimePlot
+from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported
@@ -34,14 +35,16 @@ def draw_figures(
     What cannot be drawn is noted in `faults`; the other figures are drawn.
     """
     drawn: list[Figure] = []
+    record = LackingRecord(record, experiment.units)
     with faults.tolerated("the figures of the scene could not be drawn"):
         drawn += experiment.draw(parameters, evaluator, record, folder)
     figures: Sequence[TimeFigure] = ()
     with faults.tolerated("the figures over time could not be drawn"):
-        figures = experiment.time_figures(parameters, record)
+        figures = record.drawable(experiment.time_figures(parameters, record))
     for spec in figures:
         with faults.tolerated(f"figure {spec.name} could not be drawn"):
             drawn += draw_time_figures([spec], record.time, folder)
+    faults.lines += record.lines
     return drawn
 
 
@@ -78,7 +81,7 @@ def _draw_record(facts: RunFacts, record: Record, to: Path, faults: ToleratedFau
         parameters = parameters_of(type(experiment), facts.run["parameters"])
         evaluator = experiment.evaluator_of_record(parameters, read_picture_files(facts.folder.pictures))
         with faults.tolerated("the record could not be evaluated again"):
-            _evaluate(record, evaluator)
+            _evaluate(LackingRecord(record, experiment.units), evaluator)
         draw_figures(experiment, parameters, evaluator, record, to, faults)
     except (InvalidParameter, KeyError) as e:
         raise InvalidRunFolder(

@@ -20,6 +20,7 @@ from handover.scenarios.reporting.page import Section, template, write_page
 from handover.scenarios.reporting.pictures_section import pictures_section
 from handover.scenarios.reporting.replay_section import replay_section
 from handover.scenarios.reporting.time_plots import explorer_section, time_plots_section
+from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import format_conversion, format_metric, master_rows
@@ -62,19 +63,22 @@ def _sections_of_scenario(facts: RunFacts, record: Record | None, faults: Tolera
     if experiment is None or record is None:
         return ()
     guarded = ToleratedFaults(InvalidParameter, KeyError)
+    record = LackingRecord(record, experiment.units)
     sections: list[Section | None] = []
     try:
         parameters: Any = parameters_of(type(experiment), facts.run["parameters"])
         with guarded.tolerated("the plots over time could not be drawn"):
-            sections.append(time_plots_section(experiment.plots(parameters, record), record.time))
+            plots = record.drawable_plots(experiment.plots(parameters, record))
+            sections.append(time_plots_section(plots, record.time))
         with guarded.tolerated("the replay could not be drawn"):
             replay = experiment.replay(parameters, record)
-            sections.append(None if replay is None else replay_section(replay, record))
+            shown = None if replay is None else record.drawable_replay(replay)
+            sections.append(None if shown is None else replay_section(shown, record))
     except (InvalidParameter, KeyError) as e:
         why = e.args[0] if e.args else e
         html = Markup("<p>The run is of another version of {}, so its plots and its replay are left out: {}.</p>")
         return [Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))]
-    faults.lines += guarded.lines
+    faults.lines += [*guarded.lines, *record.lines]
     return sections
 
 

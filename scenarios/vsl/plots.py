@@ -36,8 +36,9 @@ _FLAT = 1e-6
 
 def figures_of_path(parameters: Parameters, record: Record, *, hybrid: bool) -> list[TimeFigure]:
     """Return the figures of the tip's error and position, and of joints, currents and pressures."""
-    segments = int(np.max(record["planner.segment"]))
-    names = {0: "before", **{n: f"segment {n}" for n in range(1, segments + 1)}}
+    segment = record["planner.segment"]
+    segments = np.unique(segment[np.isfinite(segment)]).astype(int).tolist()
+    names = {n: f"segment {n}" if n else "before" for n in segments}
     phases = phases_of(record, "planner.segment", names)
     off_plane = bool(np.any(np.abs(record["planner.p_WG_goal"][:, 1]) > _FLAT))
     return [

@@ -1,0 +1,169 @@
+"""A controller with fewer outputs than the scenario's own leaves out what shows them, with a line, and nothing else."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from flyer_runs import run
+
+from handover.cosim.record.reader import Record
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters
+from handover.scenarios.reporting.run_figures import draw_figures
+from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.results import run_facts
+from handover.scenarios.results.lacking_record import LackingRecord
+from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
+
+FAST = {
+    "ir_grasp": ((), "reflex", "Wrist along x of W", "measured", "palm"),
+    "helix_handover": (("patience=1",), "servo", "Tendon forces", "segment 1, 0°", "arm"),
+    "vsl_hybrid": (("points=3", "settle=1", "speed=0.5"), "planner", "Servos' currents", "J1", "arm"),
+    "flyer_robot_to_human": (("patience=1",), "decision", "Roll of gripper, hand and object in W", "hand", "robot"),
+    "flyer_impedance": ((), "impedance", "Force of the thrusters along x of B", "given", "robot"),
+}
+"""Parameters, the unit whose outputs are taken away, a plot and its curve that stay, and a body that stays."""
+
+
+@pytest.fixture(scope="module", params=FAST)
+def lacking(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """Return a run whose controller has recorded nothing."""
+    name: str = request.param
+    given, unit, *_ = FAST[name]
+    folder = tmp_path_factory.mktemp("runs") / name
+    run(SCENARIOS[name], folder, *given)
+    table = pq.read_table(folder / "signals.parquet")
+    pq.write_table(
+        table.select([c for c in table.column_names if not c.startswith(f"{unit}.")]), folder / "signals.parquet"
+    )
+    return name, folder
+
+
+def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(lacking: tuple[str, Path]):
+    name, folder = lacking
+    given, unit, title, label, body = FAST[name]
+    experiment, parameters = SCENARIOS[name](), parse_parameters(SCENARIOS[name], given)
+    record = LackingRecord(Record(folder / "signals.parquet"), experiment.units)
+    plots = {p.title: p for p in record.drawable_plots(experiment.plots(parameters, record))}
+    assert label in [c.label for c in plots[title].curves]
+    assert all(np.isfinite(c.values).any() for p in plots.values() for c in p.curves)
+    replay = experiment.replay(parameters, record)
+    assert replay is not None
+    shown = record.drawable_replay(replay)
+    assert shown is not None
+    assert body in [d.label for d in (*shown.bodies, *shown.lines)]
+    (line,) = record.lines
+    assert f"{unit}." in line
+
+
+def test_page_and_figures_say_in_a_line_what_is_left_out(lacking: tuple[str, Path]):
+    name, folder = lacking
+    given, unit, title, *_ = FAST[name]
+    run_folder, experiment = RunFolder.of_run(folder), SCENARIOS[name]()
+    (line,) = write_run_page(run_folder)
+    assert line.startswith(f"what is drawn from {unit}.")
+    page = run_folder.report.read_text(encoding="utf-8")
+    assert page.count("Left out: ") == 1
+    assert title.replace("'", "&#39;") in page
+    assert all(f'id="{anchor}"' in page for anchor in ("time", "replay", "signals"))
+    (folder / "figures").mkdir()
+    faults, parameters = ToleratedFaults(), parse_parameters(SCENARIOS[name], given)
+    evaluator = experiment.evaluator(parameters)
+    draw_figures(experiment, parameters, evaluator, Record(folder / "signals.parquet"), folder / "figures", faults)
+    assert [said for said in faults.lines if "what is drawn from" in said]
+    assert len(list((folder / "figures").glob("*.png"))) >= 1
+
+
+def test_curves_keep_their_colours_where_others_are_left_out(tmp_path: Path):
+    run(FlyerImpedance, tmp_path / "r")
+    whole = Record(tmp_path / "r" / "signals.parquet")
+    table = pq.read_table(tmp_path / "r" / "signals.parquet")
+    kept = [c for c in table.column_names if not c.startswith("thrusters.")]
+    pq.write_table(table.select(kept), tmp_path / "less.parquet")
+    record = LackingRecord(Record(tmp_path / "less.parquet"), FlyerImpedance.units)
+    parameters = ImpedanceParameters()
+    before = {p.title: p for p in FlyerImpedance().plots(parameters, whole)}
+    after = record.drawable_plots(FlyerImpedance().plots(parameters, record))
+    assert record.lacking == ["thrusters.f_B", "thrusters.tau_B"]
+    for plot in after:
+        colours = dict(zip((c.label for c in before[plot.title].curves), before[plot.title].colours, strict=True))
+        assert [colours[c.label] for c in plot.curves] == list(plot.colours)
+    assert [c.label for p in after if p.title.startswith("Force") for c in p.curves] == ["commanded"] * 3
+
+
+def test_a_signal_that_no_unit_of_the_scenario_has_is_an_error(tmp_path: Path):
+    pq.write_table(pq.read_table(_one_row(tmp_path)), tmp_path / "s.parquet")
+    record = LackingRecord(Record(tmp_path / "s.parquet"), FlyerImpedance.units)
+    for signal in ("robot.speed_of_light", "nobody.p_WB"):
+        with pytest.raises(KeyError, match=signal):
+            record[signal]
+    assert record["robot.p_WB"].shape == (1, 3)
+    assert record.lacking == ["robot.p_WB"]
+
+
+def _one_row(folder: Path) -> Path:
+    import pyarrow as pa
+
+    pq.write_table(pa.table({"time": [0.0]}), folder / "one.parquet")
+    return folder / "one.parquet"
+
+
+class Bare(Experiment[Any]):
+    """A scenario of somebody else's with neither plots nor figures, replay nor published values."""
+
+    name: ClassVar[str] = "bare"
+    title: ClassVar[str] = "a push, and nothing to be seen"
+    parameters_type: ClassVar[type[Any]] = ImpedanceParameters
+    units = FlyerImpedance.units
+    headline: ClassVar[tuple[str, ...]] = ()
+
+    def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
+        return FlyerImpedance().build(parameters, seed, fmu)
+
+    def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
+        return Fraction(1, 2)
+
+    def evaluator(self, parameters: Any) -> Evaluator:
+        return Patient(parameters)
+
+    def cycle(self) -> tuple[str, ...]:
+        return ()
+
+
+class Patient(Evaluator):
+    """Waits for the end."""
+
+    def __init__(self, parameters: Any) -> None:
+        self.parameters = parameters
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        pass
+
+    @property
+    def over(self) -> bool:
+        return False
+
+    def outcome(self) -> Outcome:
+        return Outcome(success=True, reason="it is over")
+
+
+def test_a_scenario_without_plots_and_replay_has_a_page_without_these_sections(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(run_facts, "SCENARIOS", {"bare": Bare})
+    ended = run(Bare, tmp_path / "r", drawn=True)
+    assert ended.left_out == ()
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert "Left out" not in page
+    assert all(f'id="{anchor}"' in page for anchor in ("signals", "graph", "parameters", "files"))
+    assert not any(f'id="{anchor}"' in page for anchor in ("time", "replay", "published", "pictures"))
+    assert list((tmp_path / "r" / "figures").iterdir()) == []
