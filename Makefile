@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # A test file stays in one process: what its tests share is made once.
 PARALLEL := --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-slow paper lint bench install clean
+.PHONY: demo test test-slow paper lint bench pictures install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -29,6 +29,10 @@ lint: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m pytest tests --benchmark-enable --benchmark-only -s
+
+# The README's pictures; needs chromium, too.
+pictures: $(VENV)/.installed-test
+	$(BIN)/python docs/pictures.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 10) and 'Python 3.10 or newer is needed; this is ' + sys.version)"

@@ -3,7 +3,7 @@
 A point of many runs has a box too; of few, quartiles say less than the runs themselves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def _strips(results: CampaignResults, layout: PointLayout) -> list[Strip]:
 def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Strip]) -> list[dict[str, Any]]:
     """Return boxes by group, then strips, without their values."""
     along, across = ("y", "x") if layout.listed else ("x", "y")
-    boxes = [_box_trace(layout, group) for group in range(len(layout.group_names))]
+    boxes = [_box_trace(layout) for _ in layout.group_names]
     mixed = len({succeeded for _, succeeded, _, _ in strips}) > 1
     columns = [results.table.column(n) for n in ("run", "seed", "success")]
     traces: list[dict[str, Any]] = []
@@ -110,10 +110,9 @@ def _marker(colour: str, symbol: str) -> dict[str, Any]:
     return {"symbol": symbol, "size": 7, "color": colour, "opacity": 0.8, "line": line}
 
 
-def _box_trace(layout: PointLayout, group: int) -> dict[str, Any]:
+def _box_trace(layout: PointLayout) -> dict[str, Any]:
     return {
         "type": "box",
-        "y" if layout.listed else "x": [float(layout.places[k]) for k, g in enumerate(layout.groups) if g == group],
         "orientation": "h" if layout.listed else "v",
         "width": 0.75 * layout.room,
         "line": {"color": "var(--soft)", "width": 1.2},
@@ -129,9 +128,15 @@ def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Se
     unit = display_unit(results.table.unit(name), column)
     values = column * unit.factor
     across = "x" if layout.listed else "y"
-    boxes = [
-        _box([values[p.rows] for k, p in enumerate(results.points) if layout.groups[k] == group])
+    of_groups = [
+        [k for k, p in enumerate(results.points) if layout.groups[k] == group]
         for group in range(len(layout.group_names))
+    ]
+    boxes = [
+        _boxes(
+            {float(layout.places[k]): values[results.points[k].rows] for k in of_group}, "y" if layout.listed else "x"
+        )
+        for of_group in of_groups
     ]
     words = name.replace("_", " ")
     return {
@@ -142,14 +147,13 @@ def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Se
     }
 
 
-def _box(points: Sequence[Floats]) -> dict[str, Any]:
-    """Return what Plotly needs for a box at each point; None at those of few runs."""
+def _boxes(points: Mapping[float, Floats], along: str) -> dict[str, Any]:
+    """Return what Plotly needs for a box at each place where the runs are many."""
     shares = {"lowerfence": 0.0, "q1": 0.25, "median": 0.5, "q3": 0.75, "upperfence": 1.0}
-    kept = [x[np.isfinite(x)] for x in points]
-    return {
-        n: _plain([np.quantile(x, share) if len(x) >= _MIN_BOXED else np.nan for x in kept])
-        for n, share in shares.items()
-    }
+    kept = {place: x[np.isfinite(x)] for place, x in points.items()}
+    many = {place: x for place, x in kept.items() if len(x) >= _MIN_BOXED}
+    quantiles = {n: _plain([np.quantile(x, share) for x in many.values()]) for n, share in shares.items()}
+    return {along: list(many), **quantiles}
 
 
 def _plain(values: Any) -> list[float | None]:

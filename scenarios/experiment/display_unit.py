@@ -41,14 +41,14 @@ class DisplayUnit:
 def digits_after_point(values: ArrayLike) -> int:
     """Return with how many digits after the point to show all numbers of a column: the largest has four digits.
 
-    The smallest that is not zero keeps one, unless that takes more than six after the point.
+    It has five if the smallest that is not zero has less than two else. Whole numbers have none.
     """
     magnitudes = np.abs(np.asarray(values, dtype=np.float64))
     shown = magnitudes[np.isfinite(magnitudes) & (magnitudes > 0.0)]
-    if not shown.size:
+    if not shown.size or bool((shown == np.rint(shown)).all()):
         return 0
     largest, smallest = (math.floor(math.log10(float(x))) for x in (shown.max(), shown.min()))
-    return max(0, 3 - largest, min(-smallest, 6))
+    return max(0, 3 - largest, min(1 - smallest, 4 - largest))
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:

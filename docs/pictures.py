@@ -1,0 +1,102 @@
+"""Makes the README's pictures anew, of runs of today: `make pictures`. Needs what the tests need, and chromium.
+
+Whoever changes what a figure or the report looks like runs it, looks at the pictures, and commits them.
+"""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, sync_playwright
+
+DOCS = Path(__file__).parent
+
+FIGURES: Mapping[str, tuple[str, str]] = {
+    "helix_handover.jpg": ("helix_handover", "pictures"),
+    "vsl_hybrid.png": ("vsl_hybrid", "shape"),
+    "flyer_robot_to_human.png": ("flyer_robot_to_human", "scene"),
+    "ir_grasp.png": ("ir_grasp", "scene"),
+}
+"""Scenario and figure that a picture shows; the first seed's run, with the scenario's defaults."""
+REPORT = "report.jpg"
+"""The report page of `helix_handover`, on a desk and on a phone."""
+
+Pixels = NDArray[np.uint8]
+
+_JPEG = (cv2.IMWRITE_JPEG_QUALITY, 90)
+_WIDTH, _HEIGHT = 1400, 1350
+"""Width of the picture of the handover, and height of the report's, px."""
+_FLAGS = ("--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+_BACKGROUND = (237, 229, 222)  # blue green red
+_EDGE = 24
+_HIDDEN = "{} {{ display: none }}"
+
+
+def main() -> None:
+    """Run each scenario once and write the pictures."""
+    with tempfile.TemporaryDirectory(prefix="handover-") as folder:
+        for name, (scenario, figure) in FIGURES.items():
+            run = Path(folder) / scenario
+            command = "from handover.scenarios.cli.command import main; main()"
+            subprocess.run([sys.executable, "-c", command, "run", scenario, "--out", str(run)], check=True)
+            _copy(run / "figures" / f"{figure}.png", DOCS / name)
+        _draw_report(Path(folder) / "helix_handover" / "report.html", DOCS / REPORT)
+
+
+def _copy(figure: Path, to: Path) -> None:
+    pixels = _read(figure)
+    if to.suffix == ".png":
+        shutil.copyfile(figure, to)
+        return
+    height = round(pixels.shape[0] * _WIDTH / pixels.shape[1])
+    cv2.imwrite(str(to), cv2.resize(pixels, (_WIDTH, height), interpolation=cv2.INTER_AREA), _JPEG)
+
+
+def _draw_report(page: Path, to: Path) -> None:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        sys.exit(f"{to.name} is not made: there is no chromium on the path")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=_FLAGS)
+        desk = _shown(browser, page, 1150, "light", "section:not(#time, #replay), #time h3 ~ h3, #time .plot ~ .plot")
+        phone = _shown(browser, page, 430, "dark", "section:not(#replay, #pictures)")
+        browser.close()
+    high = desk.shape[0] + 2 * _EDGE
+    width = desk.shape[1] + phone.shape[1] + 3 * _EDGE
+    canvas = np.full((high, width, 3), _BACKGROUND, dtype=np.uint8)
+    canvas[_EDGE : _EDGE + desk.shape[0], _EDGE : _EDGE + desk.shape[1]] = desk
+    canvas[_EDGE : _EDGE + phone.shape[0], -_EDGE - phone.shape[1] : -_EDGE] = phone
+    cv2.imwrite(str(to), canvas, _JPEG)
+
+
+def _shown(browser: Browser, file: Path, width: int, scheme: Any, hidden: str) -> Pixels:
+    """Return a page as a browser shows it half way through the replay, without what is to be hidden."""
+    page = browser.new_page(viewport={"width": width, "height": _HEIGHT}, color_scheme=scheme)
+    page.set_default_timeout(120_000)
+    page.goto(file.as_uri(), wait_until="commit")
+    page.wait_for_selector("html[data-drawn]", state="attached")
+    page.add_style_tag(content=_HIDDEN.format(hidden))
+    page.evaluate("""() => {
+        const slider = document.querySelector(".replay-time");
+        slider.value = Math.round(slider.max * 0.43);
+        slider.dispatchEvent(new Event("input"));
+    }""")
+    page.wait_for_timeout(3000)
+    seen = np.frombuffer(page.screenshot(), dtype=np.uint8)
+    page.close()
+    return np.asarray(cv2.imdecode(seen, cv2.IMREAD_COLOR), dtype=np.uint8)
+
+
+def _read(file: Path) -> Pixels:
+    return np.asarray(cv2.imread(str(file)), dtype=np.uint8)
+
+
+if __name__ == "__main__":
+    main()
