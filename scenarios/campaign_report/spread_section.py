@@ -129,8 +129,7 @@ def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Se
     values = column * unit.factor
     across = "x" if layout.listed else "y"
     of_groups = [
-        [k for k, p in enumerate(results.points) if layout.groups[k] == group]
-        for group in range(len(layout.group_names))
+        [k for k in range(len(results.points)) if layout.groups[k] == group] for group in range(len(layout.group_names))
     ]
     boxes = [
         _boxes(

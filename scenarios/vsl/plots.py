@@ -34,12 +34,16 @@ _FLAT = 1e-6
 """Distance from the plane XZ below which a path lies in it, m."""
 
 
-def figures_of_path(parameters: Parameters, record: Record, *, hybrid: bool) -> list[TimeFigure]:
-    """Return the figures of the tip's error and position, and of joints, currents and pressures."""
+def phases_of_path(record: Record) -> tuple[Phase, ...]:
+    """Return the path's segments, as plots and replay name them."""
     segment = record["planner.segment"]
     segments = np.unique(segment[np.isfinite(segment)]).astype(int).tolist()
-    names = {n: f"segment {n}" if n else "before" for n in segments}
-    phases = phases_of(record, "planner.segment", names)
+    return phases_of(record, "planner.segment", {n: f"segment {n}" if n else "before" for n in segments})
+
+
+def figures_of_path(parameters: Parameters, record: Record, *, hybrid: bool) -> list[TimeFigure]:
+    """Return the figures of the tip's error and position, and of joints, currents and pressures."""
+    phases = phases_of_path(record)
     off_plane = bool(np.any(np.abs(record["planner.p_WG_goal"][:, 1]) > _FLAT))
     return [
         TimeFigure(

@@ -8,6 +8,7 @@ from handover.cosim.record.reader import Record
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.experiment.replay import Body, Line, Replay, ball, circle, prism
 from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.plots import phases_of_path
 
 _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
 _DESIRED, _TIP_PATH, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"
@@ -25,6 +26,7 @@ def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Repl
         lines=[*_arm(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
         fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
         eye=(0.45, -1.45, 0.35),
+        phases=phases_of_path(record),
         notes=("The path of the tip is the true one, not that by the tracker.",),
     )
 
