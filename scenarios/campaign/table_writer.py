@@ -188,10 +188,12 @@ def _type_of(variable: Variable) -> pa.DataType:
 
 
 def _metrics(rows: Sequence[RunRow]) -> dict[str, Metric]:
+    """Return the metrics by name, each as the first run with a value of it describes it."""
     metrics: dict[str, Metric] = {}
     for row in rows:
         for name, metric in row.metrics.items():
-            metrics.setdefault(name, metric)
+            if not math.isfinite(metrics.setdefault(name, metric).value):
+                metrics[name] = metric
     return metrics
 
 

@@ -157,9 +157,13 @@ def _corners(drawn: Drawn) -> tuple[Floats, Floats]:
     return shown.min(axis=0), shown.max(axis=0)
 
 
+def _seen_colour(drawn: Drawn) -> str:
+    return drawn.colour if drawn.opacity >= 1.0 else f"{drawn.colour}{round(255 * drawn.opacity):02x}"
+
+
 def _chip(drawn: Sequence[Drawn], label: str) -> str:
     """Return the background of a legend's chip: stripes of all colours that its label has in the scene."""
-    colours = list(dict.fromkeys(d.colour for d in drawn if d.label == label))
+    colours = list(dict.fromkeys(_seen_colour(d) for d in drawn if d.label == label))
     ends = [f"{100 * k / len(colours):.4g}% {100 * (k + 1) / len(colours):.4g}%" for k in range(len(colours))]
     stripes = ", ".join(f"{colour} {end}" for colour, end in zip(colours, ends, strict=True))
     return colours[0] if len(colours) == 1 else f"linear-gradient(90deg, {stripes})"

@@ -119,3 +119,15 @@ def test_a_table_that_is_none_or_torn_is_reported(tmp_path: Path, table: Campaig
     (tmp_path / "runs.parquet").write_bytes((tmp_path / "runs.parquet").read_bytes()[:900])
     with pytest.raises(InvalidRunFolder, match=r"its runs\.parquet is damaged"):
         CampaignTable.read(tmp_path)
+
+
+def test_a_metric_is_described_as_by_a_run_that_has_a_value():
+    first, second, third, _ = PLAN.runs()
+    lacks, has = Metric(math.nan, "m", "distance (sees nothing)"), Metric(0.1, "m", "distance")
+    spent = {"simulated": 5.0, "wall": 1.0, "cpu": 0.5}
+    ended = [
+        RunRow(run=run, status="done", success=True, reason="there", metrics={"distance": metric}, **spent)
+        for run, metric in ((first, lacks), (second, has), (third, lacks))
+    ]
+    table = CampaignTable(table_of(PLAN, ended))
+    assert table.description("distance") == "distance"

@@ -86,6 +86,7 @@ def test_names_are_text(record: Record):
 def test_a_legends_chip_has_all_colours_of_what_it_names(record: Record):
     tube = Line(label="<cube>", colour="#abcdef", points=MOVING[:, None] + [[0, 0, 0], [0, 3, 0]], radii=np.ones(2))
     alone = replace(CUBE, label="alone", colour="#fedcba")
-    html = replay_section(Replay(bodies=[CUBE, CUBE, alone], lines=[tube]), record).html
+    glass = replace(CUBE, label="glass", opacity=0.5)
+    html = replay_section(Replay(bodies=[CUBE, CUBE, alone, glass], lines=[tube]), record).html
     chips = re.findall(r'<i style="background: (.*?)">', html)
-    assert chips == ["linear-gradient(90deg, #123456 0% 50%, #abcdef 50% 100%)", "#fedcba"]
+    assert chips == ["linear-gradient(90deg, #123456 0% 50%, #abcdef 50% 100%)", "#fedcba", "#12345680"]
