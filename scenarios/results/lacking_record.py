@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.record.reader import Record
-from handover.fmus.catalog import UNITS, import_block
+from handover.fmus.catalog import UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.experiment.replay import Body, Replay
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 
@@ -24,7 +25,7 @@ class LackingRecord(Record):
 
     Args:
         record: what was recorded.
-        units: the scenario's: the catalogued unit by name in the system.
+        units: the scenario's: the unit, or the path of its block, by name in the system.
 
     Attributes:
         lacking: the outputs that were asked for and are not there, in the order of asking.
@@ -56,10 +57,11 @@ class LackingRecord(Record):
     def _declared(self, signal: str) -> Variable | None:
         """Return the output as the scenario's own unit declares it; None if there is none, or it is never recorded."""
         unit, _, port = signal.partition(".")
-        entry = UNITS.get(self._units.get(unit, ""))
-        if entry is None:
+        try:
+            block = import_class(find_unit(self._units.get(unit, "")).block)
+            outputs = {v.name: v for v in describe(block).outputs}
+        except (UnknownUnit, UnknownBlock, DeclarationError):
             return None
-        outputs = {v.name: v for v in describe(import_block(entry.block)).outputs}
         found = outputs.get(port)
         return None if found is None or found.kind in (Kind.STRING, Kind.BINARY) else found
 

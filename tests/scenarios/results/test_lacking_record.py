@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from flyer_runs import run
@@ -101,8 +102,7 @@ def test_curves_keep_their_colours_where_others_are_left_out(tmp_path: Path):
 
 
 def test_a_signal_that_no_unit_of_the_scenario_has_is_an_error(tmp_path: Path):
-    pq.write_table(pq.read_table(_one_row(tmp_path)), tmp_path / "s.parquet")
-    record = LackingRecord(Record(tmp_path / "s.parquet"), FlyerImpedance.units)
+    record = LackingRecord(Record(_one_row(tmp_path)), FlyerImpedance.units)
     for signal in ("robot.speed_of_light", "nobody.p_WB"):
         with pytest.raises(KeyError, match=signal):
             record[signal]
@@ -110,9 +110,15 @@ def test_a_signal_that_no_unit_of_the_scenario_has_is_an_error(tmp_path: Path):
     assert record.lacking == ["robot.p_WB"]
 
 
-def _one_row(folder: Path) -> Path:
-    import pyarrow as pa
+def test_a_block_of_ones_own_tells_what_its_outputs_would_have_been(tmp_path: Path):
+    units = {"robot": "handover.plants.free_flyer.free_flyer:FreeFlyer", "none": "nowhere:Block"}
+    record = LackingRecord(Record(_one_row(tmp_path)), units)
+    assert record["robot.q_WB"].shape == (1, 4)
+    with pytest.raises(KeyError, match=r"none\.q_WB"):
+        record["none.q_WB"]
 
+
+def _one_row(folder: Path) -> Path:
     pq.write_table(pa.table({"time": [0.0]}), folder / "one.parquet")
     return folder / "one.parquet"
 
@@ -159,7 +165,10 @@ class Patient(Evaluator):
 def test_a_scenario_without_plots_and_replay_has_a_page_without_these_sections(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(run_facts, "SCENARIOS", {"bare": Bare})
+    def bare(_name: str, _source: Any) -> type[Bare]:
+        return Bare
+
+    monkeypatch.setattr(run_facts, "scenario_of", bare)
     ended = run(Bare, tmp_path / "r", drawn=True)
     assert ended.left_out == ()
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
