@@ -23,7 +23,7 @@ def test_every_picture_of_the_readme_is_made_by_the_command():
     spec.loader.exec_module(pictures)
     made = {*pictures.FIGURES, pictures.REPORT}
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"\(docs/([\w.]+)\)", readme)) == made
+    assert set(re.findall(r"docs/(\w+\.(?:png|jpg))", readme)) == made
     assert {p.name for p in DOCS.iterdir() if p.suffix in (".png", ".jpg")} == made
     assert "\t$(BIN)/python docs/pictures.py" in (ROOT / "Makefile").read_text(encoding="utf-8")
 
