@@ -2,10 +2,12 @@
 
 A `Checkpointer` writes them during a run. The file is a zip archive, not compressed: `checkpoint.json`, for each unit
 its state, the contents of its buffers and its CPU times, and `kept`, bytes of whoever runs the master. All of it is
-plain data; what a unit makes of its state is the unit's.
+plain data; what a unit makes of its state is the unit's, and many do not look whether it is one of theirs. So
+`checkpoint.json` holds the SHA-256 of all others, and bytes that have changed reach no unit.
 """
 
 import array
+import hashlib
 import json
 import logging
 import math
@@ -131,23 +133,26 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     Raises:
         OSError: it cannot be written; the former one stays.
     """
+    parts = {"kept": checkpoint.kept}
+    for i, name in enumerate(checkpoint.units):
+        parts[f"{i}.state"] = checkpoint.units[name]
+        parts[f"{i}.contents"] = pack_state(checkpoint.contents[name])
+        parts[f"{i}.cpu"] = checkpoint.cpu[name]
     header = {
         "format": _FORMAT,
         "time": checkpoint.time,
         "rows": checkpoint.rows,
         "stepper": checkpoint.stepper,
         "units": list(checkpoint.units),
+        "sha256": {part: hashlib.sha256(content).hexdigest() for part, content in parts.items()},
     }
     unfinished = _unfinished(path)
     try:
         with open(unfinished, "wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
                 archive.writestr("checkpoint.json", json.dumps(header))
-                for i, name in enumerate(checkpoint.units):
-                    archive.writestr(f"{i}.state", checkpoint.units[name])
-                    archive.writestr(f"{i}.contents", pack_state(checkpoint.contents[name]))
-                    archive.writestr(f"{i}.cpu", checkpoint.cpu[name])
-                archive.writestr("kept", checkpoint.kept)
+                for part, content in parts.items():
+                    archive.writestr(part, content)
             file.flush()
             os.fsync(file.fileno())
         os.replace(unfinished, path)
@@ -178,14 +183,22 @@ def read_checkpoint(path: Path) -> Checkpoint:
                     path, f"a checkpoint of format {header['format']}; format {_FORMAT} can be read"
                 )
             names: list[str] = header["units"]
+            digests: dict[str, str] = header["sha256"]
+
+            def read(part: str) -> bytes:
+                content = archive.read(part)
+                if hashlib.sha256(content).hexdigest() != digests[part]:
+                    raise InvalidCheckpoint(path, f"the checkpoint is damaged: {part} in it is not what was written")
+                return content
+
             return Checkpoint(
                 time=header["time"],
                 rows=header["rows"],
                 stepper=header["stepper"],
-                units={name: archive.read(f"{i}.state") for i, name in enumerate(names)},
-                contents={name: unpack_state(archive.read(f"{i}.contents")) for i, name in enumerate(names)},
-                cpu={name: archive.read(f"{i}.cpu") for i, name in enumerate(names)},
-                kept=archive.read("kept"),
+                units={name: read(f"{i}.state") for i, name in enumerate(names)},
+                contents={name: unpack_state(read(f"{i}.contents")) for i, name in enumerate(names)},
+                cpu={name: read(f"{i}.cpu") for i, name in enumerate(names)},
+                kept=read("kept"),
             )
     except FileNotFoundError as e:
         raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e

@@ -1,3 +1,4 @@
+import hashlib
 import json
 import shutil
 import signal
@@ -219,6 +220,14 @@ def test_a_damaged_checkpoint_is_refused_and_the_record_is_whole(copy: Path):
     assert_record_is_whole(copy)
 
 
+@pytest.mark.parametrize("part", ["0.state", "0.contents", "0.cpu", "kept"])
+def test_a_part_of_a_checkpoint_that_has_changed_is_refused_before_a_unit_gets_it(copy: Path, part: str):
+    """The zip's own checksums are right: whoever writes it again writes those too."""
+    with_part(copy, part, b"of another run", keep_digest=True)
+    assert_refused(copy, f"the checkpoint is damaged: {part} in it is not what was written")
+    assert_record_is_whole(copy)
+
+
 def test_a_record_that_is_shorter_than_the_checkpoint_is_refused(copy: Path):
     (copy / "signals.arrows").unlink()
     assert_refused(copy, "rows, the record beside it has 0")
@@ -275,12 +284,18 @@ def test_units_that_do_not_save_their_states_are_refused_at_the_start(tmp_path: 
     assert not out.exists()
 
 
-def with_part(copy: Path, part: str, content: bytes, kind: int = zipfile.ZIP_STORED) -> None:
-    """Put something else in the place of a part of the checkpoint."""
+def with_part(
+    copy: Path, part: str, content: bytes, kind: int = zipfile.ZIP_STORED, *, keep_digest: bool = False
+) -> None:
+    """Put something else in the place of a part of the checkpoint, and in that of its digest, or keep that."""
     checkpoint = copy / "checkpoint.zip"
     with zipfile.ZipFile(checkpoint) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     assert part in parts
+    if part != "checkpoint.json" and not keep_digest:
+        header = json.loads(parts["checkpoint.json"])
+        header["sha256"][part] = hashlib.sha256(content).hexdigest()
+        parts["checkpoint.json"] = json.dumps(header).encode()
     with zipfile.ZipFile(checkpoint, "w", kind) as archive:
         for name, whole in (parts | {part: content}).items():
             archive.writestr(name, whole)
