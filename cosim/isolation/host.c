@@ -21,13 +21,14 @@ Entry entries[N_CALLS] = {CALLS(AS_ENTRY)};
 static void *library;
 static pid_t master;
 
-/* Ends the process with the master, whatever the unit does meanwhile. (The system's own signal for that comes when the
- * master's thread ends that started the process, which may be before its end.) */
+/* Ends the process with the master, whatever the unit does meanwhile, and with it its group, thus what the unit has
+ * forked. (The system's own signal for that comes when the master's thread ends that started the process, which may be
+ * before its end.) */
 static void *watch_master(void *unused) {
     const struct timespec pause = {0, 50000000};
     while (getppid() == master)
         nanosleep(&pause, NULL);
-    kill(getpid(), SIGKILL);
+    kill(0, SIGKILL);
     return unused;
 }
 

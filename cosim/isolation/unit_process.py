@@ -179,6 +179,9 @@ def unavailable() -> str:
 
 
 def _end(process: "subprocess.Popen[bytes]", memory: int, sockets: _Sockets) -> None:
+    """End a process, if it has not ended, and what its unit has forked and left: it leads a process group."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
     if process.returncode is None:
         process.kill()
         process.wait()

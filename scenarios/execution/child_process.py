@@ -49,7 +49,9 @@ class ChildEnd(NamedTuple):
 class ForkedChild:
     """Runs a command in the main thread of a process group of its own, which is killed when this process ends.
 
-    What is left of the group when the child ends, such as processes that a unit has forked, is killed too.
+    What is left of the group when the child ends, such as processes that a unit has forked, is killed too. On Linux so
+    is what has left the group: this process adopts the child's descendants whose parents end, as they would else be
+    adopted by the system's first process.
 
     Two pipes, over which nothing is sent, tell each process of the other's end: their read ends become ready. On Linux
     the kernel, too, kills the child when this thread ends, whatever a unit did to the pipes or to Python's threads.
@@ -57,10 +59,15 @@ class ForkedChild:
     Args:
         command: what the child does; it has to end the process.
         heartbeat: of the run in the child.
+
+    Attributes:
+        stopped: whether it was stopped (SIGSTOP) when `wait` looked last, so that it handles no signals.
     """
 
     def __init__(self, command: Callable[[], NoReturn], heartbeat: Heartbeat) -> None:
-        self._heartbeat = heartbeat
+        self._heartbeat, self.stopped = heartbeat, False
+        self._others = _children()
+        _adopt_descendants()
         self._alive, child_lives = os.pipe()
         parent_alive, self._parent_lives = os.pipe()
         parent = os.getpid()
@@ -98,15 +105,16 @@ class ForkedChild:
                 closed, since_closed = True, _Clock()
             pid, status, spent = os.wait4(self.pid, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
             if pid and (os.WIFSTOPPED(status) or os.WIFCONTINUED(status)):
-                limits.note_suspension(stopped=os.WIFSTOPPED(status))
+                self.stopped = os.WIFSTOPPED(status)
+                limits.note_suspension(stopped=self.stopped)
             elif pid:
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.killpg(self.pid, signal.SIGKILL)  # what a unit has forked and left
+                self._kill_rest()
                 self._close()
                 exited = os.WIFEXITED(status)
                 number = None if exited else os.WTERMSIG(status)
                 code = os.WEXITSTATUS(status) if exited else 0
                 return ChildEnd(number, code, spent.ru_utime + spent.ru_stime, limits.hung, limits.given_up)
+            self._reap_adopted()
             if watched is not None and watched in ready:
                 return None
             if limits.exceeded():
@@ -118,7 +126,28 @@ class ForkedChild:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         os.waitpid(self.pid, 0)
+        self._kill_rest()
         self._close()
+
+    def _kill_rest(self) -> None:
+        """Kill what units have forked and left, once the child has ended: its group, and what was adopted since."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, signal.SIGKILL)
+        while adopted := self._adopted():  # those of which one ends leave their own children to this process
+            for pid in adopted:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.kill(pid, signal.SIGKILL)
+                with contextlib.suppress(ChildProcessError):
+                    os.waitpid(pid, 0)
+
+    def _reap_adopted(self) -> None:
+        for pid in self._adopted():
+            with contextlib.suppress(ChildProcessError):
+                os.waitpid(pid, os.WNOHANG)
+
+    def _adopted(self) -> set[int]:
+        """Return the children of this process that it has neither forked here nor had before."""
+        return _children() - self._others - {self.pid}
 
     def _close(self) -> None:
         os.close(self._alive)
@@ -184,7 +213,22 @@ def _page_reads(pid: int) -> int:
         return 0
 
 
-_PR_SET_PDEATHSIG = 1
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+
+
+def _adopt_descendants() -> None:
+    """Let descendants of this process whose parents end become its children (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def _children() -> set[int]:
+    """Return the children of this process, those that have ended and were not waited for included; Linux, else none."""
+    found: set[int] = set()
+    for file in Path("/proc/self/task").glob("*/children"):
+        with contextlib.suppress(OSError):  # the thread has ended
+            found.update(map(int, file.read_bytes().split()))
+    return found
 
 
 def _die_at_once_with(parent: int) -> None:

@@ -8,6 +8,7 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "frame/unit.h"
@@ -84,6 +85,27 @@ static void fork_and_hang(void) {
     fork();
     hang();
 }
+static void sleep_in_group(void) {
+    if (fork() == 0) {
+        sleep(300);
+        _exit(0);
+    }
+}
+static void sleep_in_daemon(void) {
+    if (fork() != 0)
+        return;
+    if (setsid() < 0)
+        abort();
+    if (fork() == 0)
+        sleep(300);
+    _exit(0);
+}
+static void stop_itself(void) { raise(SIGSTOP); }
+static void limit_files(void) {
+    signal(SIGXFSZ, SIG_DFL);
+    setrlimit(RLIMIT_FSIZE, &(struct rlimit){10, RLIM_INFINITY});
+}
+static void limit_descriptors(void) { setrlimit(RLIMIT_NOFILE, &(struct rlimit){0, 4096}); }
 
 #define HARMS(DO)                                                                                                      \
     DO(change_directory)                                                                                               \
@@ -98,7 +120,12 @@ static void fork_and_hang(void) {
     DO(crash)                                                                                                          \
     DO(start_crashing_thread)                                                                                          \
     DO(ignore_signals_and_hang)                                                                                        \
-    DO(fork_and_hang)
+    DO(fork_and_hang)                                                                                                  \
+    DO(sleep_in_group)                                                                                                 \
+    DO(sleep_in_daemon)                                                                                                \
+    DO(stop_itself)                                                                                                    \
+    DO(limit_files)                                                                                                    \
+    DO(limit_descriptors)
 
 static enum status integrate(Unit *unit, double t, double h, StepEnd *end) {
     SELF(Harmful);

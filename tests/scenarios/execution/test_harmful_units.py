@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -124,6 +125,56 @@ def test_what_a_unit_has_forked_does_not_outlive_the_run(tmp_path: Path):
     status, _, errors = finish(going)
     assert (status, errors) == (3, "bad: fmi3DoStep at t = 0.2 s did not return within 2 s\n")
     until(lambda: not any(map(lives, processes)))
+
+
+@pytest.mark.parametrize(
+    ("bad", "isolate"),
+    [
+        ("sleep_in_group", ("--isolate", "all")),
+        ("sleep_in_daemon", ()),
+        pytest.param("sleep_in_daemon", ("--isolate", "all"), marks=slow),
+    ],
+)
+def test_what_a_unit_has_forked_and_left_ends_with_the_command(bad: str, isolate: tuple[str, ...], tmp_path: Path):
+    going = start(
+        tmp_path, failing_ssp(tmp_path, f"{bad}_in_step"), "--out", "r", "--pace", "1", "--no-report", *isolate
+    )
+    seen: set[int] = set()
+    while going.poll() is None:
+        seen.update(family(going.pid))
+        time.sleep(0.02)
+    left = [process for process in seen if lives(process)]
+    for process in left:
+        os.kill(process, signal.SIGKILL)
+    status, _, errors = finish(going)
+    assert (status, errors, left) == (0, "", [])
+    assert len(seen) > 1 + 3 * bool(isolate), "nothing was forked"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_a_unit_has_stopped_can_be_aborted(number: signal.Signals, tmp_path: Path):
+    going = start(tmp_path, failing_ssp(tmp_path, "stop_itself_in_step"), "--out", "r", "--call-limit", "0")
+
+    def stopped() -> bool:
+        for pid in family(going.pid):
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                if ") T " in Path(f"/proc/{pid}/stat").read_text():
+                    return True
+        return False
+
+    wait_until(stopped, going)
+    time.sleep(1)  # until its parent has looked
+    for _ in range(2):
+        going.send_signal(number)
+        time.sleep(1)
+    status, _, errors = finish(going)
+    assert status == 130
+    assert errors.splitlines() == [
+        "the run is stopped (SIGSTOP) and ends once it continues; the same signal again aborts it",
+        "Aborted! The run was stopped (SIGSTOP).",
+    ]
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert (tmp_path / "r" / "signals.tail").exists(), "what was recorded is left"
 
 
 @pytest.mark.parametrize("bad", ["ignore_signals_and_hang", pytest.param("fork_and_hang", marks=slow)])
