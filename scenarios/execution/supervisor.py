@@ -5,6 +5,7 @@ Only where processes can be forked, thus not on Windows. What is imported here i
 
 import contextlib
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -14,6 +15,7 @@ from typing import Any, NoReturn
 
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
+from handover.scenarios.execution.exit_status import ABORTED
 
 TERMINATION_SIGNALS = (
     () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
@@ -64,7 +66,8 @@ def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, Chi
     completes what the run left, prints what happened and returns the exit status.
 
     The child is a process group of its own: the parent alone receives Ctrl-C and forwards it, so that the child
-    receives each signal once. If the parent ends, the child is killed.
+    receives each signal once. If the parent ends, the child is killed. A child that is stopped (SIGSTOP), as by a
+    unit, handles no signals: the second that asks it to end kills it, with the status of what is aborted.
     """
     began = time.monotonic()
     forwarded = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGCONT]
@@ -77,10 +80,14 @@ def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, Chi
         run_to_end(command)
 
     child = ForkedChild(begin, heartbeat)
-    _forward_signals(child.pid)
+    asks = _forward_signals(child)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     end = child.wait()
     assert end is not None  # it watched nothing else
+    if asks.aborted and heartbeat.status is None:
+        for folder in heartbeat.facts.get("scratch", []):
+            shutil.rmtree(folder, ignore_errors=True)
+        sys.exit(ABORTED)
     _end_as(end, time.monotonic() - began, report_crash)
 
 
@@ -108,10 +115,32 @@ def leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _forward_signals(child: int) -> None:
+class _Asks:
+    """How often a child was asked to end, and whether it was killed because it could not."""
+
+    def __init__(self, child: ForkedChild) -> None:
+        self._child, self._count, self.aborted = child, 0, False
+
+    def add(self) -> None:
+        self._count += 1
+        if not self._child.stopped:
+            return
+        line = "the run is stopped (SIGSTOP) and ends once it continues; the same signal again aborts it\n"
+        if self._count > 1:
+            self.aborted, line = True, "Aborted! The run was stopped (SIGSTOP).\n"
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self._child.pid, signal.SIGKILL)
+        os.write(2, line.encode())
+
+
+def _forward_signals(child: ForkedChild) -> _Asks:
+    asks = _Asks(child)
+
     def forward(number: int, _frame: Any) -> None:
         with contextlib.suppress(ProcessLookupError):
-            os.kill(child, number)
+            os.kill(child.pid, number)
+        if number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            asks.add()
 
     def stop(_number: int, _frame: Any) -> None:
         forward(signal.SIGSTOP, None)
@@ -124,6 +153,7 @@ def _forward_signals(child: int) -> None:
         signal.signal(signal.SIGHUP, forward)
     if signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL:
         signal.signal(signal.SIGTSTP, stop)
+    return asks
 
 
 def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
