@@ -1,4 +1,4 @@
-"""What units share with their host: its directory, standard streams, signal handlers, arithmetic, and its identity.
+"""What units share with their host: directory, standard streams, signal handlers, limits, arithmetic, its identity.
 
 A unit's library may change any of these as it is loaded or called, and then every other unit, and the host itself, runs
 with that. `HostProcess` notes how they were and puts them back. A process that a unit has forked returns from the
@@ -14,6 +14,16 @@ import signal
 import sys
 import time
 from typing import Any
+
+if sys.platform != "win32":
+    import resource
+
+    _LIMITED = (
+        resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE, resource.RLIMIT_AS, resource.RLIMIT_DATA, resource.RLIMIT_CPU,
+        resource.RLIMIT_STACK,
+    )  # fmt: skip
+else:
+    _LIMITED = ()
 
 _POSIX = sys.platform != "win32"
 _MADV_WIPEONFORK = 18  # Linux 4.14
@@ -55,7 +65,7 @@ def exit_if_forked() -> None:
 
 
 class HostProcess:
-    """Notes directory, standard streams, signal handlers and floating-point environment, and puts them back.
+    """Notes directory, standard streams, signal handlers, limits and floating-point environment, and puts them back.
 
     The floating-point environment (rounding, traps, flushing to zero) is that of the calling thread. On Windows only
     the directory is put back.
@@ -74,6 +84,7 @@ class HostProcess:
         self._streams = {n: copy for n in _STREAMS if (copy := _copied(n)) is not None}
         self._handlers = {n: (self._handler(n), signal.getsignal(n)) for n in _SIGNALS}
         self._arithmetic = self._environment()
+        self._limits = _limits()
         self._checked_at = time.monotonic()
 
     def restore(self, *, handlers_set_here: bool = True) -> None:
@@ -95,7 +106,22 @@ class HostProcess:
                 handlers_set_here or signal.getsignal(number) == known
             ):
                 self._libc.sigaction(number, handler, None)
+        self.restore_limits()
         self.restore_arithmetic()
+
+    def restore_limits(self) -> None:
+        """Raise limits of resources again that were lowered, as of files' sizes and number, as far as that is allowed.
+
+        A process may lower its hard limits, but only a privileged one may raise them again.
+        """
+        for limited, now in _limits().items():
+            before = self._limits[limited]
+            if all(map(_is_within, before, now)):
+                continue
+            for limits in (before, (now[1], now[1])):
+                with contextlib.suppress(OSError, ValueError):
+                    resource.setrlimit(limited, limits)
+                    break
 
     def restore_arithmetic(self) -> None:
         """Put back the floating-point environment of the calling thread; a process that a unit has forked ends."""
@@ -132,6 +158,15 @@ class HostProcess:
         buffer = ctypes.create_string_buffer(_SIZE)
         self._libm.fegetenv(buffer)
         return buffer.raw
+
+
+def _limits() -> dict[int, tuple[int, int]]:
+    """Return soft and hard limit of each resource that a host needs to write what it records."""
+    return {n: resource.getrlimit(n) for n in _LIMITED}
+
+
+def _is_within(before: int, now: int) -> bool:
+    return now == resource.RLIM_INFINITY or (before != resource.RLIM_INFINITY and before <= now)
 
 
 def _significant(handler: bytes) -> bytes:

@@ -270,6 +270,8 @@ class Master:
         except UnitTerminated as e:
             at_point = self.stepper.arriving if isinstance(self.stepper, PlanStepper) else arriving
             self._end_with(e, observers, at_point=at_point)
+        finally:
+            self.ensemble.host.restore_limits()  # what follows writes files
 
     def _end_with(self, request: UnitTerminated, observers: Sequence[Observer], *, at_point: bool) -> None:
         """End the run with a unit's request, made before observers saw the communication point or in a step from it."""

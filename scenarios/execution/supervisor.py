@@ -13,9 +13,10 @@ import time
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+from handover.cosim.exceptions import one_line
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
-from handover.scenarios.execution.exit_status import ABORTED
+from handover.scenarios.execution.exit_status import ABORTED, UNIT_FAILED
 
 TERMINATION_SIGNALS = (
     () if sys.platform == "win32" else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE, signal.SIGQUIT)
@@ -99,6 +100,9 @@ def run_to_end(command: Callable[[], Any]) -> NoReturn:
         status = 0
     except SystemExit as e:
         status = e.code if isinstance(e.code, int) else int(e.code is not None)
+    except OSError as e:  # not even an error could be printed, as where a unit took the right to write files
+        heartbeat.record_facts(unsaid=f"the run's process could not go on: {one_line(e)}")
+        status = UNIT_FAILED
     finally:
         heartbeat.status = status
     if heartbeat.abandoned:  # a thread is still in a unit's call: the interpreter could not end
@@ -161,6 +165,8 @@ def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, Child
     if end.signal is not None and end.signal in TERMINATION_SIGNALS:
         signal.signal(end.signal, signal.SIG_DFL)
         os.kill(os.getpid(), end.signal)
+    if "unsaid" in heartbeat.facts:
+        print(f"Error: {heartbeat.facts['unsaid']}", file=sys.stderr)
     if heartbeat.status is not None:
         sys.exit(heartbeat.status if end.signal is not None else end.status)
     signal.signal(signal.SIGINT, signal.default_int_handler)

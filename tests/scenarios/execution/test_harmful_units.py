@@ -21,9 +21,15 @@ slow = pytest.mark.slow
 WHEN = ("step", "instantiate", "load")
 HARMLESS_IN_THE_END = (
     "change_directory", "close_descriptors", "close_output", "take_output", "install_handlers", "round_up",
-    "trap_division", "fork_itself",
+    "trap_division", "fork_itself", "limit_files", "limit_descriptors",
 )  # fmt: skip
-FIRST = {("close_descriptors", "step"), ("take_output", "load"), ("round_up", "step"), ("fork_itself", "step")}
+FIRST = {
+    ("close_descriptors", "step"),
+    ("take_output", "load"),
+    ("round_up", "step"),
+    ("fork_itself", "step"),
+    ("limit_files", "step"),
+}
 
 
 def finish(going: "subprocess.Popen[str]") -> tuple[int, str, str]:
