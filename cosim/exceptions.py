@@ -159,7 +159,9 @@ class InitializationError(CosimError):
     """A unit did not accept its parameters or did not initialise; nothing has run yet."""
 
     def __init__(self, failure: UnitFailure) -> None:
-        super().__init__(f"{failure.unit} does not start: {failure.message}")
+        logged = failure.message != failure.status
+        how = failure.message if logged else f"{failure.call} {failure.what}"
+        super().__init__(f"{failure.unit} does not start: {how}")
         self.failure = failure
 
 

@@ -187,6 +187,7 @@ FAULTS = [
     failure("error", "get", 3, "b: {call} at t = 0.3 s", "the solver failed", rows=UNTIL_OUTPUT),
     failure("error", "step", 3, "b: {call} at t = 0.3 s", "the solver failed", rows=UNTIL_FAULT, fast=PLAN),
     failure("error", "terminate", 3, "b: {call} at t = 1 s", "the solver failed"),
+    failure("discard", "exit", 2, "b does not start: {call} answered Discard", rows=None, notes=WITHOUT_C, fast=PLAN),
     failure("fatal", "enter", 2, "b does not start", "memory is corrupt", rows=None, notes=FREED),
     failure("fatal", "step", 3, "b: {call} at t = 0.3 s", "memory is corrupt", rows=UNTIL_FAULT, fast=PLAN),
     failure("discard", "step", 3, "b: {call} at t = 0.3 s", "Discard", rows=UNTIL_FAULT),
