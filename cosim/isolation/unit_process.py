@@ -126,6 +126,8 @@ class UnitProcess:
         ending = self._library.isolation_ending(self._connection, ctypes.byref(number))
         if ending in (_RUNNING, _BY_MASTER):
             return None
+        if ending == _BY_SIGNAL and number.value == signal.SIGKILL:
+            return Ending("killed, by someone or by the system for want of memory", self.failed_call)
         if ending == _BY_SIGNAL:
             return Ending((signal.strsignal(number.value) or f"signal {number.value}").lower(), self.failed_call)
         if ending == _BY_EXIT:

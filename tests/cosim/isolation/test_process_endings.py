@@ -1,6 +1,7 @@
 """A unit that ends its own process, in whatever call: it is named, and the others are terminated and freed in order."""
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -77,6 +78,19 @@ def test_a_unit_that_ends_its_process(phase: str, fault: str, fmi: int, compiled
     for unit in {"source", "reader"} & {unit for unit, _ in call_log.calls}:
         begun = ["Terminate"] if phase in TIMES else []
         assert [c for u, c in ends if u == unit] == [f"fmi{fmi}{name}" for name in (*begun, "FreeInstance")]
+
+
+def test_a_unit_s_process_that_somebody_killed_is_told_as_that():
+    master = Master(fed_by(native_fmu("gain"), 3), MasterOptions(isolated=("bad",)))
+
+    def kill(t: float, _signals: object) -> None:
+        process = master.ensemble.instances["bad"]._process.own  # pyright: ignore
+        assert process is not None
+        os.kill(process._process.pid, signal.SIGKILL)
+
+    how = "unit bad crashed in fmi3DoStep at t = 0 s: killed, by someone or by the system for want of memory"
+    with pytest.raises(UnitCrashed, match=how), master:
+        master.run(Fraction(1), [kill])
 
 
 def siblings(fmi: int) -> tuple[UnitFailure, CallLog]:
