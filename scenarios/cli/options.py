@@ -66,6 +66,10 @@ class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (g
             seconds = Fraction(value) if _FORM.fullmatch(value) else Fraction(0)
         except (ValueError, ZeroDivisionError):
             seconds = Fraction(0)
+        if seconds > sys.float_info.max:
+            self.fail(
+                f"{value!r} is not finite as a floating-point number; seconds are such as 0.01 or 1/30", param, ctx
+            )
         if not sys.float_info.min <= seconds <= sys.float_info.max:
             self.fail(f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30", param, ctx)
         return seconds

@@ -60,6 +60,8 @@ def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, A
         raise UsageError(f"{path}: it is empty; a line of names is wanted, {TIME} and inputs, then lines of numbers")
     (_, header), *lines = rows
     names = [name.strip() for name in header]
+    if len(names) == 1 and (found := next((c for c in ";\t" if c in names[0]), None)):
+        raise UsageError(f"{path}: its cells are separated by {found!r}; commas are right, and points in numbers")
     columns = _columns(path, names, inputs)
     if not lines:
         raise UsageError(f"{path}: there is no line of numbers after the names")

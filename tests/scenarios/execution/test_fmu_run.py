@@ -106,6 +106,7 @@ def test_entries_of_an_array_are_columns(tmp_path: Path):
         ("", ["it is empty"]),
         ("time,f\n", ["no line of numbers"]),
         ("f\n0\n", ["there is no column 'time'"]),
+        ("time;f\n0,5;0\n", ["its cells are separated by ';'; commas are right"]),
         ("time,force\n0,1\n", ["no input 'force'; valid: f"]),
         ("time,f,f\n0,1,1\n", ["there are 2 columns 'f'"]),
         ("time,f\n0,1\n0.2,1\n0.1,1\n", ["line 4: time 0.1 s comes after 0.2 s: times must not descend"]),

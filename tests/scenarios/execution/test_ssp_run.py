@@ -130,6 +130,12 @@ def test_a_time_is_a_positive_number(spring: Path, tmp_path: Path, option: str, 
     assert f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30" in " ".join(result.output.split())
 
 
+def test_a_time_is_finite(spring: Path, tmp_path: Path):
+    result = run(packed(spring, tmp_path), "--stop", "1e400")
+    assert result.exit_code == 2, result.output
+    assert "'1e400' is not finite as a floating-point number" in " ".join(result.output.split())
+
+
 @pytest.mark.parametrize(
     ("old", "new", "data"),
     [
