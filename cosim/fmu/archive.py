@@ -29,7 +29,7 @@ _MAX_BYTES = 16 << 30
 _SUSPECT_BYTES, _SUSPECT_RATIO = 256 * _MIB, 200  # libraries and tables shrink to a tenth, rarely to a hundredth
 _MAX_REPORTED = 5
 _TOP = "./"
-"""The folder itself, which some tools pack."""
+"""The folder itself, which some tools pack, or put before each path; paths are without it."""
 
 
 def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
@@ -38,7 +38,7 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
     There is a line for each kind of fault.
     """
     names = [m.orig_filename for m in members]
-    plain = {n for n in names if not n.endswith("/")}
+    plain = {_path(n) for n in names if not n.endswith("/")}
     kinds: tuple[tuple[str, Iterable[str]], ...] = (
         ("paths that lead out of it; they must be relative, with slashes", filter(_escapes_root, names)),
         ("symbolic links or devices; store the files themselves", (m.orig_filename for m in members if _special(m))),
@@ -72,6 +72,13 @@ def _escapes_root(name: str) -> bool:
     is_nameless = name != _TOP and not name.strip("./")
     windows = "\\" in name or ":" in name  # ordinary characters elsewhere; on Windows they lead to other folders
     return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or is_nameless
+
+
+def _path(name: str) -> str:
+    """Return a member's path from the archive's top; empty for the top itself."""
+    while name.startswith(_TOP):
+        name = name[len(_TOP) :].lstrip("/")
+    return name
 
 
 def _special(member: zipfile.ZipInfo) -> bool:
@@ -124,8 +131,8 @@ class FmuArchive:
         if faults:
             raise InvalidFmu(path, "; ".join(faults))
         self._check_copies()
-        self.names = tuple(dict.fromkeys(m.orig_filename for m in self._members if m.orig_filename != _TOP))
-        self._by_name = {m.orig_filename: m for m in self._members}
+        self._by_name = {path: m for m in self._members if (path := _path(m.orig_filename))}
+        self.names = tuple(self._by_name)
         self._opened: zipfile.ZipFile | None = None
 
     @property
@@ -137,7 +144,7 @@ class FmuArchive:
         """Check that members of one path have one content."""
         by_name: dict[str, list[zipfile.ZipInfo]] = defaultdict(list)
         for member in self._members:
-            by_name[member.orig_filename].append(member)
+            by_name[_path(member.orig_filename)].append(member)
         different = [n for n, copies in by_name.items() if len(copies) > 1 and not self._are_alike(copies)]
         if different:
             raise InvalidFmu(
@@ -203,12 +210,29 @@ class FmuArchive:
         """
         try:
             with contextlib.nullcontext(self._opened) if self._opened else zipfile.ZipFile(self.path) as z:
-                size = z.getinfo(name).file_size
+                member = self._by_name[name]
+                size = member.file_size
                 if size > _MAX_TEXT:
                     raise InvalidFmu(self.path, f"{name} has {size / _MIB:.0f} MiB; at most 512 MiB are read")
-                return z.read(name)
+                return z.read(member)
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"the archive is damaged: {name}: {one_line(e)}") from e
+
+    def xml_source(self) -> str | io.BytesIO:
+        """Return what others, which know no `./` before a path, read the XML files from: the path, or a copy of those.
+
+        Raises:
+            InvalidFmu: one is damaged, or longer than 512 MiB.
+        """
+        if all(path == m.orig_filename for path, m in self._by_name.items()):
+            return str(self.path)
+        copy = io.BytesIO()
+        with zipfile.ZipFile(copy, "w") as z:
+            for name in self.names:
+                if name.endswith(".xml"):
+                    z.writestr(name, self.read(name))
+        copy.seek(0)
+        return copy
 
     def size(self, name: str) -> int:
         """Return a member's unpacked size in bytes."""
@@ -221,7 +245,7 @@ class FmuArchive:
             InvalidFmu: it is damaged.
         """
         try:
-            with zipfile.ZipFile(self.path) as z, z.open(name) as file:
+            with zipfile.ZipFile(self.path) as z, z.open(self._by_name[name]) as file:
                 return file.read(size)
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"the archive is damaged: {name}: {one_line(e)}") from e

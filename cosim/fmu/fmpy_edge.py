@@ -73,7 +73,7 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:
     version_of(path, root)
     fault = ""
     try:
-        md: Any = fmpy.read_model_description(str(path))
+        md: Any = fmpy.read_model_description(archive.xml_source())
     except Exception as e:  # FMPy raises plain Exception for unknown elements, lxml its own for malformed XML
         fault = _fault_of(e)
         try:
@@ -135,8 +135,9 @@ def problems_of(path: Path) -> tuple[list[str], str]:
 
     Where the description violates the schema, the rules beyond it are checked nonetheless, as far as the reader gets.
     """
+    archive = FmuArchive(path)
     try:
-        fmpy.read_model_description(str(path), validate_variable_names=True, validate_model_structure=True)
+        fmpy.read_model_description(archive.xml_source(), validate_variable_names=True, validate_model_structure=True)
     except ValidationError as e:
         problems = [str(p) for p in cast(list[Any], e.problems)]
     except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... for descriptions that it cannot interpret
@@ -144,7 +145,7 @@ def problems_of(path: Path) -> tuple[list[str], str]:
     else:
         return [], ""
     try:
-        md: Any = fmpy.read_model_description(str(path), validate=False)
+        md: Any = fmpy.read_model_description(archive.xml_source(), validate=False)
         problems += validate_model_description(md, validate_variable_names=True, validate_model_structure=True)
     except Exception as e:
         return problems, f"{type(e).__name__}: {one_line(e)}"

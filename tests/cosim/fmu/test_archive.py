@@ -6,14 +6,19 @@ import tracemalloc
 import zipfile
 import zlib
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.archive import FmuArchive, archive_faults
+from handover.cosim.fmu.fmpy_edge import problems_of
+from handover.cosim.master.master import Master
+from handover.cosim.system.system import System
 
 PLAIN = {"modelDescription.xml": b"<fmiModelDescription/>" * 20, "resources/table.csv": b"1,2,3\n" * 100}
 
@@ -214,3 +219,23 @@ def test_what_is_no_file_is_reported(tmp_path: Path):
     for path, value in ((tmp_path, "zip what is in it"), (Path(os.devnull), "not a regular file")):
         with pytest.raises(InvalidFmu, match=value):
             FmuArchive(path)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_whose_paths_begin_at_the_folder_itself_runs(tmp_path: Path, fmi: int):
+    dotted = tmp_path / "dotted.fmu"
+    with zipfile.ZipFile(native_fmu("gain", fmi)) as plain, zipfile.ZipFile(dotted, "w") as archive:
+        for name in plain.namelist():
+            archive.writestr(f"./{name}", plain.read(name))
+    assert set(FmuArchive(dotted).names) >= {"modelDescription.xml"}
+    system = System()
+    system.add("gain", dotted)
+    with Master(system) as master:
+        master.run(Fraction(1))
+    assert problems_of(dotted) == ([], "")
+
+
+def test_a_path_twice_with_and_without_the_folder_itself_has_one_content(tmp_path: Path):
+    assert "the same path twice, with different contents: resources/table.csv" in refusal(
+        tmp_path, packed("./resources/table.csv")
+    )

@@ -83,7 +83,7 @@ def test_a_unit_that_ends_its_process(phase: str, fault: str, fmi: int, compiled
 def test_a_unit_s_process_that_somebody_killed_is_told_as_that():
     master = Master(fed_by(native_fmu("gain"), 3), MasterOptions(isolated=("bad",)))
 
-    def kill(t: float, _signals: object) -> None:
+    def kill(_t: float, _signals: object) -> None:
         process = master.ensemble.instances["bad"]._process.own  # pyright: ignore
         assert process is not None
         os.kill(process._process.pid, signal.SIGKILL)
