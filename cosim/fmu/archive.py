@@ -131,7 +131,8 @@ class FmuArchive:
         if faults:
             raise InvalidFmu(path, "; ".join(faults))
         self._check_copies()
-        self._by_name = {path: m for m in self._members if (path := _path(m.orig_filename))}
+        by_name = {_path(m.orig_filename): m for m in self._members}
+        self._by_name = {name: m for name, m in by_name.items() if name}
         self.names = tuple(self._by_name)
         self._opened: zipfile.ZipFile | None = None
 

@@ -86,7 +86,7 @@ def test_a_unit_s_process_that_somebody_killed_is_told_as_that():
     def kill(_t: float, _signals: object) -> None:
         process = master.ensemble.instances["bad"]._process.own  # pyright: ignore
         assert process is not None
-        os.kill(process._process.pid, signal.SIGKILL)
+        os.kill(process._process.pid, signal.SIGKILL)  # pyright: ignore
 
     how = "unit bad crashed in fmi3DoStep at t = 0 s: killed, by someone or by the system for want of memory"
     with pytest.raises(UnitCrashed, match=how), master:
