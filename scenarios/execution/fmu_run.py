@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import WiringError
-from handover.cosim.fmu.default_experiment import exact_seconds
+from handover.cosim.fmu.default_experiment import DefaultExperiment, exact_seconds
 from handover.cosim.system.system import PortName, System
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_file import read_inputs
@@ -66,7 +66,7 @@ class FmuRun:
             raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
         if d.experiment.start:
             _log.warning("%s proposes to start at %g s; a run starts at 0 s", self.path, d.experiment.start)
-        return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, self._until(d.experiment.stop))
+        return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, self._until(d.experiment))
 
     def as_source(self, stop: Fraction) -> dict[str, Any]:
         """Return what a run's folder keeps, so that it can be resumed; `reopened` reads it."""
@@ -76,9 +76,13 @@ class FmuRun:
         times = {"stop": str(stop), "step": None if self.step is None else str(self.step)}
         return {**files, **times, "parameters": list(self.parameters)}
 
-    def _until(self, proposed: float | None) -> Fraction:
+    def _until(self, experiment: DefaultExperiment) -> Fraction:
         if self.stop is not None:
             return self.stop
+        proposed, start = experiment.stop, experiment.start or 0.0
+        if proposed is not None and 0 < proposed <= start:
+            reason = f"it proposes to stop at {proposed:g} s, though to start at {start:g} s"
+            raise UsageError(f"{self.path}: {reason}; --stop 10 lets it run from 0 to 10 s")
         if proposed is None or proposed <= 0:
             reason = "it proposes no stop time" if proposed is None else f"it proposes to stop at {proposed:g} s"
             raise UsageError(f"{self.path}: {reason}; --stop 10 lets it run from 0 to 10 s")

@@ -1,6 +1,7 @@
 """`handover run FILE.fmu`: one unit by itself, with its inputs constant or from a table, as `fmpy simulate` runs it."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -226,3 +227,19 @@ def edited(folder: Path, old: bytes, new: bytes) -> Path:
             assert old in content or name != "modelDescription.xml"
             target.writestr(name, content.replace(old, new, 1) if name == "modelDescription.xml" else content)
     return file
+
+
+def test_a_default_experiment_that_stops_before_it_starts_is_refused(tmp_path: Path):
+    turned = tmp_path / "turned.fmu"
+    with zipfile.ZipFile(native_fmu("gain")) as plain, zipfile.ZipFile(turned, "w") as archive:
+        for name in plain.namelist():
+            content = plain.read(name)
+            if name == "modelDescription.xml":
+                content = re.sub(
+                    rb"<DefaultExperiment [^>]*?/>", b'<DefaultExperiment startTime="2" stopTime="1"/>', content
+                )
+                assert b'startTime="2"' in content
+            archive.writestr(name, content)
+    result = run(turned, "--step", "0.1", "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "it proposes to stop at 1 s, though to start at 2 s; --stop 10 lets it run from 0 to 10 s" in result.output
