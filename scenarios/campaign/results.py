@@ -192,6 +192,10 @@ class CampaignResults:
             return parameter.replace("_", " ") if text.lower() == "true" else f"not {parameter.replace('_', ' ')}"
         if self.is_number(parameter):
             return display_unit(self.unit(parameter), float(text)).text(float(text))
+        return self.words(parameter, text)
+
+    def words(self, parameter: str, text: str) -> str:  # noqa: ARG002 (a name may be shown as it was given)
+        """Return a value that is no number as one reads it."""
         return text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:

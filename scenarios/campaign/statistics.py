@@ -1,4 +1,4 @@
-"""Intervals and exact tests for campaigns, by scipy.stats."""
+"""Intervals and tests for campaigns, by scipy.stats."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import beta, binomtest, bootstrap, fisher_exact
+from scipy.stats import beta, binomtest, bootstrap, fisher_exact, mannwhitneyu, wilcoxon
 
 LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
@@ -54,6 +54,25 @@ class PairedTest:
     def first_is_better(self) -> bool:
         """Whether the test rejects, and the first succeeded where the second did not more often than the reverse."""
         return self.p < LEVEL and self.only_first > self.only_second
+
+
+@dataclass(frozen=True)
+class DifferenceTest:
+    """A test of the values of two groups.
+
+    Attributes:
+        n: pairs, or values of the smaller group where they are not paired.
+        difference: median of second minus first over the pairs; without pairs, the difference of the medians.
+        interval: of the difference of pairs; None without pairs, or where they are too few or all the same.
+        p: how probable so large a difference, either way, is if there is none.
+        method: the test's name.
+    """
+
+    n: int
+    difference: float
+    interval: Interval | None
+    p: float
+    method: str
 
 
 def success_interval(successes: int, n: int) -> Interval:
@@ -121,3 +140,36 @@ def compatible_counts(successes: int, n: int, n_others: int) -> tuple[int, int]:
     """
     kept = [k for k in range(n_others + 1) if two_proportions(k, n_others, successes, n) >= LEVEL]
     return kept[0], kept[-1]
+
+
+def paired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest | None:
+    """Return Wilcoxon's signed-rank test of pairs of values, two-sided; None without a pair of finite values.
+
+    Raises:
+        ValueError: the two are not of one length.
+    """
+    d = np.asarray(second, dtype=np.float64) - np.asarray(first, dtype=np.float64)
+    d = d[np.isfinite(d)]
+    if not len(d):
+        return None
+    p = float(wilcoxon(d).pvalue) if d.any() else 1.0
+    interval = time_interval(d) if np.ptp(d) > 0.0 else None
+    return DifferenceTest(len(d), float(np.median(d)), interval, p, "Wilcoxon")
+
+
+def unpaired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest | None:
+    """Return the test of Mann and Whitney of two groups of values, two-sided; None if one has no finite value."""
+    x, y = (values[np.isfinite(values)] for values in (np.asarray(first, float), np.asarray(second, float)))
+    if not len(x) or not len(y):
+        return None
+    p = float(mannwhitneyu(x, y).pvalue)
+    return DifferenceTest(min(len(x), len(y)), float(np.median(y) - np.median(x)), None, p, "Mann-Whitney")
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Return p-values corrected for their number by Holm's step-down method."""
+    corrected, largest = [0.0] * len(p), 0.0
+    for rank, k in enumerate(sorted(range(len(p)), key=lambda k: p[k])):
+        largest = max(largest, min(1.0, (len(p) - rank) * p[k]))
+        corrected[k] = largest
+    return corrected

@@ -22,14 +22,19 @@ _MAX_ENTRIES = 80
 _LETTERS_ALONG = 60  # that fit along a horizontal axis
 
 
-def draw_campaign(results: CampaignResults, folder: Path) -> list[Figure]:
+def draw_campaign(results: CampaignResults, folder: Path, layout: PointLayout | None = None) -> list[Figure]:
     """Draw success rates and the first metrics of the headline into a folder, as PNG and SVG.
 
     Draws nothing if no run is done, or if the points are more than a figure has room for.
+
+    Args:
+        results: what is drawn.
+        folder: where the figures go; it is made if it is not there.
+        layout: where the points stand; by default as `layout_of` lays them out.
     """
     if not any(len(p.done) for p in results.points):
         return []
-    layout = layout_of(results)
+    layout = layout or layout_of(results)
     if layout.listed and len(results.points) > _MAX_ENTRIES:
         return []
     folder.mkdir(parents=True, exist_ok=True)

@@ -64,14 +64,14 @@ def layout_of(results: CampaignResults) -> PointLayout:
     """
     varied = results.independent
     if any(name not in p.values for p in results.points for name in varied):
-        return _list(results)
+        return list_layout(results)
     if len(varied) == 1:
         return _side_by_side(results, varied[0], None)
     if len(varied) == 2:
         across, colour = _axis_and_colour(results, varied[0], varied[1])
         if len(_texts(results, colour)) <= _MAX_COLOURS:
             return _side_by_side(results, across, colour)
-    return _list(results)
+    return list_layout(results)
 
 
 def _axis_and_colour(results: CampaignResults, first: str, second: str) -> tuple[str, str]:
@@ -95,7 +95,7 @@ def _side_by_side(results: CampaignResults, across: str, colour: str | None) -> 
         texts = _texts(results, across)
         labels = [results.value_text(across, t) for t in texts]
         if len(labels) > _MAX_NAMES or sum(map(len, labels)) > _MAX_LABEL_LENGTH:
-            return _list(results)
+            return list_layout(results)
         along, step = {t: float(k) for k, t in enumerate(texts)}, 1.0
         ticks, title = list(enumerate(labels)), "" if results.is_boolean(across) else across.replace("_", " ")
     room = 0.8 * step / max(len(names), 1)
@@ -141,7 +141,8 @@ def _tick(value: float) -> str:
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:g}"
 
 
-def _list(results: CampaignResults) -> PointLayout:
+def list_layout(results: CampaignResults) -> PointLayout:
+    """Lay a campaign's points out as a list from top to bottom."""
     n = len(results.points)
     places = np.arange(n - 1, -1, -1, dtype=np.float64)
     labels = [results.label(p) for p in results.points]

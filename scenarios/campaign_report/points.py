@@ -63,7 +63,7 @@ def _values(results: CampaignResults, point: PointResults, units: Mapping[str, D
         elif name in units:
             cells.append(Cell(units[name].text(float(text)), float(text)))
         else:
-            cells.append(Cell(text.replace("_", " ")))
+            cells.append(Cell(results.words(name, text)))
     return cells or [Cell("all runs")]
 
 

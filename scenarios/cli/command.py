@@ -22,6 +22,7 @@ Run
   handover resume runs/long              resumes a run with checkpoints
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
                                          a campaign: many runs, one table
+  handover compare ours theirs           campaigns, or runs, on one page: rates, tests, curves
   handover paper ir-table                a paper's experiment: ours beside the published
   handover report runs/long              writes its page again, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
@@ -99,6 +100,11 @@ COMMANDS = (
     ),
     DeferredCommand(
         "check", "handover.scenarios.cli.check:check", short_help="Find what is wrong with FMUs, whoever made them."
+    ),
+    DeferredCommand(
+        "compare",
+        "handover.scenarios.cli.compare:compare",
+        short_help="Put campaigns, or runs, on one page: rates, metrics, tests, curves.",
     ),
     DeferredCommand(
         "export",

@@ -1,0 +1,105 @@
+"""The command `handover compare`: campaigns, or runs, on one page and in one table."""
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.results.run_folder import RunFolder
+
+if TYPE_CHECKING:
+    from handover.scenarios.comparison.page import Comparison
+
+_HELP = """Put campaigns, or runs, of one scenario on one page and in one table.
+
+\b
+Examples
+  handover sweep ir_grasp thing=cylinder,book -p strategy=reflex --repeat 20 --out ours
+  handover sweep ir_grasp thing=cylinder,book -p strategy=blind --repeat 20 --out theirs
+  handover compare ours theirs
+  handover compare runs/a runs/b --name "step 0.1" --name "step 0.4" --signal arm.p_WG
+
+Points of campaigns are matched by the values of the parameters that any of them varies. At each, success rates and
+metrics stand beside each other with 95 % intervals, and each two campaigns are tested against each other: run by run
+where they share seeds, as campaigns with the same points and --seed do. Of runs, the same curves are drawn over each
+other.
+
+The folder holds report.html, comparison.csv, comparison.json, and figures for papers in figures/ as PNG and SVG.
+Settings in which the entries differ are listed, units and versions included.
+"""
+
+
+@click.command("compare", help=_HELP, short_help="Put campaigns, or runs, on one page: rates, metrics, tests, curves.")
+@click.argument("folders", metavar="DIR DIR...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--name", "names", multiple=True, metavar="NAME", help="Name of each DIR, in their order.  [default: the folder's]"
+)
+@click.option(
+    "--signal",
+    "signals",
+    multiple=True,
+    metavar="UNIT.PORT",
+    help="Signal of runs to be drawn; UNIT.PORT[2] is an element.  [default: the scenario's first curves]",
+)
+@click.option(
+    "--metric",
+    "metrics",
+    multiple=True,
+    metavar="METRIC",
+    help="Metric of campaigns to be shown by point.  [default: the first four]",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder for the comparison, a new or an empty one.  [default: one of its own in comparisons/]",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what comparison.json holds, and where it is, as JSON.")
+def compare(
+    folders: Sequence[Path],
+    names: Sequence[str],
+    signals: Sequence[str],
+    metrics: Sequence[str],
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Put campaigns, or runs, on one page."""
+    from handover.scenarios.comparison.entries import NotComparable  # pages and statistics take long to load
+    from handover.scenarios.comparison.page import compare as compared
+    from handover.scenarios.comparison.page import write_comparison
+
+    with one_line_errors():
+        folder = None if out is None else RunFolder(out)
+        try:
+            comparison = compared(folders, names, signals, metrics)
+        except NotComparable as e:
+            raise UsageError(str(e)) from e
+        folder = folder or RunFolder(_default(comparison.entries[0].scenario))
+        data = write_comparison(comparison, folder)
+    if as_json:
+        click.echo(json.dumps({"folder": str(folder.shown), **data}, indent=2, allow_nan=False))
+        return
+    _print(comparison, folder)
+
+
+_PLACE = Path("comparisons")
+
+
+def _default(scenario: str) -> Path:
+    """Return a folder that is not there, named by the date and the scenario."""
+    stem = scenario.partition(":")[2] or scenario
+    name = time.strftime(f"%Y-%m-%d_%H%M%S_{Path(stem).stem}")
+    path, number = _PLACE / name, 1
+    while path.exists():
+        number += 1
+        path = _PLACE / f"{name}_{number}"
+    return path
+
+
+def _print(comparison: "Comparison", folder: RunFolder) -> None:
+    from handover.scenarios.cli.comparison_summary import print_comparison
+
+    print_comparison(comparison, folder)

@@ -1,0 +1,79 @@
+"""Prints the summary of a comparison: a row for each point and campaign, or for each metric of runs, and the tests."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from handover.scenarios.cli.console import open_console
+from handover.scenarios.comparison.campaigns import ComparedCampaigns, success_tests
+from handover.scenarios.comparison.page import Comparison, RunComparison
+from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.results.run_folder import RunFolder
+
+_MAX_ROWS = 24
+
+
+def print_comparison(comparison: Comparison, folder: RunFolder) -> None:
+    """Print what was found, in what the entries differ, and where page and figures are."""
+    console = open_console()
+    if isinstance(comparison, RunComparison):
+        _print_runs(console, comparison)
+    else:
+        _print_campaigns(console, comparison.results)
+    if comparison.differences:
+        names = ", ".join(d.name for d in comparison.differences)
+        console.print(f"they differ in: {names}", markup=False, soft_wrap=True)
+    if isinstance(comparison, RunComparison):
+        for line in comparison.overlay.left_out:
+            console.print(line, markup=False, soft_wrap=True)
+    console.print(f"report: {folder.shown / folder.report.name}", markup=False, soft_wrap=True)
+    console.print(f"figures: {folder.shown / folder.figures.name}", markup=False, soft_wrap=True)
+
+
+def _print_campaigns(console: Console, results: ComparedCampaigns) -> None:
+    metrics = results.shown_metrics[: max(1, (console.width - 70) // 24)]
+    rows: list[list[str]] = []
+    for key in results.matched:
+        for name, point in results.at(key).items():
+            span = point.interval
+            ends = "" if span is None else f"{100 * span.low:.0f} % to {100 * span.high:.0f} %"
+            medians = [display_unit(results.table.unit(m), results.median(point, m)) for m in metrics]
+            texts = [unit.text(results.median(point, m)) for unit, m in zip(medians, metrics, strict=True)]
+            rows.append([results.label_of(key), name, f"{point.successes} of {len(point.done)}", ends, *texts])
+    _print_table(console, ("at", "campaign", "succeeded", "95 % interval", *(f"median\n{m}" for m in metrics)), rows)
+    tests = [
+        [
+            results.label_of(t.key),
+            f"{t.first} – {t.second}",
+            f"{t.counts[0]} of {t.counts[1]} – {t.counts[2]} of {t.counts[3]}",
+            t.method,
+            f"{t.p:.2g}",
+        ]
+        for t in success_tests(results)
+    ]
+    _print_table(console, ("at", "successes of", "", "test", "p"), tests)
+
+
+def _print_runs(console: Console, comparison: RunComparison) -> None:
+    names = [e.name for e in comparison.entries]
+    rows: list[list[str]] = []
+    for row in comparison.metrics:
+        unit = display_unit(row.unit, list(row.values.values()))
+        rows.append([row.description, *(unit.text(row.values[n]) for n in names)])
+    verdicts = ["succeeded" if e.facts.summary["success"] else "failed" for e in comparison.entries]
+    _print_table(console, ("", *names), [["verdict", *verdicts], *rows])
+
+
+def _print_table(console: Console, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    if not rows:
+        return
+    table = Table(box=None, padding=(0, 2), pad_edge=True)
+    for k, heading in enumerate(header):
+        table.add_column(Text(heading), justify="left" if k == 0 else "right", overflow="fold")
+    for row in rows[:_MAX_ROWS]:
+        table.add_row(*map(Text, row))
+    console.print(table)
+    if len(rows) > _MAX_ROWS:
+        console.print(f"  and {len(rows) - _MAX_ROWS} rows more, in the report")

@@ -1,0 +1,1 @@
+"""Campaigns, or runs, beside each other: one table, one page, figures."""

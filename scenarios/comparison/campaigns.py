@@ -1,0 +1,322 @@
+"""Campaigns beside each other: their points matched by the values of their parameters, and tests at each point."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from handover.cosim.exceptions import nearest
+from handover.scenarios.campaign.results import CampaignResults, PointResults
+from handover.scenarios.campaign.statistics import (
+    DifferenceTest,
+    PairedTest,
+    holm,
+    paired_difference,
+    paired_test,
+    two_proportions,
+    unpaired_difference,
+)
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of, list_layout
+from handover.scenarios.comparison.entries import CampaignEntry, NotComparable, full_parameters
+
+ENTRY = "in campaign"
+"""The parameter, in the table of all, that tells the campaigns apart; no parameter has a name with a space."""
+
+_MAX_TESTS = 100
+"""Tests of a metric: the interval of each takes some 20 ms."""
+
+Key = tuple[tuple[str, str], ...]
+"""Names and values by which points are matched."""
+
+
+class ComparedCampaigns(CampaignResults):
+    """The runs of several campaigns as those of one, whose points are told apart by the campaign, too.
+
+    Args:
+        entries: the campaigns.
+        chosen: metrics that are shown; by default the first of the headline.
+
+    Raises:
+        NotComparable: a campaign shares no point with another, a metric has another unit than elsewhere, or a chosen
+            metric is in none of them.
+    """
+
+    def __init__(self, entries: Sequence[CampaignEntry], chosen: Sequence[str] = ()) -> None:
+        self.entries = entries
+        self.keys = tuple(dict.fromkeys(name for e in entries for name in e.results.varied))
+        by_entry = [self._points_of(e) for e in entries]
+        faults = _faults_of_points(entries, by_entry) + _faults_of_metrics(entries, chosen)
+        if faults:
+            raise NotComparable(faults)
+        self._chosen = tuple(dict.fromkeys(chosen))
+        self.matched: Sequence[Key] = tuple(dict.fromkeys(key for points in by_entry for key in points))
+        pairs = [(key, k) for key in self.matched for k, points in enumerate(by_entry) if key in points]
+        numbers = {pair: number for number, pair in enumerate(pairs)}
+        metadata: dict[str, Any] = {
+            "scenario": entries[0].scenario,
+            "source": entries[0].description.get("source", {}),
+            "points": [{**dict(key), ENTRY: entries[k].name} for key, k in pairs],
+            "fixed": {},
+            "repetitions": 1,
+        }
+        super().__init__(metadata, _merged(entries, [_numbers(by_entry[k], k, numbers) for k in range(len(entries))]))
+
+    def _points_of(self, entry: CampaignEntry) -> dict[Key, list[int]]:
+        """Return the numbers of a campaign's points by the values that tell points apart."""
+        points: dict[Key, list[int]] = {}
+        for number, values in enumerate(entry.description["points"]):
+            full = full_parameters(entry.results.experiment, {**entry.description["fixed"], **values})
+            key = tuple((name, full[name]) for name in self.keys if name in full)
+            points.setdefault(key, []).append(number)
+        return points
+
+    @property
+    def shown_metrics(self) -> tuple[str, ...]:
+        """Metrics that tables and figures of points show: those chosen, else the first."""
+        return self._chosen or super().shown_metrics
+
+    def words(self, parameter: str, text: str) -> str:
+        """Return a value that is no number as one reads it; a campaign's name as it was given."""
+        return text if parameter == ENTRY else super().words(parameter, text)
+
+    def at(self, key: Key) -> Mapping[str, PointResults]:
+        """Return the results of a matched point by the campaign's name; those without a run that has ended lack."""
+        return self._by_key.get(key, {})
+
+    @cached_property
+    def _by_key(self) -> Mapping[Key, Mapping[str, PointResults]]:
+        by_key: dict[Key, dict[str, PointResults]] = {}
+        for point in self.points:
+            by_key.setdefault(_key_of(point), {})[point.values[ENTRY]] = point
+        return by_key
+
+    def label_of(self, key: Key) -> str:
+        """Return what a matched point is called."""
+        return ", ".join(self.value_text(name, text) for name, text in key) or "all runs"
+
+    @property
+    def layout(self) -> PointLayout:
+        """The points along an axis, the campaigns beside each other at each, told apart by colour."""
+        if len(self.matched) == 1:
+            return replace(layout_of(self), title="")
+        base, order = self._without_entries()
+        layout = layout_of(base)
+        if len(layout.group_names) > 1:
+            layout = list_layout(base)
+        names = [e.name for e in self.entries]
+        room = layout.room / len(names)
+        groups = [names.index(p.values[ENTRY]) for p in self.points]
+        sign = -1.0 if layout.listed else 1.0
+        shift = np.array([sign * (g - (len(names) - 1) / 2) * room for g in groups])
+        return replace(layout, places=layout.places[order] + shift, room=room, groups=groups, group_names=names)
+
+    def _without_entries(self) -> tuple[CampaignResults, list[int]]:
+        """Return the matched points as those of one campaign without metrics, and which of them each point is."""
+        keys = [_key_of(p) for p in self.points]
+        present = list(dict.fromkeys(keys))
+        n = len(present)
+        table: Any = pa.table({"point": list(range(n)), "status": ["done"] * n, "success": [True] * n})
+        return CampaignResults({**self.metadata, "points": [dict(key) for key in present]}, CampaignTable(table)), [
+            present.index(key) for key in keys
+        ]
+
+
+def _key_of(point: PointResults) -> Key:
+    return tuple((name, text) for name, text in point.values.items() if name != ENTRY)
+
+
+def _numbers(points: Mapping[Key, Sequence[int]], entry: int, numbers: Mapping[tuple[Key, int], int]) -> dict[int, int]:
+    """Return the number in the table of all of each of a campaign's points."""
+    return {own: numbers[key, entry] for key, owns in points.items() for own in owns}
+
+
+def _faults_of_points(entries: Sequence[CampaignEntry], by_entry: Sequence[Mapping[Key, Any]]) -> list[str]:
+    faults: list[str] = []
+    for k, entry in enumerate(entries):
+        others = {key for j, points in enumerate(by_entry) for key in points if j != k}
+        if not others & by_entry[k].keys():
+            own, theirs = _values(by_entry[k]), _values(others)
+            apart = [n for n in {**own, **theirs} if not own.get(n, {}).keys() & theirs.get(n, {}).keys()]
+            why = [f"{n} is {_list(own.get(n, {}))} in it, {_list(theirs.get(n, {}))} in others" for n in apart]
+            text = "; ".join(why) or "the values of its parameters are combined otherwise"
+            faults.append(f"{entry.folder}: none of its points is in another campaign: {text}")
+    return faults
+
+
+def _values(keys: Any) -> dict[str, dict[str, None]]:
+    values: dict[str, dict[str, None]] = {}
+    for key in keys:
+        for name, text in key:
+            values.setdefault(name, {})[text] = None
+    return values
+
+
+def _list(texts: Any) -> str:
+    shown = list(texts)
+    return ", ".join(shown[:4]) + (", ..." if len(shown) > 4 else "") if shown else "not given"
+
+
+def _faults_of_metrics(entries: Sequence[CampaignEntry], chosen: Sequence[str]) -> list[str]:
+    faults: list[str] = []
+    units: dict[str, tuple[str, Path]] = {}
+    for entry in entries:
+        for name in _metrics(entry):
+            unit = entry.results.table.unit(_column(entry, name))
+            first = units.setdefault(name, (unit, entry.folder))
+            if first[0] != unit:
+                faults.append(f"{entry.folder}: its metric {name} is in {unit}, in {first[1]} in {first[0]}")
+    return faults + [f"no campaign has a metric {n!r}; {nearest(n, units)}" for n in chosen if n not in units]
+
+
+def _metrics(entry: CampaignEntry) -> list[str]:
+    """Return the names of a campaign's metrics, without what tells their columns from those of parameters."""
+    columns = entry.results.table.metrics
+    bare = [c.removesuffix("_metric") for c in columns]
+    return [c if n != c and n in columns else n for c, n in zip(columns, bare, strict=True)]
+
+
+def _column(entry: CampaignEntry, metric: str) -> str:
+    columns = entry.results.table.metrics
+    return metric if metric in columns else f"{metric}_metric"
+
+
+_KEPT = ("repetition", "seed", "status", "success", "reason", "simulated_seconds", "wall_seconds", "cpu_seconds")
+
+
+def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int]]) -> CampaignTable:
+    """Return the runs of all campaigns in one table, by the points' new numbers; a metric that one lacks is null."""
+    tables: list[Any] = [e.results.table.table for e in entries]
+    columns: dict[str, Any] = {
+        "run": pa.chunked_array(
+            [[f"{e.name}: {run}" for run in t.column("run").to_pylist()] for e, t in _both(entries)]
+        ),
+        "point": pa.chunked_array(
+            [[of[k] for k in t.column("point").to_pylist()] for of, t in zip(numbers, tables, strict=True)],
+            type=pa.int64(),
+        ),
+    }
+    fields: list[Any] = [pa.field("run", pa.string()), pa.field("point", pa.int64())]
+    for name in _KEPT:
+        kind = next(t.schema.field(name).type for t in tables if name in t.column_names)
+        columns[name] = _column_of(tables, [name] * len(tables), kind)
+        fields.append(pa.field(name, kind))
+    for name in dict.fromkeys(name for e in entries for name in _metrics(e)):
+        owner = next(e for e in entries if name in _metrics(e)).results.table
+        source = name if name in owner.metrics else f"{name}_metric"
+        metadata = {"role": "metric", "unit": owner.unit(source), "description": owner.description(source)}
+        columns[name] = _column_of(tables, [_column(e, name) for e in entries], pa.float64())
+        fields.append(pa.field(name, pa.float64(), metadata=metadata))
+    return CampaignTable(pa.table(columns, schema=pa.schema(fields)))
+
+
+def _both(entries: Sequence[CampaignEntry]) -> list[tuple[CampaignEntry, Any]]:
+    return [(e, e.results.table.table) for e in entries]
+
+
+def _column_of(tables: Sequence[Any], names: Sequence[str], kind: Any) -> Any:
+    parts: list[Any] = [
+        t.column(n).combine_chunks().cast(kind) if n in t.column_names else pa.nulls(t.num_rows, kind)
+        for t, n in zip(tables, names, strict=True)
+    ]
+    return pa.chunked_array(parts, type=kind)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuccessTest:
+    """Whether one campaign succeeds more often than another at a point.
+
+    Attributes:
+        key: the point.
+        first, second: names of the campaigns.
+        counts: successes and runs done of the first, then of the second; of the pairs, where there are any.
+        pairs: the runs with shared seeds, by McNemar's exact test; None where none are, and Fisher's test is taken.
+        p, corrected: of the test, and by Holm's method for the number of such tests.
+    """
+
+    key: Key
+    first: str
+    second: str
+    counts: tuple[int, int, int, int]
+    pairs: PairedTest | None
+    p: float
+    corrected: float = 1.0
+
+    @property
+    def method(self) -> str:
+        """The test's name."""
+        return "Fisher" if self.pairs is None else "McNemar"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MetricTest:
+    """In what a metric differs between two campaigns at a point, and by which test; see `SuccessTest`."""
+
+    key: Key
+    first: str
+    second: str
+    metric: str
+    test: DifferenceTest
+    corrected: float = 1.0
+
+
+def success_tests(results: ComparedCampaigns) -> list[SuccessTest]:
+    """Return tests of successes of each two campaigns at each point that both have: paired where they share seeds."""
+    success = results.table.column("success")
+    tests: list[SuccessTest] = []
+    for key, first, second in _pairs_of_campaigns(results):
+        a, b = results.at(key)[first], results.at(key)[second]
+        rows = _shared_rows(results, a, b)
+        if rows:
+            ours, theirs = ([bool(success[pair[k]]) for pair in rows] for k in (0, 1))
+            test = paired_test(ours, theirs)
+            counts = (sum(ours), len(rows), sum(theirs), len(rows))
+            p = test.p
+        else:
+            test, counts = None, (a.successes, len(a.done), b.successes, len(b.done))
+            p = two_proportions(*counts)
+        tests.append(SuccessTest(key=key, first=first, second=second, counts=counts, pairs=test, p=p))
+    corrected = holm([t.p for t in tests])
+    return [replace(t, corrected=p) for t, p in zip(tests, corrected, strict=True)]
+
+
+def metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
+    """Return tests of a metric, likewise, over the runs done; at the first points, where there are very many."""
+    values = results.table.column(metric)
+    tests: list[MetricTest] = []
+    for key, first, second in _pairs_of_campaigns(results)[:_MAX_TESTS]:
+        a, b = results.at(key)[first], results.at(key)[second]
+        rows = _shared_rows(results, a, b)
+        if rows:
+            test = paired_difference(*(values[[pair[k] for pair in rows]] for k in (0, 1)))
+        else:
+            test = unpaired_difference(values[a.done], values[b.done])
+        if test is not None:
+            tests.append(MetricTest(key=key, first=first, second=second, metric=metric, test=test))
+    corrected = holm([t.test.p for t in tests])
+    return [replace(t, corrected=p) for t, p in zip(tests, corrected, strict=True)]
+
+
+def _pairs_of_campaigns(results: ComparedCampaigns) -> list[tuple[Key, str, str]]:
+    """Return the points with each two campaigns that have done runs there, in the campaigns' order."""
+    pairs: list[tuple[Key, str, str]] = []
+    for key in results.matched:
+        here = results.at(key)
+        names = [e.name for e in results.entries if e.name in here and len(here[e.name].done)]
+        pairs += [(key, first, second) for first, second in combinations(names, 2)]
+    return pairs
+
+
+def _shared_rows(results: ComparedCampaigns, a: PointResults, b: PointResults) -> list[tuple[int, int]]:
+    """Return the rows of runs done with the same seed; none where a seed is there twice, as in merged points."""
+    seed = results.table.column("seed")
+    ours, theirs = ({int(seed[row]): int(row) for row in point.done} for point in (a, b))
+    if max(Counter(seed[a.done].tolist()).values()) > 1 or max(Counter(seed[b.done].tolist()).values()) > 1:
+        return []
+    return [(ours[s], theirs[s]) for s in sorted(ours.keys() & theirs.keys())]

@@ -1,0 +1,241 @@
+"""Reads what is compared, campaigns or runs, and finds what makes them incomparable and in what they differ.
+
+Nothing is written to their folders. All faults are found at once (`NotComparable`).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+from handover.cosim.record.reader import Record
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.results import CampaignResults
+from handover.scenarios.campaign_report.campaign_page import read_results
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
+from handover.scenarios.results.run_facts import RunFacts, record_of
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.tables import format_value
+
+MAX_ENTRIES = 9
+"""Campaigns or runs on one page: as many as there are colours."""
+
+
+class NotComparable(ValueError):
+    """Folders that cannot be compared; `faults` lists all reasons, a line each."""
+
+    def __init__(self, faults: Sequence[str]) -> None:
+        super().__init__("\n".join(faults))
+        self.faults = tuple(faults)
+
+
+@dataclass(frozen=True)
+class CampaignEntry:
+    """A campaign that is compared: the name that it has in the comparison, its folder, and its results."""
+
+    name: str
+    folder: Path
+    results: CampaignResults
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return self.results.scenario
+
+    @property
+    def description(self) -> Mapping[str, Any]:
+        """Content of `campaign.json`."""
+        return self.results.metadata
+
+    @cached_property
+    def parameters(self) -> Mapping[str, str]:
+        """The texts of the parameters that its points share, those at their defaults included."""
+        return full_parameters(self.results.experiment, self.results.metadata["fixed"])
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """A run that is compared: the name that it has in the comparison, its folder, what it says, and its record."""
+
+    name: str
+    folder: Path
+    facts: RunFacts
+    record: Record | None
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return self.facts.scenario
+
+    @property
+    def description(self) -> Mapping[str, Any]:
+        """Content of `run.json`."""
+        return self.facts.run
+
+    @cached_property
+    def parameters(self) -> Mapping[str, str]:
+        """The texts of its parameters, with units where the run's folder tells them."""
+        return {name: text for name, text, _ in self.facts.parameters}
+
+
+Entry = CampaignEntry | RunEntry
+
+
+def full_parameters(experiment: type[Experiment[Any]] | None, given: Mapping[str, str]) -> dict[str, str]:
+    """Return the texts of a scenario's parameters, those that are not given at their defaults.
+
+    Texts that this version of the scenario does not take stay as they are.
+    """
+    if experiment is None:
+        return dict(given)
+    declared = experiment.parameters()
+    known = {v.name for v in declared}
+    try:
+        parameters = parse_parameters(experiment, [f"{n}={text}" for n, text in given.items() if n in known])
+    except InvalidParameter:
+        return dict(given)
+    return {**{v.name: text_of(v, getattr(parameters, v.name)) for v in declared}, **given}
+
+
+def read_entries(
+    folders: Sequence[Path], names: Sequence[str] = ()
+) -> tuple[Sequence[CampaignEntry], Sequence[RunEntry]]:
+    """Read campaigns or runs, one of the two sequences being empty.
+
+    Args:
+        folders: of campaigns, or of runs.
+        names: of the entries, in the order of the folders; by default those of the folders.
+
+    Raises:
+        NotComparable: a folder is neither, or damaged; they are too few or too many, of both kinds, or of different
+            scenarios; or a name is given twice.
+    """
+    faults = [*_faults_of_folders(folders), *_faults_of_names(folders, names)]
+    campaigns: list[CampaignEntry] = []
+    runs: list[RunEntry] = []
+    for name, folder in zip(names or _names_of(folders), folders, strict=False):
+        try:
+            if CampaignFolder(folder).is_there:
+                campaigns.append(CampaignEntry(name, folder, read_results(CampaignFolder(folder))))
+            elif RunFolder.of_run(folder).is_there:
+                run = RunFolder.of_run(folder)
+                runs.append(RunEntry(name, folder, RunFacts.read(run), record_of(run)))
+            else:
+                what = "neither a run (no run.json) nor a campaign (no campaign.json)" if folder.is_dir() else "nothing"
+                faults.append(f"{folder} is the folder of {what}; name folders of runs, or of campaigns")
+        except InvalidRunFolder as e:
+            faults.append(f"{folder}: {e.fault}")
+    faults += _faults_of_kinds(campaigns, runs)
+    if faults:
+        raise NotComparable(faults)
+    return campaigns, runs
+
+
+def _faults_of_folders(folders: Sequence[Path]) -> list[str]:
+    faults: list[str] = []
+    if len(folders) < 2:
+        faults.append("there is nothing to compare it with; name at least two folders, of campaigns or of runs")
+    if len(folders) > MAX_ENTRIES:
+        faults.append(f"{len(folders)} folders; at most {MAX_ENTRIES} can be told apart on a page")
+    absolute = [folder.resolve() for folder in folders]
+    twice = [f for k, f in enumerate(folders) if absolute[k] in absolute[:k]]
+    return faults + [f"{folder} is named twice; a comparison with itself says nothing" for folder in twice]
+
+
+def _faults_of_names(folders: Sequence[Path], names: Sequence[str]) -> list[str]:
+    faults: list[str] = []
+    if names and len(names) != len(folders):
+        faults.append(f"{len(names)} names for {len(folders)} folders; give --name once for each, in their order")
+    faults += [f"name {name!r} is given twice" for name in dict.fromkeys(n for n in names if names.count(n) > 1)]
+    return faults + ["a name is empty" for name in names if not name.strip()]
+
+
+def _names_of(folders: Sequence[Path]) -> list[str]:
+    """Return the folders' own names, with as many of the folders above them as tell them apart."""
+    paths = [folder.resolve().parts for folder in folders]
+    for depth in range(1, max(map(len, paths)) + 1):
+        names = ["/".join(parts[-depth:]) for parts in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [str(folder) for folder in folders]
+
+
+def _faults_of_kinds(campaigns: Sequence[CampaignEntry], runs: Sequence[RunEntry]) -> list[str]:
+    if campaigns and runs:
+        a, b = campaigns[0].folder, runs[0].folder
+        return [f"{a} is a campaign, {b} a run: compare campaigns with campaigns, or runs with runs, as {a}/runs/..."]
+    entries: Sequence[Entry] = campaigns or runs
+    return [
+        f"{e.folder} is of another scenario, {e.scenario}, than {entries[0].folder}, {entries[0].scenario}"
+        for e in entries[1:]
+        if e.scenario != entries[0].scenario
+    ]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A setting in which entries differ: its name, its kind, and its text in each of them, "–" where it has none."""
+
+    name: str
+    kind: str
+    values: tuple[str, ...]
+
+
+def differences_of(entries: Sequence[Entry], varied: Sequence[str] = ()) -> list[Difference]:
+    """Return in what entries differ: parameters, units, the scenario's code, options of the master, seeds, versions.
+
+    Args:
+        entries: what is compared.
+        varied: parameters by which points are told apart, which are left out.
+    """
+    found = _of_kind(entries, "parameter", lambda e: {n: t for n, t in e.parameters.items() if n not in varied})
+    found += _of_kind(entries, "unit", lambda e: {n: _fmu(u) for n, u in _part(e, "units").items()})
+    found += _of_kind(entries, "scenario", _code)
+    found += _of_kind(entries, "master", lambda e: _flat(_part(e, "master")))
+    found += _of_kind(entries, "seeds", _seeds)
+    return found + _of_kind(entries, "version", lambda e: {n: str(v) for n, v in _part(e, "versions").items()})
+
+
+def _of_kind(entries: Sequence[Entry], kind: str, texts: Callable[[Any], Mapping[str, str]]) -> list[Difference]:
+    by_entry = [texts(entry) for entry in entries]
+    names = dict.fromkeys(name for known in by_entry for name in known)
+    rows = [Difference(n, kind, tuple(known.get(n, "–") for known in by_entry)) for n in names]
+    return [row for row in rows if len(set(row.values)) > 1]
+
+
+def _part(entry: Entry, name: str) -> Mapping[str, Any]:
+    part: Any = entry.description.get(name)
+    return cast(Mapping[str, Any], part) if isinstance(part, dict) else {}
+
+
+def _fmu(unit: Any) -> str:
+    if not isinstance(unit, dict):
+        return str(unit)
+    known = cast(Mapping[str, Any], unit)
+    return f"{known.get('fmu', '')} ({str(known.get('sha256', ''))[:12]})"
+
+
+def _code(entry: Entry) -> dict[str, str]:
+    digest = str(_part(entry, "source").get("sha256", ""))
+    return {"code of the scenario": digest[:12]} if digest else {}
+
+
+def _seeds(entry: Entry) -> dict[str, str]:
+    content = entry.description
+    if isinstance(entry, RunEntry):
+        return {"seed": str(content.get("seed"))}
+    names = {"seed": "campaign's seed", "repetitions": "runs of each point", "paired": "points share seeds"}
+    return {words: format_value(content.get(name)) for name, words in names.items()}
+
+
+def _flat(options: Mapping[str, Any], before: str = "") -> dict[str, str]:
+    flat: dict[str, str] = {}
+    for name, value in options.items():
+        words = f"{before}{name.replace('_', ' ')}"
+        if isinstance(value, Mapping):
+            flat |= _flat(cast(Mapping[str, Any], value), f"{words} ")
+        else:
+            flat[words] = "none" if value is None else format_value(value)
+    return flat
