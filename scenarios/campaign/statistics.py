@@ -7,7 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import beta, binomtest, bootstrap, fisher_exact, mannwhitneyu, wilcoxon
+from scipy import stats
+from scipy.stats import beta, binomtest, bootstrap, fisher_exact, wilcoxon
 
 LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
@@ -162,8 +163,10 @@ def unpaired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest |
     x, y = (values[np.isfinite(values)] for values in (np.asarray(first, float), np.asarray(second, float)))
     if not len(x) or not len(y):
         return None
-    p = float(mannwhitneyu(x, y).pvalue)
-    return DifferenceTest(min(len(x), len(y)), float(np.median(y) - np.median(x)), None, p, "Mann-Whitney")
+    test: Any = stats.mannwhitneyu(x, y)
+    return DifferenceTest(
+        min(len(x), len(y)), float(np.median(y) - np.median(x)), None, float(test.pvalue), "Mann-Whitney"
+    )
 
 
 def holm(p: Sequence[float]) -> list[float]:

@@ -1,6 +1,5 @@
 """Campaigns beside each other: their points matched by the values of their parameters, and tests at each point."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -213,7 +212,8 @@ def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int
         metadata = {"role": "metric", "unit": owner.unit(source), "description": owner.description(source)}
         columns[name] = _column_of(tables, [_column(e, name) for e in entries], pa.float64())
         fields.append(pa.field(name, pa.float64(), metadata=metadata))
-    return CampaignTable(pa.table(columns, schema=pa.schema(fields)))
+    table: Any = pa.table(columns, schema=pa.schema(fields))
+    return CampaignTable(table)
 
 
 def _both(entries: Sequence[CampaignEntry]) -> list[tuple[CampaignEntry, Any]]:
@@ -221,11 +221,12 @@ def _both(entries: Sequence[CampaignEntry]) -> list[tuple[CampaignEntry, Any]]:
 
 
 def _column_of(tables: Sequence[Any], names: Sequence[str], kind: Any) -> Any:
-    parts: list[Any] = [
+    parts: Any = [
         t.column(n).combine_chunks().cast(kind) if n in t.column_names else pa.nulls(t.num_rows, kind)
         for t, n in zip(tables, names, strict=True)
     ]
-    return pa.chunked_array(parts, type=kind)
+    column: Any = pa.chunked_array(parts, type=kind)
+    return column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -317,6 +318,6 @@ def _shared_rows(results: ComparedCampaigns, a: PointResults, b: PointResults) -
     """Return the rows of runs done with the same seed; none where a seed is there twice, as in merged points."""
     seed = results.table.column("seed")
     ours, theirs = ({int(seed[row]): int(row) for row in point.done} for point in (a, b))
-    if max(Counter(seed[a.done].tolist()).values()) > 1 or max(Counter(seed[b.done].tolist()).values()) > 1:
+    if len(ours) < len(a.done) or len(theirs) < len(b.done):
         return []
     return [(ours[s], theirs[s]) for s in sorted(ours.keys() & theirs.keys())]

@@ -115,7 +115,7 @@ def read_entries(
     faults = [*_faults_of_folders(folders), *_faults_of_names(folders, names)]
     campaigns: list[CampaignEntry] = []
     runs: list[RunEntry] = []
-    for name, folder in zip(names or _names_of(folders), folders, strict=False):
+    for name, folder in zip(names if len(names) == len(folders) else _names_of(folders), folders, strict=True):
         try:
             if CampaignFolder(folder).is_there:
                 campaigns.append(CampaignEntry(name, folder, read_results(CampaignFolder(folder))))
@@ -123,8 +123,9 @@ def read_entries(
                 run = RunFolder.of_run(folder)
                 runs.append(RunEntry(name, folder, RunFacts.read(run), record_of(run)))
             else:
-                what = "neither a run (no run.json) nor a campaign (no campaign.json)" if folder.is_dir() else "nothing"
-                faults.append(f"{folder} is the folder of {what}; name folders of runs, or of campaigns")
+                of_neither = "is the folder of neither a run (no run.json) nor a campaign (no campaign.json)"
+                what = of_neither if folder.is_dir() else "is no folder"
+                faults.append(f"{folder} {what}; name folders of runs, or of campaigns")
         except InvalidRunFolder as e:
             faults.append(f"{folder}: {e.fault}")
     faults += _faults_of_kinds(campaigns, runs)

@@ -120,7 +120,7 @@ Panel = tuple[TimePlot, Mapping[str, Curve]]
 """A plot without curves, and the curve of each run by its name, over that run's own time."""
 
 
-def _of_scenario(entries: Sequence[tuple[RunEntry, Record]], left_out: list[str]) -> list[Panel]:
+def _of_scenario(entries: Sequence[tuple[RunEntry, Record]], left_out: list[str]) -> Sequence[Panel]:
     """Return the main curves of the scenario's plots, each in a plot of its own, in which all runs have one."""
     panels: dict[tuple[str, str], tuple[TimePlot, dict[str, Curve]]] = {}
     for entry, record in entries:
@@ -130,7 +130,7 @@ def _of_scenario(entries: Sequence[tuple[RunEntry, Record]], left_out: list[str]
                 panel = panels.setdefault((plot.title, curve.label), (_panel(plot, curve, len(main)), {}))
                 panel[1][entry.name] = curve
     if panels:
-        return list(panels.values())[:_MAX_PLOTS]
+        return [*panels.values()][:_MAX_PLOTS]
     first = entries[0][1]
     scalars = [s for s in first.signals if first[s].dtype.kind == "f" and first[s].ndim == 1]
     return _named(entries, scalars[:_MAX_PLOTS])
@@ -190,7 +190,7 @@ def _panel_of(record: Record, signal: str, title: str, columns: Mapping[str, Map
 def _is_held(values: Floats) -> bool:
     """Return whether a signal keeps its value over most steps, as a sampled unit's output does."""
     changes = np.count_nonzero(np.diff(values))
-    return 0 < changes < 0.7 * (len(values) - 1)
+    return bool(0 < changes < 0.7 * (len(values) - 1))
 
 
 def _split(record: Record, signal: str) -> tuple[str, str] | None:

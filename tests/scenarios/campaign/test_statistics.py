@@ -6,10 +6,13 @@ from scipy.stats import binomtest
 
 from handover.scenarios.campaign.statistics import (
     compatible_counts,
+    holm,
+    paired_difference,
     paired_test,
     success_interval,
     time_interval,
     two_proportions,
+    unpaired_difference,
 )
 
 
@@ -105,3 +108,30 @@ def test_the_lady_tasting_tea():
 def test_with_three_trials_of_theirs_hardly_a_count_can_be_distinguished():
     assert compatible_counts(2, 3, 3) == (0, 3)
     assert compatible_counts(0, 4, 4) == (0, 3)  # 4 of 4: p = 2 / C(8, 4)
+
+
+def test_a_signed_rank_test_of_differences_of_one_sign():
+    test = paired_difference([1.0, 2.0, 3.0, 4.0, np.nan], [1.5, 2.6, 3.7, 4.8, 9.0])
+    assert test is not None
+    assert (test.n, test.p) == (4, pytest.approx(2 / 2**4))
+    assert test.difference == pytest.approx(0.65)
+
+
+def test_values_that_are_all_alike_do_not_differ():
+    test = paired_difference([1.0, 2.0], [1.0, 2.0])
+    assert test is not None
+    assert (test.p, test.difference, test.interval) == (1.0, 0.0, None)
+    assert paired_difference([np.nan], [1.0]) is None
+
+
+def test_groups_that_do_not_overlap():
+    test = unpaired_difference([1.0, 2.0, 3.0], [4.0, 5.0, 6.0, np.nan])
+    assert test is not None
+    assert (test.n, test.difference, test.p) == (3, 3.0, pytest.approx(2 / 20))  # two of the 6 choose 3 orders
+    assert unpaired_difference([], [1.0]) is None
+
+
+def test_holms_correction():  # [Holm1979], each p times the number of those not smaller, never falling
+    assert holm([0.04, 0.01, 0.03]) == pytest.approx([0.06, 0.03, 0.06])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([]) == []

@@ -1,0 +1,146 @@
+"""`handover compare`: campaigns that differ, run and compared; usage errors, which leave nothing; JSON."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from campaigns import campaign_metadata, carried_out, folder_of, table_of
+from click.testing import CliRunner, Result
+from opened_page import opened, overflow
+from playwright.sync_api import Browser
+
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.cli.command import main
+
+
+@pytest.fixture(scope="module")
+def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of two campaigns with the same seeds: `far`, where a hand goes 10 cm forward, and `near`."""
+    folder = tmp_path_factory.mktemp("campaigns")
+    for name, given in (("far", {"strategy": "forward", "forward": "0.1"}), ("near", {"strategy": "blind"})):
+        fixed = {**given, "run_up": "0"}
+        points = [{"thing": "cylinder"}, {"thing": "paper_box_a"}][: 1 + (name == "far")]
+        carried_out(CampaignPlan(scenario="ir_grasp", points=points, fixed=fixed, repetitions=3, seed=2), folder / name)
+    return folder
+
+
+def compare(*arguments: object) -> Result:
+    return CliRunner().invoke(main, ["compare", *map(str, arguments)])
+
+
+def test_a_known_difference_is_found_run_by_run(grasps: Path, tmp_path: Path, browser: Browser):
+    out = tmp_path / "out"
+    call = (grasps / "far", grasps / "near", "--name", "10 cm", "--name", "<at once>", "--out", out)
+    done = compare(*call, "--metric", "moved", "--metric", "left_behind", "--json")
+    assert done.exit_code == 0, done.output
+    printed: dict[str, Any] = json.loads(done.stdout)
+    assert printed.pop("folder") == str(out)
+    assert printed == json.loads((out / "comparison.json").read_bytes())
+    assert printed["differences"] == [
+        {"kind": "parameter", "name": "strategy", "values": {"10 cm": "forward", "<at once>": "blind"}},
+        {"kind": "parameter", "name": "forward", "values": {"10 cm": "0.1", "<at once>": "0.035"}},
+    ]
+    assert [list(p["campaigns"]) for p in printed["points"]] == [["10 cm", "<at once>"], ["10 cm"]]
+    success, *_ = printed["tests"]
+    assert (success["of"], success["paired"], success["method"]) == ("success", True, "McNemar")
+    assert success["counts"] == {"first": [3, 3], "second": [0, 3]}
+    assert (success["only_first"], success["p"]) == (3, 0.25)
+    moved = next(t for t in printed["tests"] if t["of"] == "moved")  # by the seed alone: the pairs are of one scene
+    assert (moved["paired"], moved["n"], moved["difference"], moved["p"]) == (True, 3, 0.0, 1.0)
+    assert len((out / "comparison.csv").read_text().splitlines()) == 4
+    names = ("success_by_point", "moved_by_point", "left_behind_by_point")
+    assert {p.name for p in (out / "figures").iterdir()} == {f"{n}.{end}" for n in names for end in ("png", "svg")}
+    with opened(browser, out / "report.html") as page:
+        assert page.inner_text("h1") == "ir_grasp: 10 cm and <at once>"
+        assert page.locator(".plot:has(.main-svg)").count() == page.locator(".plot").count() == 2
+        assert page.evaluate("document.querySelector('#success .plot').data.map(t => t.name)") == ["10 cm", "<at once>"]
+        rates = "document.querySelector('#success .plot').data.map(t => t.customdata.map(c => c[1]))"
+        assert page.evaluate(rates) == [["3 of 3", "3 of 3"], ["0 of 3"]]
+        assert "3 of 3" in page.inner_text("#tests tbody tr")
+        assert "0.035" in page.inner_text("#differences")
+        page.set_viewport_size({"width": 400, "height": 800})
+        assert overflow(page) <= 0
+
+
+def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser: Browser):
+    folders = [grasps / name / "runs" / "000_thing=cylinder_r0000" for name in ("far", "near")]
+    out = tmp_path / "out"
+    done = compare(*folders, "--out", out, "--name", "far", "--name", "near", "--signal", "scene.p_WH")
+    assert done.exit_code == 0, done.output
+    assert f"report: {out / 'report.html'}" in done.stdout
+    assert "they differ in: strategy, forward" in done.stdout
+    assert {p.name for p in (out / "figures").iterdir()} == {"curves.png", "curves.svg"}
+    assert json.loads((out / "comparison.json").read_bytes())["curves"] == ["scene.p_WH[1]", "scene.p_WH[2]"]
+    assert (out / "comparison.csv").read_text().startswith("metric,unit,far,near\n")
+    with opened(browser, out / "report.html") as page:
+        first = "document.querySelector('#time .plot')"
+        assert page.evaluate(f"{first}.data.map(t => t.name)") == ["far", "near"]
+        assert page.evaluate(f"{first}.layout.yaxis.title.text") == "scene.p_WH[1] (mm)"
+        last = f"{first}.calcdata.map(points => Math.max(...points.map(p => p.y ?? -1e9)))"
+        far, near = page.evaluate(last)
+        assert far - near == pytest.approx(100, abs=2)  # mm, which it goes forward before it closes
+
+
+def test_the_scenarios_own_plots_are_compared_where_no_signal_is_named(grasps: Path, tmp_path: Path):
+    folders = [grasps / name / "runs" / "000_thing=cylinder_r0000" for name in ("far", "near")]
+    done = compare(*folders, "--out", tmp_path / "out", "--json")
+    assert done.exit_code == 0, done.output
+    curves = json.loads(done.stdout)["curves"]
+    assert curves[0] == "Distances of the fingers from the object: thumb, as seen"
+    assert "Cost of thumb and ring, [Luberto] eq. (4)" in curves
+    assert len(curves) == 6
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_without_a_folder_it_is_one_of_its_own(here: Path):
+    for name in ("a", "b"):
+        folder_of(here / name, campaign_metadata("ir_grasp", [{}]), table_of([{}]))
+    done = compare("a", "b"), compare("a", "b")
+    assert [d.exit_code for d in done] == [0, 0]
+    made = sorted((here / "comparisons").iterdir())
+    assert len(made) == 2
+    assert all((folder / "report.html").is_file() and "_ir_grasp" in folder.name for folder in made)
+
+
+def test_a_folder_that_is_not_empty_is_refused_and_left_alone(here: Path):
+    for name in ("a", "b"):
+        folder_of(here / name, campaign_metadata("ir_grasp", [{}]), table_of([{}]))
+    done = compare("a", "b", "--out", "a")
+    assert (done.exit_code, done.output) == (
+        2,
+        "Error: output folder a: it is not empty; name a new or an empty folder\n",
+    )
+    assert {p.name for p in (here / "a").iterdir()} == {"campaign.json", "runs.parquet"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentences"),
+    [
+        (("a",), ["there is nothing to compare it with; name at least two folders, of campaigns or of runs"]),
+        (
+            ("a", "absent", "--name", "x"),
+            ["1 names for 2 folders", "absent is no folder; name folders of runs, or of campaigns"],
+        ),
+        (("a", "b", "--signal", "scene.yaw"), ["--signal scene.yaw: a campaign has no curves"]),
+        (("a", "b", "--metric", "mowed"), ["no campaign has a metric 'mowed'"]),
+        (("a", "r"), ["a is a campaign, r a run: compare campaigns with campaigns, or runs with runs"]),
+    ],
+)
+def test_usage_errors_are_told_in_a_line_each_and_leave_nothing(
+    here: Path, arguments: tuple[str, ...], sentences: list[str]
+):
+    for name in ("a", "b"):
+        folder_of(here / name, campaign_metadata("ir_grasp", [{}]), table_of([{}], moved=[0.1, 0.2]))
+    (here / "r").mkdir()
+    (here / "r" / "run.json").write_text('{"scenario": "ir_grasp", "parameters": {}}')
+    done = compare(*arguments)
+    assert done.exit_code == 2, done.output
+    assert len(done.output.splitlines()) == len(sentences)
+    assert all(sentence in done.output for sentence in sentences)
+    assert {p.name for p in here.iterdir()} == {"a", "b", "r"}

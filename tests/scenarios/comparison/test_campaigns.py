@@ -1,0 +1,199 @@
+"""Campaigns beside each other: which points are matched, which runs are pairs, and what cannot be compared."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from campaigns import campaign_metadata, folder_of, table_of
+
+from handover.scenarios.comparison.campaigns import ComparedCampaigns, metric_tests, success_tests
+from handover.scenarios.comparison.entries import NotComparable, differences_of, read_entries
+from handover.scenarios.comparison.tables import campaigns_csv, campaigns_data
+
+THINGS = [{"thing": "cylinder"}, {"thing": "baby_cup_a"}]
+
+
+def campaign(
+    path: Path, points: Sequence[Mapping[str, str]], repetitions: int = 6, seeds_from: int = 100, **more: Any
+) -> Path:
+    """Write a campaign in whose runs the object moved by the given lengths, m, or by 10 mm."""
+    moved = more.pop("moved", [0.01] * len(points) * repetitions)
+    seeds = [seeds_from + r for _ in points for r in range(repetitions)]
+    success = more.pop("success", [r % 2 == 0 for _ in points for r in range(repetitions)])
+    metrics = more.pop("metrics", {"moved": moved})
+    table = table_of(points, repetitions, **metrics)
+    for name, values in (("seed", seeds), ("success", success)):
+        whole: Any = table.table
+        index = whole.column_names.index(name)
+        table.table = whole.set_column(index, whole.schema.field(index), [values])
+    folder_of(path, campaign_metadata("ir_grasp", points, repetitions, **more), table)
+    return path
+
+
+def compared(*folders: Path, names: Sequence[str] = (), metrics: Sequence[str] = ()) -> ComparedCampaigns:
+    campaigns, runs = read_entries(folders, names)
+    assert not runs
+    return ComparedCampaigns(campaigns, metrics)
+
+
+def faults_of(*folders: Path, **given: Any) -> tuple[str, ...]:
+    with pytest.raises(NotComparable) as raised:
+        compared(*folders, **given)
+    return raised.value.faults
+
+
+def test_points_are_matched_by_the_values_of_what_varies_defaults_included(tmp_path: Path):
+    first = campaign(tmp_path / "a", THINGS[::-1], fixed={"strategy": "reflex"})
+    second = campaign(tmp_path / "b", [{"standoff": "0.07"}, {"standoff": "0.08"}])  # 70 mm is the default
+    results = compared(first, second)
+    assert results.keys == ("thing", "standoff")
+    shared = (("thing", "cylinder"), ("standoff", "0.07"))
+    assert {key: [*results.at(key)] for key in results.matched} == {
+        (("thing", "baby_cup_a"), ("standoff", "0.07")): ["a"],
+        shared: ["a", "b"],
+        (("thing", "cylinder"), ("standoff", "0.08")): ["b"],
+    }
+    assert [(t.key, t.first, t.second) for t in success_tests(results)] == [(shared, "a", "b")]
+
+
+def test_runs_with_one_seed_are_pairs(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}], success=[True] * 6, moved=[0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
+    second = campaign(tmp_path / "b", [{}], success=[False] * 6, moved=[0.012, 0.023, 0.034, 0.045, 0.056, 0.067])
+    results = compared(first, second)
+    (test,) = success_tests(results)
+    assert test.pairs is not None
+    assert (test.pairs.only_first, test.pairs.only_second, test.method) == (6, 0, "McNemar")
+    assert test.p == pytest.approx(2 / 2**6)
+    (moved,) = metric_tests(results, "moved")
+    assert (moved.test.n, moved.test.method) == (6, "Wilcoxon")
+    assert moved.test.p == pytest.approx(2 / 2**6)  # all six differences of one sign
+    assert moved.test.difference == pytest.approx(0.0045)
+    assert moved.test.interval is not None
+    assert 0.002 <= moved.test.interval.low < 0.0045 < moved.test.interval.high <= 0.007
+
+
+def test_a_pair_counts_where_both_runs_are_done(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}])
+    second = campaign(tmp_path / "b", [{}], repetitions=4, seeds_from=103)  # shares 103 to 105
+    (test,) = success_tests(compared(first, second))
+    assert test.counts == (1, 3, 2, 3)
+
+
+def test_runs_without_shared_seeds_are_compared_as_groups(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}], success=[True] * 6, moved=[0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
+    second = campaign(
+        tmp_path / "b", [{}], seeds_from=500, success=[False] * 6, moved=[0.11, 0.12, 0.13, 0.14, 0.15, 0.16]
+    )
+    results = compared(first, second)
+    (test,), (moved,) = success_tests(results), metric_tests(results, "moved")
+    assert (test.pairs, test.method, test.counts) == (None, "Fisher", (6, 6, 0, 6))
+    assert test.p == pytest.approx(2 / 924)  # of the 12 choose 6 tables, the two extreme ones
+    assert (moved.test.method, moved.test.p) == ("Mann-Whitney", pytest.approx(2 / 924))
+    assert moved.test.difference == pytest.approx(0.1)
+
+
+def test_a_metric_that_one_lacks_is_shown_where_it_is(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}])
+    second = campaign(tmp_path / "b", [{}], metrics={"moved": [0.02] * 6, "pushed": [0.5] * 6})
+    results = compared(first, second, metrics=["moved", "pushed"])
+    assert metric_tests(results, "pushed") == []
+    (point,) = campaigns_data(results, ())["points"]
+    assert point["campaigns"]["a"]["metrics"]["pushed"] == {"median": None, "interval": None}
+    assert point["campaigns"]["b"]["metrics"]["pushed"]["median"] == 0.5
+    header, a, b = campaigns_csv(results).splitlines()
+    assert header.endswith("moved_median,moved_low,moved_high,pushed_median,pushed_low,pushed_high")
+    assert a.startswith("a,6,6,3,0.5,")
+    assert a.endswith(",0.01,,,,,")
+    assert b.endswith(",0.02,,,0.5,,")
+
+
+def test_rates_and_medians_have_their_intervals(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}], moved=[0.01, 0.02, 0.03, 0.04, 0.05, 0.06])
+    results = compared(first, campaign(tmp_path / "b", [{}]))
+    (point,) = campaigns_data(results, ())["points"]
+    a = point["campaigns"]["a"]
+    assert (a["rate"], a["interval"]) == (0.5, pytest.approx([0.1181, 0.8819], abs=1e-4))  # Clopper-Pearson, 3 of 6
+    low, high = a["metrics"]["moved"]["interval"]
+    assert a["metrics"]["moved"]["median"] == pytest.approx(0.035)
+    assert 0.01 <= low < 0.035 < high <= 0.06
+
+
+def test_settings_in_which_campaigns_differ_are_listed(tmp_path: Path):
+    def unit(digest: str) -> dict[str, dict[str, str]]:
+        return {"reflex": {"fmu": "IrReflex.fmu", "sha256": digest * 64}}
+
+    first = campaign(tmp_path / "a", THINGS, units=unit("1"), versions={"numpy": "2.0"}, fixed={"strategy": "blind"})
+    second = campaign(tmp_path / "b", THINGS, units=unit("2"), versions={"numpy": "2.1"}, seed=4)
+    campaigns, _ = read_entries([first, second])
+    assert [(d.kind, d.name, *d.values) for d in differences_of(campaigns, ["thing"])] == [
+        ("parameter", "strategy", "blind", "reflex"),
+        ("unit", "reflex", "IrReflex.fmu (111111111111)", "IrReflex.fmu (222222222222)"),
+        ("seeds", "campaign's seed", "0", "4"),
+        ("version", "numpy", "2.0", "2.1"),
+    ]
+
+
+def test_campaigns_without_a_common_point_are_refused_with_their_values(tmp_path: Path):
+    first, second = campaign(tmp_path / "a", THINGS), campaign(tmp_path / "b", [{"thing": "baby_cup_a"}])
+    third = campaign(tmp_path / "c", [{}], fixed={"thing": "paper_box_a"})
+    assert faults_of(first, second, third) == (
+        f"{third}: none of its points is in another campaign: "
+        "thing is paper_box_a in it, cylinder, baby_cup_a in others",
+    )
+
+
+def test_a_metric_in_another_unit_and_one_that_is_unknown_are_refused(tmp_path: Path):
+    first, second = campaign(tmp_path / "a", [{}]), campaign(tmp_path / "b", [{}])
+    table = table_of([{}], 6, moved=[1.0] * 6)
+    whole: Any = table.table
+    index = whole.column_names.index("moved")
+    field = whole.schema.field(index).with_metadata({"role": "metric", "unit": "s"})
+    table.table = whole.cast(whole.schema.set(index, field))
+    folder_of(second, campaign_metadata("ir_grasp", [{}], 6), table)
+    assert faults_of(first, second, metrics=["mowed"]) == (
+        f"{second}: its metric moved is in s, in {first} in m",
+        "no campaign has a metric 'mowed'; did you mean moved?",
+    )
+
+
+def test_all_faults_of_folders_and_names_are_told_at_once(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}])
+    other = folder_of(tmp_path / "b", campaign_metadata("vsl_hybrid", [{}]), table_of([{}])).path
+    broken, empty = tmp_path / "c", tmp_path / "d"
+    for folder in (broken, empty):
+        folder.mkdir()
+    (broken / "campaign.json").write_text("{")
+    faults = faults_of(first, other, broken, empty, first, names=["x", "x", "y"])
+    assert [fault.partition(";")[0] for fault in faults[:3]] == [
+        f"{first} is named twice",
+        "3 names for 5 folders",
+        "name 'x' is given twice",
+    ]
+    assert any(f.startswith(f"{broken}: its campaign.json is damaged") for f in faults)
+    assert f"{other} is of another scenario, vsl_hybrid, than {first}, ir_grasp" in faults
+    assert all("\n" not in fault for fault in faults)
+
+
+def test_one_folder_is_not_enough_and_names_of_folders_tell_namesakes_apart(tmp_path: Path):
+    (fault,) = faults_of(campaign(tmp_path / "x" / "c", [{}]))
+    assert fault.endswith("name at least two folders, of campaigns or of runs")
+    results = compared(tmp_path / "x" / "c", campaign(tmp_path / "y" / "c", [{}]))
+    assert [e.name for e in results.entries] == ["x/c", "y/c"]
+
+
+def test_campaigns_stand_beside_each_other_at_each_point(tmp_path: Path):
+    results = compared(campaign(tmp_path / "a", THINGS), campaign(tmp_path / "b", THINGS))
+    layout = results.layout
+    assert [name for _, name in layout.ticks or ()] == ["cylinder", "baby cup a"]
+    assert list(layout.group_names) == ["a", "b"]
+    assert list(layout.groups) == [0, 1, 0, 1]
+    assert layout.places.tolist() == pytest.approx([-0.2, 0.2, 0.8, 1.2])
+
+
+def test_points_of_two_parameters_are_a_list_with_a_colour_for_each_campaign(tmp_path: Path):
+    points = [{"thing": t, "strategy": s} for t in ("cylinder", "baby_cup_a") for s in ("reflex", "blind")]
+    layout = compared(campaign(tmp_path / "a", points), campaign(tmp_path / "b", points)).layout
+    assert layout.listed
+    assert layout.places[0] > layout.places[1] > layout.places[2]
+    assert list(layout.groups) == [0, 1] * 4
