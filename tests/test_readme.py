@@ -1,6 +1,7 @@
 """The README's commands and programs do what it says."""
 
 import importlib.util
+import json
 import re
 import shlex
 import shutil
@@ -46,7 +47,8 @@ def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " build " in c]) == 2
     assert len([c for c in COMMANDS if " check " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
-    assert len([c for c in COMMANDS if " sweep " in c]) == 2
+    assert len([c for c in COMMANDS if " sweep " in c]) == 4
+    assert len([c for c in COMMANDS if " compare " in c]) == 1
     assert len([c for c in COMMANDS if " paper " in c]) == 1
     assert len([c for c in COMMANDS if " report " in c]) == 1
 
@@ -215,3 +217,16 @@ def test_the_campaigns_end(command: str, tmp_path: Path):
     tables = [*tmp_path.glob("*/runs.parquet"), *tmp_path.glob("campaigns/*/runs.parquet")]
     assert len(tables) == 1
     assert (tables[0].parent / "report.html").is_file()
+
+
+@pytest.mark.slow
+def test_campaigns_are_compared(tmp_path: Path):
+    block = block_with(" compare ")
+    for command in block.splitlines():
+        done = handover(command, tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+    comparison = tmp_path / command_with(" compare ").split()[-1]
+    assert {"report.html", "comparison.csv", "comparison.json", "figures"} == {p.name for p in comparison.iterdir()}
+    found = json.loads((comparison / "comparison.json").read_bytes())
+    assert all(test["paired"] for test in found["tests"])  # "run by run where they share seeds, as these do"
+    assert {p.suffix for p in (comparison / "figures").iterdir()} == {".png", ".svg"}

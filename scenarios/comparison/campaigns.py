@@ -28,8 +28,10 @@ from handover.scenarios.comparison.entries import CampaignEntry, NotComparable, 
 ENTRY = "in campaign"
 """The parameter, in the table of all, that tells the campaigns apart; no parameter has a name with a space."""
 
-_MAX_TESTS = 100
+MAX_TESTS = 100
 """Tests of a metric: the interval of each takes some 20 ms."""
+
+_MAX_METRICS = 4
 
 Key = tuple[tuple[str, str], ...]
 """Names and values by which points are matched."""
@@ -37,6 +39,12 @@ Key = tuple[tuple[str, str], ...]
 
 class ComparedCampaigns(CampaignResults):
     """The runs of several campaigns as those of one, whose points are told apart by the campaign, too.
+
+    Attributes:
+        entries: the campaigns.
+        keys: the parameters by which points are matched: those that vary within any campaign.
+        matched: the points, by these parameters' values; one that a campaign leaves at its default counts with that.
+        tested: tests that were made, by metric.
 
     Args:
         entries: the campaigns.
@@ -55,6 +63,7 @@ class ComparedCampaigns(CampaignResults):
         if faults:
             raise NotComparable(faults)
         self._chosen = tuple(dict.fromkeys(chosen))
+        self.tested: dict[str, list[MetricTest]] = {}
         self.matched: Sequence[Key] = tuple(dict.fromkeys(key for points in by_entry for key in points))
         pairs = [(key, k) for key in self.matched for k, points in enumerate(by_entry) if key in points]
         numbers = {pair: number for number, pair in enumerate(pairs)}
@@ -78,8 +87,8 @@ class ComparedCampaigns(CampaignResults):
 
     @property
     def shown_metrics(self) -> tuple[str, ...]:
-        """Metrics that tables and figures of points show: those chosen, else the first."""
-        return self._chosen or super().shown_metrics
+        """Metrics that tables and figures of points show: those chosen, else the first of the headline, or of all."""
+        return self._chosen or super().shown_metrics or self.measured[:_MAX_METRICS]
 
     def words(self, parameter: str, text: str) -> str:
         """Return a value that is no number as one reads it; a campaign's name as it was given."""
@@ -139,8 +148,8 @@ def _numbers(points: Mapping[Key, Sequence[int]], entry: int, numbers: Mapping[t
 def _faults_of_points(entries: Sequence[CampaignEntry], by_entry: Sequence[Mapping[Key, Any]]) -> list[str]:
     faults: list[str] = []
     for k, entry in enumerate(entries):
-        others = {key for j, points in enumerate(by_entry) for key in points if j != k}
-        if not others & by_entry[k].keys():
+        others = dict.fromkeys(key for j, points in enumerate(by_entry) for key in points if j != k)
+        if not others.keys() & by_entry[k].keys():
             own, theirs = _values(by_entry[k]), _values(others)
             apart = [n for n in {**own, **theirs} if not own.get(n, {}).keys() & theirs.get(n, {}).keys()]
             why = [f"{n} is {_list(own.get(n, {}))} in it, {_list(theirs.get(n, {}))} in others" for n in apart]
@@ -186,7 +195,7 @@ def _column(entry: CampaignEntry, metric: str) -> str:
     return metric if metric in columns else f"{metric}_metric"
 
 
-_KEPT = ("repetition", "seed", "status", "success", "reason", "simulated_seconds", "wall_seconds", "cpu_seconds")
+_KEPT = ("repetition", "seed", "status", "success", "reason")
 
 
 def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int]]) -> CampaignTable:
@@ -197,7 +206,7 @@ def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int
             [[f"{e.name}: {run}" for run in t.column("run").to_pylist()] for e, t in _both(entries)]
         ),
         "point": pa.chunked_array(
-            [[of[k] for k in t.column("point").to_pylist()] for of, t in zip(numbers, tables, strict=True)],
+            [[of.get(k, -1) for k in t.column("point").to_pylist()] for of, t in zip(numbers, tables, strict=True)],
             type=pa.int64(),
         ),
     }
@@ -225,8 +234,8 @@ def _column_of(tables: Sequence[Any], names: Sequence[str], kind: Any) -> Any:
         t.column(n).combine_chunks().cast(kind) if n in t.column_names else pa.nulls(t.num_rows, kind)
         for t, n in zip(tables, names, strict=True)
     ]
-    column: Any = pa.chunked_array(parts, type=kind)
-    return column
+    arrow: Any = pa  # whose stubs ask for a type that is known
+    return arrow.chunked_array(parts, type=kind)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,9 +298,15 @@ def success_tests(results: ComparedCampaigns) -> list[SuccessTest]:
 
 def metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
     """Return tests of a metric, likewise, over the runs done; at the first points, where there are very many."""
+    if metric not in results.tested:
+        results.tested[metric] = _metric_tests(results, metric)
+    return results.tested[metric]
+
+
+def _metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
     values = results.table.column(metric)
     tests: list[MetricTest] = []
-    for key, first, second in _pairs_of_campaigns(results)[:_MAX_TESTS]:
+    for key, first, second in _pairs_of_campaigns(results)[:MAX_TESTS]:
         a, b = results.at(key)[first], results.at(key)[second]
         rows = _shared_rows(results, a, b)
         if rows:

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from handover.scenarios.comparison.campaigns import ComparedCampaigns, metric_tests, success_tests
+from handover.scenarios.comparison.campaigns import MAX_TESTS, ComparedCampaigns, metric_tests, success_tests
 from handover.scenarios.comparison.entries import CampaignEntry, Difference, Entry, RunEntry
 from handover.scenarios.comparison.runs import MetricRow
 from handover.scenarios.experiment.display_unit import display_unit
@@ -125,6 +125,8 @@ def tests_section(results: ComparedCampaigns) -> Section | None:
         "interval. Without shared seeds: Fisher's exact test, and Mann and Whitney's. p is two-sided; the last column "
         "is corrected for the number of tests in its table by Holm's method."
     )
+    if len(tests) > MAX_TESTS:
+        note += f" Metrics are tested in the first {MAX_TESTS} of {len(tests)} cases only."
     html = Markup("").join(parts) + Markup("<p class='soft'>{}</p>").format(note)
     return Section(anchor="tests", title="Tests", html=html, scripts=("campaign.js",))
 

@@ -7,9 +7,12 @@ from typing import Any
 import pytest
 from campaigns import campaign_metadata, folder_of, table_of
 
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.comparison.campaigns import ComparedCampaigns, metric_tests, success_tests
 from handover.scenarios.comparison.entries import NotComparable, differences_of, read_entries
+from handover.scenarios.comparison.page import compare, write_comparison
 from handover.scenarios.comparison.tables import campaigns_csv, campaigns_data
+from handover.scenarios.results.run_folder import RunFolder
 
 THINGS = [{"thing": "cylinder"}, {"thing": "baby_cup_a"}]
 
@@ -197,3 +200,20 @@ def test_points_of_two_parameters_are_a_list_with_a_colour_for_each_campaign(tmp
     assert layout.listed
     assert layout.places[0] > layout.places[1] > layout.places[2]
     assert list(layout.groups) == [0, 1] * 4
+
+
+def test_a_campaign_that_has_not_begun_is_beside_one_that_has(tmp_path: Path):
+    first, second = campaign(tmp_path / "a", THINGS), campaign(tmp_path / "b", THINGS)
+    folder_of(second, campaign_metadata("ir_grasp", THINGS, 6), CampaignTable(table_of(THINGS).table.slice(0, 0)))
+    comparison = compare([first, second])
+    write_comparison(comparison, RunFolder(tmp_path / "out"))
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "0 of 0 runs done succeeded, 12 are still to be done" in html
+    assert 'id="success"' in html
+    assert 'id="tests"' not in html
+
+
+def test_names_and_reasons_are_no_html(tmp_path: Path):
+    folders = [campaign(tmp_path / name, THINGS) for name in ("a", "b")]
+    write_comparison(compare(folders, ["<script>alert(1)</script>", "b"]), RunFolder(tmp_path / "out"))
+    assert "<script>alert" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -24,8 +24,9 @@ def run(path: Path, time: Sequence[float], signals: Mapping[str, tuple[str, Any]
     summary = {"success": True, "reason": "it ended", "metrics": metrics}
     (path / "summary.json").write_text(json.dumps(summary))
     fields: list[Any] = [pa.field("time", pa.float64(), metadata={"unit": "s"})]
-    fields += [pa.field(n, pa.array(v).type, metadata={"unit": unit}) for n, (unit, v) in signals.items()]
-    columns: dict[str, Any] = {"time": list(time), **{n: v for n, (_, v) in signals.items()}}
+    arrays: dict[str, Any] = {n: pa.array(values) for n, (_, values) in signals.items()}
+    fields += [pa.field(n, arrays[n].type, metadata={"unit": unit}) for n, (unit, _) in signals.items()]
+    columns: dict[str, Any] = {"time": list(time), **arrays}
     table: Any = pa.table(columns, schema=pa.schema(fields))
     pq.write_table(table, path / "signals.parquet")
     return path
