@@ -1,6 +1,7 @@
 """Runs beside each other: their metrics, and the same curves of each in one plot."""
 
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -127,8 +128,9 @@ def _of_scenario(entries: Sequence[tuple[RunEntry, Record]], left_out: list[str]
         for plot in _plots_of(entry, record, left_out):
             main = [c for c in plot.curves if c.stroke == "solid"] or plot.curves
             for curve in main:
-                panel = panels.setdefault((plot.title, curve.label), (_panel(plot, curve, len(main)), {}))
-                panel[1][entry.name] = curve
+                key = plot.title, curve.label
+                panel, curves = panels.get(key, (_panel(plot, curve, len(main)), {}))
+                panels[key] = replace(panel, limits=_both_limits(panel, plot)), {**curves, entry.name: curve}
     if panels:
         return [*panels.values()][:_MAX_PLOTS]
     first = entries[0][1]
@@ -146,12 +148,28 @@ def _plots_of(entry: RunEntry, record: Record, left_out: list[str]) -> Sequence[
     return ()
 
 
+def _both_limits(panel: TimePlot, plot: TimePlot) -> tuple[float | None, float | None]:
+    """Return limits of an axis within which the curves of both plots are; None where one of them sets none."""
+    (low, high), (other_low, other_high) = panel.limits, plot.limits
+    return (
+        None if low is None or other_low is None else min(low, other_low),
+        None if high is None or other_high is None else max(high, other_high),
+    )
+
+
+_LINE = 20
+"""Letters that fit along a vertical axis."""
+
+
 def _panel(plot: TimePlot, curve: Curve, curves: int) -> TimePlot:
     if curves == 1:
-        return replace(plot, curves=(), levels=(), phases=(), palette=())
-    quantity = f"{plot.quantity} {curve.label}" if len(curve.label) < 4 else curve.label
+        quantity = textwrap.fill(plot.quantity, _LINE)
+        return replace(plot, quantity=quantity, curves=(), levels=(), phases=(), palette=())
+    quantity = f"{plot.quantity}, {curve.label}"
     title = f"{plot.title}: {curve.label}"
-    return replace(plot, title=title, quantity=quantity, curves=(), levels=(), phases=(), palette=())
+    return replace(
+        plot, title=title, quantity=textwrap.fill(quantity, _LINE), curves=(), levels=(), phases=(), palette=()
+    )
 
 
 def _named(entries: Sequence[tuple[RunEntry, Record]], signals: Sequence[str]) -> list[Panel]:

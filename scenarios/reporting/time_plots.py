@@ -104,7 +104,12 @@ def time_figure(plot: TimePlot, time: Floats) -> go.Figure:
             "hovermode": "x unified",
             "showlegend": plot.has_legend,
             "xaxis": {"title": {"text": TIME_AXIS}, "unifiedhovertitle": {"text": "%{x:.4~f} s"}},
-            "yaxis": {"title": {"text": plot.axis_label}, "exponentformat": "power", **kind, **shown},
+            "yaxis": {
+                "title": {"text": plot.axis_label.replace("\n", "<br>")},
+                "exponentformat": "power",
+                **kind,
+                **shown,
+            },
         },
     )
 

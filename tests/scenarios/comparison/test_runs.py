@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from handover.cosim.record.reader import Record
 from handover.scenarios.comparison.entries import NotComparable, RunEntry, differences_of, read_entries
 from handover.scenarios.comparison.runs import Overlay, at_times, metric_rows, overlaid
-from handover.scenarios.experiment.time_plot import Curve
+from handover.scenarios.experiment.time_plot import Curve, TimePlot
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
 
 def run(path: Path, time: Sequence[float], signals: Mapping[str, tuple[str, Any]], **more: Any) -> Path:
@@ -90,6 +93,27 @@ def test_a_signal_that_one_run_lacks_is_drawn_of_the_others_and_told(tmp_path: P
     assert [[c.label for c in p.curves] for p in overlay.plots] == [["a"], ["a", "b"]]
     assert [p.colours for p in overlay.plots] == [(0,), (0, 1)]
     assert overlay.left_out == ["b has no signal mass.v"]
+
+
+class Limited(IrGrasp):
+    """A scenario whose plot has limits that follow from a run's own curve, and a long label."""
+
+    def plots(self, parameters: Any, record: Record) -> Sequence[TimePlot]:  # noqa: ARG002
+        top = float(record["mass.x"].max())
+        curve = Curve(label="tip by the servos, links taken as rigid", values=record["mass.x"])
+        other = Curve(label="dashed", values=record["mass.x"], stroke="dashed")
+        more = Curve(label="tip", values=record["mass.x"])
+        return [TimePlot(title="Tip", quantity="x", unit="m", curves=[curve, other, more], limits=(0.0, top))]
+
+
+def test_axes_have_room_for_all_runs_and_lines_for_long_labels(tmp_path: Path):
+    first = run(tmp_path / "a", [0.0, 1.0], {"mass.x": ("m", [0.0, 1.0])})
+    second = run(tmp_path / "b", [0.0, 1.0], {"mass.x": ("m", [0.0, 5.0])})
+    entries = [replace(e, facts=replace(e.facts, experiment=Limited())) for e in runs(first, second)]
+    plots = overlaid(entries).plots
+    assert [p.title for p in plots] == ["Tip: tip by the servos, links taken as rigid", "Tip: tip"]
+    assert [p.limits for p in plots] == [(0.0, 5.0)] * 2
+    assert [p.axis_label for p in plots] == ["x, tip by the\nservos, links taken\nas rigid (m)", "x, tip (m)"]
 
 
 def test_a_run_without_a_record_is_told(tmp_path: Path):
