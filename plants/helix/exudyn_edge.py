@@ -1,15 +1,18 @@
 """Typed interface to Exudyn: a system of rigid bodies, elastic joints and tendons, advanced in steps."""
 
 import contextlib
+import importlib.util
 import io
 import os
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.helix.empty_library import bound_at_first_call, can_be_empty, can_be_loaded, load_empty
 
 _NO_SETTINGS = "EXUDYN_NO_USER_SETTINGS"
 
@@ -19,7 +22,7 @@ def _load() -> tuple[Any, Any]:
     kept = os.environ.get(_NO_SETTINGS)
     os.environ[_NO_SETTINGS] = "1"
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stdout(io.StringIO()), _drawing_nothing():
             import exudyn
             import exudyn.itemInterface as items
     finally:
@@ -29,6 +32,31 @@ def _load() -> tuple[Any, Any]:
     module: Any = exudyn
     module.config.printToConsole = False
     return module, items
+
+
+@contextlib.contextmanager
+def _drawing_nothing() -> Generator[None]:
+    """Let Exudyn be imported where OpenGL or X11 are missing, as on machines without a screen.
+
+    Its wheel for Linux is linked to OpenGL and, by the GLFW that it brings, to X11. Only windows call them, which are
+    never opened here. A library that is there is taken as it is: a host may draw with it.
+    """
+    wanted = {"libGL.so.1": ["libGL.so.1"], "libX11.so.6": _glfw()}
+    empty = [name for library, names in wanted.items() if not can_be_loaded(library) for name in names]
+    if not (empty and can_be_empty()):
+        yield
+        return
+    for name in empty:
+        load_empty(name)
+    with bound_at_first_call():
+        yield
+
+
+def _glfw() -> list[str]:
+    """Return the names of GLFW libraries in Exudyn's wheel; they are unlike from one version to the next."""
+    package = importlib.util.find_spec("exudyn")
+    origin = Path(package.origin or "") if package else Path()
+    return sorted(file.name for file in origin.parent.parent.glob("exudyn.libs/libglfw*"))
 
 
 _exu, _items = _load()
