@@ -5,12 +5,8 @@ They work on units, on ports and on groups of units alike, which are called item
 
 import heapq
 from collections import defaultdict
-from collections.abc import Callable, Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from typing import TypeVar
-
-import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 T = TypeVar("T", bound=Hashable)
 
@@ -22,19 +18,41 @@ DescribeWait = Callable[[T, set[T]], None]
 
 
 def strongly_connected(needs: Needs[T]) -> list[list[T]]:
-    """Return the strongly connected components: sets of items that need each other; each in the order given."""
-    names = list(needs)
-    if not names:
-        return []
-    position = {name: i for i, name in enumerate(names)}
-    pairs = [(position[b], position[a]) for a, others in needs.items() for b in others if b in position]
-    edges = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    graph = csr_array((np.ones(len(pairs)), (edges[:, 0], edges[:, 1])), shape=(len(names), len(names)))
-    _, labels = connected_components(graph, directed=True, connection="strong")
-    components: dict[int, list[T]] = defaultdict(list)
-    for name, label in zip(names, labels.tolist(), strict=True):
-        components[label].append(name)
-    return list(components.values())
+    """Return the strongly connected components: sets of items that need each other; each in the order given.
+
+    Tarjan's algorithm, without recursion: systems have more units than Python has stack.
+    """
+    found: dict[T, int] = {}  # when each item was found
+    lowest: dict[T, int] = {}  # the earliest item on the path that an item leads back to
+    component: dict[T, T] = {}  # by item, the item at which its component was closed
+    open_items: list[T] = []  # items of no component yet, as they were found
+    for start in needs:
+        if start in found:
+            continue
+        path: list[tuple[T, Iterator[T]]] = [(start, iter(needs[start]))]
+        found[start] = lowest[start] = len(found)
+        open_items.append(start)
+        while path:
+            item, others = path[-1]
+            for other in others:
+                if other not in found:
+                    if other in needs:
+                        found[other] = lowest[other] = len(found)
+                        open_items.append(other)
+                        path.append((other, iter(needs[other])))
+                        break
+                elif other not in component and found[other] < lowest[item]:
+                    lowest[item] = found[other]
+            else:
+                path.pop()
+                if path and lowest[item] < lowest[path[-1][0]]:
+                    lowest[path[-1][0]] = lowest[item]
+                while lowest[item] == found[item] and item not in component:
+                    component[open_items.pop()] = item
+    members: dict[T, list[T]] = defaultdict(list)
+    for item in needs:
+        members[component[item]].append(item)
+    return list(members.values())
 
 
 def ordered(firm: Needs[T], soft: Needs[T], describe_soft: DescribeWait[T], describe_firm: DescribeWait[T]) -> list[T]:

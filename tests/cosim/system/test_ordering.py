@@ -1,3 +1,7 @@
+import networkx as nx
+from hypothesis import given
+from hypothesis import strategies as st
+
 from handover.cosim.system.ordering import ordered, strongly_connected
 
 
@@ -49,3 +53,16 @@ def test_those_that_need_each_other_are_together_in_the_order_given():
     sets = strongly_connected({"d": "c", "c": "b", "b": "c", "a": "x"})
     assert sorted(map("".join, sets)) == ["a", "cb", "d"]
     assert strongly_connected({}) == []
+
+
+@given(st.dictionaries(st.integers(0, 11), st.lists(st.integers(0, 13), max_size=4), max_size=12))
+def test_those_that_need_each_other_are_the_components_that_networkx_finds(needs: dict[int, list[int]]):
+    graph = nx.DiGraph([(a, b) for a, others in needs.items() for b in others if b in needs])
+    graph.add_nodes_from(needs)
+    rank = list(needs).index
+    expected = [sorted(c, key=rank) for c in nx.strongly_connected_components(graph)]
+    assert strongly_connected(needs) == sorted(expected, key=lambda component: rank(component[0]))
+
+
+def test_a_chain_may_be_longer_than_pythons_stack():
+    assert len(strongly_connected({i: [i + 1] for i in range(20000)})) == 20000
