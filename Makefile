@@ -40,7 +40,7 @@ $(VENV)/bin/python:
 
 $(VENV)/.installed: pyproject.toml constraints.txt setup.py $(wildcard fmus/runtime/*.[ch] cosim/plan/*.[ch] cosim/isolation/*.[ch]) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable . --constraint constraints.txt
+	$(BIN)/python -m pip install --quiet --editable ".[all]" --constraint constraints.txt
 	touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed

@@ -15,6 +15,7 @@ from typing import Any
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
 from handover.cosim.exceptions import nearest, one_line
+from handover.fmus.import_failure import explain_import, is_of_a_package
 
 
 class UnknownUnit(LookupError):
@@ -31,6 +32,10 @@ class UnknownBlock(LookupError):
     def __init__(self, path: str, fault: str) -> None:
         super().__init__(f"{path}: {fault}")
         self.path, self.fault = path, fault
+
+
+class PackageFailure(UnknownBlock):
+    """A package that a class needs is missing or cannot be imported; the message says why, with the cure."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +208,7 @@ def import_class(path: str) -> type[Any]:
 
     Raises:
         UnknownBlock: the module cannot be loaded, or has no such class.
+        PackageFailure: a package that it needs is missing or cannot be imported.
     """
     module_name, colon, name = path.partition(":")
     if not colon:
@@ -213,6 +219,8 @@ def import_class(path: str) -> type[Any]:
         fault = f"its module cannot be loaded: {type(e).__name__}: {one_line(e)}"
         if isinstance(e, ModuleNotFoundError) and e.name == module_name:
             fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}"
+        elif is_of_a_package(e):
+            raise PackageFailure(path, explain_import(e)) from e
         raise UnknownBlock(path, fault) from e
     found = getattr(module, name, None)
     if not isinstance(found, type):

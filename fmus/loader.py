@@ -34,6 +34,12 @@ class HostError(Exception):
     is_refusal = True
 
 
+class MissingSource(ModuleNotFoundError):
+    """The FMU itself lacks a module; logged without a traceback."""
+
+    is_refusal = True
+
+
 def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = None) -> Any:
     """Return an instance's Python side, a `handover.fmus.slave.Slave`.
 
@@ -43,7 +49,7 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
         memory: allocates that many bytes for the variables; without it the memory is this process's own.
 
     Raises:
-        HostError: the token is that of another FMU, or packages are missing.
+        HostError: the token is that of another FMU, or packages are missing or cannot be imported.
     """
     with open(os.path.join(resources, "unit.json"), encoding="utf-8") as file:
         unit = json.load(file)
@@ -55,9 +61,15 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     _require(unit, resources)
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
-    block = getattr(modules.load(module), name)
-    for deferred in getattr(block, "deferred", ()):  # here, in the host's own thread: libcosim steps units in others
-        modules.import_from(deferred)
+    try:
+        block = getattr(modules.load(module), name)
+        for deferred in getattr(block, "deferred", ()):  # in the host's own thread: libcosim steps units in others
+            modules.import_from(deferred)
+    except Exception as error:
+        failure = modules.load("handover.fmus.import_failure")
+        if getattr(error, "is_refusal", False) or not failure.is_of_a_package(error):
+            raise
+        raise HostError(f"unit {unit['unit']} cannot be loaded: {failure.explain_import(error)}") from error
     return modules.load("handover.fmus.slave").Slave(block, unit["form"], unit["start"], memory)
 
 
@@ -204,7 +216,10 @@ class _PrivateModules:
     def _execute(self, name: str, full: str) -> types.ModuleType:
         path = self._place(name)
         if path is None:
-            raise ModuleNotFoundError(f"the FMU has no module {name!r}", name=name)
+            raise MissingSource(
+                f"the FMU has no module {name!r}. Cure: unpack it again, into an empty folder, or build it again",
+                name=name,
+            )
         is_package = not path.endswith(f"{name.rpartition('.')[2]}.py")
         source = _source(path)
         module = types.ModuleType(full)

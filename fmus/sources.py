@@ -19,7 +19,13 @@ from handover.fmus.catalog import UnknownBlock
 OWN_PACKAGE = "handover"
 """The package of which every FMU contains sources."""
 
-SLAVE_SIDE = ("handover.fmus.slave", "handover.fmus.loader", "handover.fmus.server", "handover.fmus.interpreter")
+SLAVE_SIDE = (
+    "handover.fmus.slave",
+    "handover.fmus.loader",
+    "handover.fmus.import_failure",
+    "handover.fmus.server",
+    "handover.fmus.interpreter",
+)
 """Modules that every FMU contains, whatever its block imports."""
 
 

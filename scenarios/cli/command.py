@@ -1,6 +1,7 @@
 """The command `handover`: its subcommands by name, each loaded when it is called or its help is asked for."""
 
 from importlib import import_module
+from typing import Any
 
 import click
 
@@ -83,6 +84,15 @@ class DeferringGroup(click.Group):
 
     Physics, tables and pages take seconds to load, which `handover --help` should not take.
     """
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the command; a package that is missing is told in one line."""
+        try:
+            return super().invoke(ctx)
+        except ImportError as e:
+            from handover.scenarios.execution.errors import missing_package  # loaded for this alone
+
+            raise missing_package(e) from e
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -9,7 +9,16 @@ from rich.console import Console
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.exceptions import nearest
-from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit, import_class, installed_units
+from handover.fmus.catalog import (
+    UNITS,
+    Entry,
+    PackageFailure,
+    UnknownBlock,
+    UnknownUnit,
+    find_unit,
+    import_class,
+    installed_units,
+)
 from handover.scenarios.catalog import (
     SCENARIOS,
     SYSTEMS,
@@ -120,7 +129,10 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
 def print_unit(unit: Entry) -> None:
     """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
     console = open_console()
-    d = describe(import_class(unit.block))
+    try:
+        d = describe(import_class(unit.block))
+    except PackageFailure as e:
+        raise UsageError(str(e)) from e
     step = "sampled every" if d.period is not None else "stepped by, for instance,"
     console.print(f"{unit.name}: {unit.summary}", style="bold")
     console.print(f"{step} {float(unit.step) * 1000:.4g} ms")

@@ -16,7 +16,7 @@ from handover.cosim.exceptions import nearest
 from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.options import HeadedCommand, campaign_options
-from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.results.run_folder import InvalidRunFolder
 
 if TYPE_CHECKING:
@@ -60,6 +60,8 @@ def paper(
     scheduler: str | None,
 ) -> None:
     """Run a paper's EXPERIMENT."""
+    for extra in ("campaigns", "reports"):
+        require_extra(extra, "experiments of papers")
     from handover.scenarios.published.catalog import EXPERIMENTS  # its statistics take long to load
 
     if experiment is None:

@@ -6,7 +6,7 @@ import click
 
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
@@ -33,6 +33,7 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
         page = file or folder / "report.html"
         if page.is_dir():
             raise UsageError(f"{page} is a folder; name a file for the page")
+        require_extra("reports", "the page")
         check_place(page.parent)
         if figures:
             check_place(folder)

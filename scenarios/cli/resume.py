@@ -12,7 +12,7 @@ from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits
 from handover.scenarios.cli.run_summary import exit_with
-from handover.scenarios.execution.errors import one_line_errors
+from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.execution.runner import run_task
@@ -38,6 +38,8 @@ somebody else's, see that they are yours.
 def resume(folder: Path, no_report: bool, isolate: Sequence[str], call_limit: float, pace: float | None) -> None:
     """Resume a run from its last checkpoint."""
     with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
+        if not no_report:
+            require_extra("reports", "report and figures", "--no-report")
         run_folder = RunFolder.of_run(folder)
         opened.enter_context(run_folder.held())
         interrupted = InterruptedRun(run_folder)

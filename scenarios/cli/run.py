@@ -18,7 +18,7 @@ from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
 from handover.scenarios.cli.run_summary import exit_with
-from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
@@ -156,6 +156,8 @@ def run(
     for_scenarios = {"-p": parameters, "--seed": seed, "--unit": replaced}
     reject_other_options(scenario, {**for_scenarios, "--stop": stop, "--step": step, "--input": inputs})
     with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
+        if not no_report:
+            require_extra("reports", "report and figures", "--no-report")
         options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace), strict=strict)
         source: Mapping[str, Any] = {}
         of_units: Mapping[str, str] = {}

@@ -46,11 +46,12 @@ class WorkersLost(click.ClickException):
 
 @contextmanager
 def one_line_errors() -> Generator[None, None, None]:
-    """Report what a user's input, or a missing compiler, leads to as UsageError, without a traceback.
+    """Report what a user's input, or a missing compiler or package, leads to as UsageError, without a traceback.
 
     A unit's failure is reported as UnitLost, a full disk as RunNotWritten, a lost cluster as WorkersLost.
     """
     from handover.fmus.binaries import NotCompiled  # loaded here: only commands that build units need it
+    from handover.fmus.catalog import PackageFailure
     from handover.fmus.compile import CompilationError, UnknownPlatform
     from handover.scenarios.experiment.parameters import InvalidParameter
     from handover.scenarios.results.run_folder import InvalidRunFolder
@@ -66,7 +67,34 @@ def one_line_errors() -> Generator[None, None, None]:
         raise WorkersLost(str(e)) from e
     except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed) as e:
         raise UsageError(str(e)) from e
-    except (PoolError, NotCompiled, UnknownPlatform) as e:
+    except (PoolError, NotCompiled, UnknownPlatform, PackageFailure) as e:
         raise UsageError(str(e)) from e
     except CompilationError as e:
         raise UsageError(str(e).replace("\n", " ", 1)) from e
+    except ImportError as e:
+        raise missing_package(e) from e
+
+
+def require_extra(extra: str, what: str, way_out: str = "") -> None:
+    """Refuse what needs an extra of this project that is not installed, before anything starts.
+
+    Args:
+        extra: its name, such as `reports`.
+        what: what needs it.
+        way_out: what else can be done.
+
+    Raises:
+        UsageError: modules that it brings are missing; the message names them.
+    """
+    from handover.fmus.import_failure import install_extra, missing_modules
+
+    if missing := missing_modules(extra):
+        instead = f", or {way_out}" if way_out else ""
+        raise UsageError(f"{what}: {', '.join(missing)} missing. Cure: {install_extra(extra)}{instead}")
+
+
+def missing_package(error: ImportError) -> UsageError:
+    """Return the report of a package that is missing or cannot be imported, with its cure."""
+    from handover.fmus.import_failure import explain_import
+
+    return UsageError(explain_import(error))

@@ -116,7 +116,7 @@ def test_without_a_screen_an_arm_runs_in_a_host_that_is_not_python(
     without_screen: "list[str]", own_process: str, tmp_path: Path
 ):
     if own_process == "0" and not interpreter.library():
-        pytest.skip("this Python has no shared library (Debian: libpython3-dev)")
+        pytest.skip("this Python has no shared library (Debian: libpython3.13, by its version)")
     with zipfile.ZipFile(cached("TendonArm", 2)) as archive:
         archive.extractall(tmp_path / "arm")
     program = tmp_path / "c_host"

@@ -1,0 +1,105 @@
+"""What the base installation does, and what it says of the extras that it lacks."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[3]
+MAIN = "from handover.scenarios.cli.entry import main; main()"
+
+
+def distributions(name: str, extras: Iterable[str] = ()) -> "set[str]":
+    """Return the names of a distribution and of all that it requires, without extras that are not asked for."""
+    found: set[tuple[str, str]] = set()
+    waiting = [(name, extra) for extra in ("", *extras)]
+    while waiting:
+        of, extra = waiting.pop()
+        if (of, extra) in found:
+            continue
+        found.add((of, extra))
+        for requirement in map(Requirement, metadata.requires(of) or []):
+            if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
+                waiting += [(requirement.name, wanted) for wanted in ("", *requirement.extras)]
+    return {of for of, _ in found}
+
+
+def size(names: Iterable[str]) -> int:
+    """Return how many bytes distributions have installed."""
+    files = [file for name in names for file in metadata.files(name) or []]
+    return sum(Path(str(file.locate())).stat().st_size for file in files if Path(str(file.locate())).is_file())
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder like site-packages that has what the package requires without extras, and nothing else."""
+    folder = tmp_path_factory.mktemp("base") / "site-packages"
+    folder.mkdir()
+    for name in distributions("handover-cosim"):
+        for top in {Path(file.parts[0]) for file in metadata.files(name) or [] if file.parts[0] != ".."}:
+            place = Path(str(metadata.distribution(name).locate_file(top)))
+            if place.exists() and not (folder / top).exists() and "__editable__" not in top.name:
+                (folder / top).symlink_to(place)
+    return folder
+
+
+def handover(base: Path, folder: Path, *arguments: object) -> "subprocess.CompletedProcess[str]":
+    program = f"import sys; sys.path += [{str(ROOT)!r}, {str(base)!r}]; {MAIN}"
+    return subprocess.run(
+        [sys.executable, "-S", "-c", program, *map(str, arguments)],
+        cwd=folder,
+        env={**os.environ, "HANDOVER_CACHE": str(base.parent / "cache")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_base_installation_takes_less_than_half(base: Path):
+    assert not (base / "scipy").exists()
+    assert size(distributions("handover-cosim")) < 0.5 * size(distributions("handover-cosim", ["all"]))
+
+
+def test_the_base_installation_builds_checks_and_runs_units(base: Path, tmp_path: Path):
+    for arguments in (
+        ["list"],
+        ["list", "helix_handover"],
+        ["list", "FreeFlyer"],
+        ["build", "FreeFlyer", "--out", "."],
+        ["check", "FreeFlyer.fmi3.fmu"],
+        ["run", "FreeFlyer.fmi2.fmu", "--stop", "0.2", "--no-report", "--out", "one"],
+        ["run", "vsl_model_based", "--no-report", "--out", "two"],
+        ["export", "vsl_hybrid", "--ssp", "vsl.ssp"],
+    ):
+        done = handover(base, tmp_path, *arguments)
+        assert done.returncode == 0, done.stdout
+    assert (tmp_path / "two" / "signals.parquet").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "extra", "names"),
+    [
+        (["run", "helix_handover", "--out", "r"], "reports", "plotly"),
+        (["run", "helix_handover", "--no-report", "--out", "r"], "robots", "cv2"),
+        (["run", "ir_grasp", "--no-report", "--out", "r"], "robots", "pymunk"),
+        (["run", "flyer_impedance", "--no-report", "--out", "r"], "robots", "control"),
+        (["sweep", "ir_grasp", "strategy=reflex,blind", "--out", "r"], "campaigns", "distributed"),
+        (["paper", "ir-table", "--out", "r"], "campaigns", "distributed"),
+        (["report", "."], "reports", "matplotlib"),
+    ],
+)
+def test_what_needs_an_extra_names_it_in_one_line_and_writes_nothing(
+    base: Path, tmp_path: Path, arguments: "list[str]", extra: str, names: str
+):
+    done = handover(base, tmp_path, *arguments)
+    assert done.returncode in (2, 3)
+    assert f'"handover-cosim[{extra}]"' in done.stdout
+    assert names in done.stdout
+    assert len(done.stdout.splitlines()) == 1
+    assert not (tmp_path / "r").exists()
