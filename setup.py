@@ -1,9 +1,12 @@
 """Compiles the FMI runtime and the master's plan while the package is built; all else is in pyproject.toml.
 
-The wheel has the runtime for this machine, or for the platforms that the environment variable HANDOVER_FMI_PLATFORMS
-names, and the plan and the process of isolated units for this machine.
+The wheel has the runtime, the plan and the process of isolated units for this machine, or for the platform that the
+environment variable HANDOVER_WHEEL_PLATFORM names, by FMI 3.0's names such as `x86_64-darwin`. With HANDOVER_FMI_PLATFORMS
+it has the runtime for the platforms that this names instead.
 """
 
+import os
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -16,18 +19,39 @@ from setuptools.errors import CompileError, OptionError
 sys.path.insert(0, str(Path(__file__).parent))  # a build frontend leaves it out
 
 from handover.cosim.isolation.compile import compile_isolation
-from handover.cosim.native_libraries import CompilationError, host_platform
+from handover.cosim.native_libraries import TARGETS, CompilationError, host_platform
 from handover.cosim.plan.compile import compile_plan
-from handover.fmus.compile import UnknownPlatform, compile_runtime, wanted_platforms
+from handover.fmus.compile import UnknownPlatform, compile_runtime, named_platforms, wanted_platforms
 
-_FOR_THE_HOST = ("handover.cosim.plan", "handover.cosim.isolation")
+_FOR_ONE_PLATFORM = ("handover.cosim.plan", "handover.cosim.isolation")
+
+
+def _platform() -> str:
+    """Return the platform of the wheel."""
+    named = os.environ.get("HANDOVER_WHEEL_PLATFORM")
+    if named and named not in TARGETS:
+        raise OptionError(f"HANDOVER_WHEEL_PLATFORM: no platform {named!r}; there are {', '.join(TARGETS)}")
+    return named or host_platform()
 
 
 def _wanted_platforms() -> tuple[str, ...]:
     try:
-        return wanted_platforms()
+        return wanted_platforms() if os.environ.get("HANDOVER_FMI_PLATFORMS") else named_platforms([_platform()])
     except UnknownPlatform as e:
         raise OptionError(f"HANDOVER_FMI_PLATFORMS: {e}") from e
+
+
+def _platform_tag(default: str) -> str:
+    """Return the tag of the oldest system that the compiled files run on, as zig was told; else the default."""
+    if _platform() not in TARGETS:
+        return default
+    architecture, _, system = _platform().partition("-")
+    version = "_".join(re.findall(r"\d+", TARGETS[_platform()][0].rpartition("-")[2]))
+    return {
+        "linux": f"manylinux_{version}_{architecture}",
+        "darwin": f"macosx_{version}_{architecture.replace('aarch64', 'arm64')}",
+        "windows": f"win_{architecture.replace('x86_64', 'amd64')}",
+    }[system]
 
 
 class BuildWithLibraries(build_py):
@@ -37,27 +61,27 @@ class BuildWithLibraries(build_py):
         """Compile, then build."""
         try:
             compile_runtime(_wanted_platforms())
-            compile_plan()
-            compile_isolation()
+            compile_plan(_platform())
+            compile_isolation(_platform())
         except CompilationError as e:
             raise CompileError(str(e)) from e
-        for package in (("handover", "fmus", "runtime"), *(name.split(".") for name in _FOR_THE_HOST)):
+        for package in (("handover", "fmus", "runtime"), *(name.split(".") for name in _FOR_ONE_PLATFORM)):
             shutil.rmtree(Path(self.build_lib, *package, "bin"), ignore_errors=True)  # of a build before
         super().run()
 
     def find_data_files(self, package: str, src_dir: str) -> list[str]:
         """Leave out what a checkout has been compiled for besides."""
-        wanted = (host_platform(),) if package in _FOR_THE_HOST else _wanted_platforms()
+        wanted = (_platform(),) if package in _FOR_ONE_PLATFORM else _wanted_platforms()
         files = [Path(file) for file in super().find_data_files(package, src_dir)]
         return [str(file) for file in files if file.parent.parent.name != "bin" or file.parent.name in wanted]
 
 
 class PlatformWheel(bdist_wheel):
-    """Names the wheel for its platform but for every Python: the libraries need no particular one."""
+    """Names the wheel for its platform, from the oldest system on, and for every Python."""
 
     def get_tag(self) -> tuple[str, str, str]:
         """Return the tags for Python, its ABI, and the platform."""
-        return "py3", "none", super().get_tag()[2]
+        return "py3", "none", _platform_tag(super().get_tag()[2])
 
 
 class WithLibraries(Distribution):

@@ -22,19 +22,20 @@ PROXY = (
 HOST = ("channel.c", "host.c", "host_calls.c")
 
 
-def is_supported() -> bool:
-    """Return whether units can have processes of their own on this machine: not on Windows."""
-    return host_platform() in TARGETS and not host_platform().endswith("windows")
+def is_supported(platform: "str | None" = None) -> bool:
+    """Return whether units can have processes of their own on a platform, by default this machine's: not on Windows."""
+    target = platform or host_platform()
+    return target in TARGETS and not target.endswith("windows")
 
 
-def compile_isolation() -> None:
-    """Compile what is missing or older than its sources; do nothing where it is not supported.
+def compile_isolation(platform: "str | None" = None) -> None:
+    """Compile what is missing or older than its sources, likewise; do nothing where it is not supported.
 
     Raises:
         CompilationError: the compiler failed or is missing, or the files cannot be written.
     """
-    if is_supported():
-        _libraries().compile(host_platform())
+    if is_supported(platform):
+        _libraries().compile(platform or host_platform())
 
 
 @functools.cache

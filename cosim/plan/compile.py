@@ -11,14 +11,17 @@ FOLDER = Path(__file__).parent
 SOURCES = ("carry_out.c", "cpu_clock.c", "crash_note.c", "exact_time.c", "plan.c")
 
 
-def compile_plan() -> None:
-    """Compile the library if it is missing or older than its sources; do nothing on a platform that is not a target.
+def compile_plan(platform: "str | None" = None) -> None:
+    """Compile the library for a platform, by default this machine's, if it is missing or older than its sources.
+
+    On a platform that is not a target nothing is done.
 
     Raises:
         CompilationError: the compiler failed or is missing, or the library cannot be written.
     """
-    if host_platform() in TARGETS:
-        _libraries().compile(host_platform())
+    target = platform or host_platform()
+    if target in TARGETS:
+        _libraries().compile(target)
 
 
 def plan_library() -> "Path | None":
