@@ -1,8 +1,8 @@
 """Compiles the FMI runtime and the master's plan while the package is built; all else is in pyproject.toml.
 
 The wheel has the runtime, the plan and the process of isolated units for this machine, or for the platform that the
-environment variable HANDOVER_WHEEL_PLATFORM names, by FMI 3.0's names such as `x86_64-darwin`. With HANDOVER_FMI_PLATFORMS
-it has the runtime for the platforms that this names instead.
+environment variable HANDOVER_WHEEL_PLATFORM names, by FMI 3.0's names such as `x86_64-darwin`. With
+HANDOVER_FMI_PLATFORMS it has the runtime for the platforms that this names instead.
 """
 
 import os

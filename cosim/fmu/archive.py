@@ -5,10 +5,10 @@ or be unreadable (`archive_faults`). Archives that are written have the same byt
 """
 
 import contextlib
-import io
 import os
 import re
 import stat
+import struct
 import uuid
 import zipfile
 import zlib
@@ -314,8 +314,10 @@ def _no_zip(first_bytes: bytes, kind: str) -> str:
     return f"not an {kind}: an {kind} is a zip archive, and this file is not one"
 
 
-DATE = (1980, 1, 1, 0, 0, 0)
-UNIX = 3
+_DATE = (1 << 5) | 1
+"""1 January 1980, as zip files have it."""
+_VERSION = 20
+_UNIX = 3
 """The system that created the members, so that their permissions count."""
 
 
@@ -342,20 +344,22 @@ def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
 
 
 def _packed(files: Mapping[str, bytes]) -> bytes:
-    memory = io.BytesIO()
-    archive = _Archive(memory, "w", zipfile.ZIP_DEFLATED)
+    """Return a zip file: members, their directory, its end.
+
+    Not by `zipfile`: where an exception such as Ctrl-C drops its objects within a member, Python 3.13 reports that they
+    cannot be closed.
+    """
+    members, directory = bytearray(), bytearray()
     for name in sorted(files):
-        member = zipfile.ZipInfo(name, DATE)
-        member.compress_type = zipfile.ZIP_DEFLATED
-        member.create_system = UNIX
-        member.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-        archive.writestr(member, files[name])
-    archive.close()
-    return memory.getvalue()
-
-
-class _Archive(zipfile.ZipFile):
-    """A zip file that is not closed when an exception, such as Ctrl-C, drops it: within a member, closing fails."""
-
-    def __del__(self) -> None:
-        pass
+        encoded, content = name.encode(), files[name]
+        deflate = zlib.compressobj(wbits=-zlib.MAX_WBITS)
+        packed = deflate.compress(content) + deflate.flush()
+        flags = 0 if name.isascii() else 0x800  # UTF-8
+        sizes = zlib.crc32(content), len(packed), len(content), len(encoded), 0
+        facts = struct.pack("<5H3L2H", _VERSION, flags, zipfile.ZIP_DEFLATED, 0, _DATE, *sizes)
+        mode = 0o755 if name.startswith("binaries/") else 0o644
+        place = struct.pack("<3H2L", 0, 0, 0, mode << 16, len(members))
+        directory += b"PK\1\2" + bytes([_VERSION, _UNIX]) + facts + place + encoded
+        members += b"PK\3\4" + facts + encoded + packed
+    counts = struct.pack("<4H2LH", 0, 0, len(files), len(files), len(directory), len(members), 0)
+    return bytes(members + directory + b"PK\5\6" + counts)

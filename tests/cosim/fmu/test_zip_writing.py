@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import io
 import os
 import sys
 import zipfile
@@ -13,8 +14,8 @@ import pytest
 
 from handover.cosim.fmu.archive import write_archive
 
-FILES = {"a.txt": b"a" * 100, "binaries/b": b"b" * 100}
-PLACES = ("zip_writing.py", "zipfile.py", "zipfile/__init__.py")
+FILES = {"a.txt": b"a" * 100, "binaries/b": b"b" * 100, "empty": b"", "größe.txt": bytes(range(256)) * 300}
+PLACES = ("archive.py", "zipfile.py", "zipfile/__init__.py")
 
 
 class Interrupt:
@@ -62,13 +63,25 @@ def test_an_interrupt_leaves_nothing_and_says_nothing(tmp_path: Path, monkeypatc
         left = list(tmp_path.iterdir())
         assert left in ([], [path]), at
         for file in left:  # interrupted after all was done
-            assert zipfile.ZipFile(file).testzip() is None
+            with zipfile.ZipFile(file) as archive:
+                assert archive.testzip() is None
             file.unlink()
         at += 1
     gc.collect()
     assert [value for value in said if value.exc_type is not KeyboardInterrupt] == []  # which may strike in a finalizer
     assert at > 50
     assert path.stat().st_mode & 0o777 == 0o644
+
+
+def test_the_bytes_are_those_that_pythons_zipfile_writes(tmp_path: Path):
+    expected = io.BytesIO()
+    with zipfile.ZipFile(expected, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(FILES):
+            member = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            member.compress_type, member.create_system = zipfile.ZIP_DEFLATED, 3
+            member.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(member, FILES[name])
+    assert write_archive(tmp_path / "x.fmu", FILES).read_bytes() == expected.getvalue()
 
 
 def test_a_file_is_the_same_whatever_order_its_members_come_in(tmp_path: Path):
