@@ -5,7 +5,9 @@ BIN := $(VENV)/bin
 # A test file stays in one process: what its tests share is made once.
 PARALLEL := --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-slow paper lint bench pictures install clean
+WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
+
+.PHONY: demo test test-slow paper lint bench pictures wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -33,6 +35,11 @@ bench: $(VENV)/.installed-test
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test
 	$(BIN)/python docs/pictures.py
+
+wheels: $(VENV)/bin/python
+	for platform in $(WHEELS); do \
+	    HANDOVER_WHEEL_PLATFORM=$$platform $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist . || exit; \
+	done
 
 $(VENV)/bin/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 10) and 'Python 3.10 or newer is needed; this is ' + sys.version)"

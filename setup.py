@@ -3,6 +3,9 @@
 The wheel has the runtime, the plan and the process of isolated units for this machine, or for the platform that the
 environment variable HANDOVER_WHEEL_PLATFORM names, by FMI 3.0's names such as `x86_64-darwin`. With
 HANDOVER_FMI_PLATFORMS it has the runtime for the platforms that this names instead.
+
+HANDOVER_SITE is the address below which this folder's files can be fetched, such as `https://example.org/handover`: an
+index of packages then shows the README's pictures and links. Without it they are left out there.
 """
 
 import os
@@ -54,6 +57,23 @@ def _platform_tag(default: str) -> str:
     }[system]
 
 
+def _site() -> str:
+    return os.environ.get("HANDOVER_SITE", "").rstrip("/")
+
+
+def _readme() -> str:
+    """Return the README as an index of packages shows it, which has none of the files that it links to."""
+    text = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
+    link = re.compile(r"(!?)\[([^\]]*)\]\((?![a-z]+:|#)([^)]*)\)")
+    if _site():
+        return link.sub(rf"\1[\2]({_site()}/\3)", text)
+    return link.sub(lambda found: f"*{found[2]}*" if found[1] else found[2], text)
+
+
+def _links() -> dict[str, str]:
+    return {"Homepage": _site(), "Changelog": f"{_site()}/CHANGELOG.md"} if _site() else {}
+
+
 class BuildWithLibraries(build_py):
     """Compiles C into the source tree, from where it is packed as data, or used in an editable install."""
 
@@ -92,4 +112,10 @@ class WithLibraries(Distribution):
         return True
 
 
-setup(cmdclass={"build_py": BuildWithLibraries, "bdist_wheel": PlatformWheel}, distclass=WithLibraries)
+setup(
+    cmdclass={"build_py": BuildWithLibraries, "bdist_wheel": PlatformWheel},
+    distclass=WithLibraries,
+    long_description=_readme(),
+    long_description_content_type="text/markdown",
+    project_urls=_links(),
+)

@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
 
@@ -61,6 +60,8 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool, runs
 
 def _write_of_runs(campaign: CampaignFolder) -> None:
     """Write the pages of a campaign's runs; a line for each that cannot be made."""
+    from handover.scenarios.campaign.table import CampaignTable
+
     for name in CampaignTable.read(campaign.table).column("run").tolist():
         run = RunFolder.of_run(campaign.runs / name)
         if not run.is_there:  # it was lost

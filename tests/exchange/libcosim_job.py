@@ -1,5 +1,7 @@
 """A job for libcosim and its result, by variables' names."""
 
+import ctypes
+import importlib.util
 import json
 import subprocess
 import sys
@@ -11,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from own_master import Connections, Placed
 from reference import Record
 
@@ -23,6 +26,20 @@ KINDS = {"Real": "real", "Integer": "integer", "Boolean": "boolean", "String": "
 """libcosim's words for FMI 2's types; it leaves out enumerations, saying so in its log."""
 
 Row = dict[str, float]
+
+
+def _missing() -> str:
+    """Return what libcosim lacks on this machine; empty if it runs."""
+    if importlib.util.find_spec("libcosimpy") is None:
+        return "libcosimpy has wheels for few platforms"
+    try:
+        ctypes.CDLL("libatomic.so.1")  # its wheel does not bring it
+    except OSError:
+        return "libcosim needs libatomic.so.1 (Debian: libatomic1)"
+    return ""
+
+
+needs_libcosim = pytest.mark.skipif(bool(_missing()), reason=_missing())
 
 
 @dataclass

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from ecos_command import Ecos
-from libcosim_job import Job, known
+from libcosim_job import Job, known, needs_libcosim
 from own_master import Placed
 
 from handover.cosim.master.master import Master
@@ -28,9 +28,6 @@ from handover.scenarios.cli.command import main
 
 pytestmark = pytest.mark.slow
 
-in_libcosim = pytest.mark.skipif(
-    importlib.util.find_spec("libcosimpy") is None, reason="libcosimpy has wheels for few platforms"
-)
 in_ecos = pytest.mark.skipif(
     importlib.util.find_spec("ecospy") is None or not interpreter.library(),
     reason="ecospy has wheels for few platforms, and Ecos loads only a Python with a shared library",
@@ -105,7 +102,7 @@ def verdict_of(folder: Path, name: str) -> Verdict:
     return own_verdict(exported(folder, name), name)
 
 
-@in_libcosim
+@needs_libcosim
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: Path, name: str):
     file, wanted = exported(folder, name), verdict_of(folder, name)
@@ -139,7 +136,7 @@ def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path,
     assert compared > 10
 
 
-@in_libcosim
+@needs_libcosim
 def test_libcosim_knows_no_connectors_of_pictures(folder: Path, tmp_path: Path):
     job = Job({}, None, 1, ssp=exported(folder, WITH_PICTURES))
     with pytest.raises(AssertionError, match="A valid connector type was not found"):

@@ -6,12 +6,14 @@ from pathlib import Path
 import drive
 import pytest
 import systems
-from libcosim_job import Job, without_enumerations
+from libcosim_job import Job, needs_libcosim, without_enumerations
 from own_master import Placed, run_in_our_own
 from reference import FMI2_UNITS, References, description, expect_same
 
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
+
+pytestmark = needs_libcosim
 
 LIGHT = "FreeFlyer"
 

@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from libcosim_job import Job, known
+from libcosim_job import Job, known, needs_libcosim
 from own_master import Placed
 from ssp_rows import STEP, STEPS, exported, own_rows
 
 from handover.cosim.ssp.ssp_file import SspFile
 
 
+@needs_libcosim
 @pytest.mark.slow
 def test_an_exported_scenario_in_libcosim_is_the_same_as_in_our_own_master(tmp_path: Path):
     file = exported(tmp_path)

@@ -135,7 +135,8 @@ def test_faults_of_fmi_3_are_reported(fmu: FmuOf, tmp_path: Path, old: str, new:
 
 
 def test_start_values_must_fit_the_dimensions(fmu: FmuOf, tmp_path: Path):
-    description = zipfile.ZipFile(fmu("Echo")).read("modelDescription.xml").decode()
+    with zipfile.ZipFile(fmu("Echo")) as archive:
+        description = archive.read("modelDescription.xml").decode()
     start = re.search(r'name="pair"[^>]*start="([^"]*)"', description)
     assert start
     old = f'start="{start[1]}"'

@@ -1,0 +1,107 @@
+"""The wheels for all platforms: what they are called, what they are for, and what an index shows of them."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from email import message_from_bytes
+from pathlib import Path
+
+import pytest
+from libraries import facts
+
+from handover.cosim.native_libraries import TARGETS
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[3]
+TAGS = {
+    "x86_64-linux": "manylinux_2_17_x86_64",
+    "aarch64-linux": "manylinux_2_17_aarch64",
+    "x86_64-windows": "win_amd64",
+    "x86_64-darwin": "macosx_11_0_x86_64",
+    "aarch64-darwin": "macosx_11_0_arm64",
+}
+OLDEST = {"linux": (2, 17), "windows": (), "darwin": (11, 0, 0)}
+LIBRARIES = (
+    "cosim/isolation/bin/{}/proxy",
+    "cosim/plan/bin/{}/plan",
+    "fmus/runtime/bin/{}/fmi2",
+    "fmus/runtime/bin/{}/fmi3",
+)
+SITE = "https://example.org/files"
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the sources with what builds them, `build-tools`."""
+    folder = tmp_path_factory.mktemp("checkout") / "handover"
+    ignored = shutil.ignore_patterns(".*", "bin", "build", "dist", "tests", "runs", "*.egg-info", "__pycache__")
+    shutil.copytree(ROOT, folder, symlinks=True, ignore=ignored)
+    tools = ["setuptools>=77", *re.findall(r'"(ziglang==[\d.]+)"\]', (ROOT / "pyproject.toml").read_text())]
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(folder / "build-tools"), *tools]
+    subprocess.run(command, check=True)
+    return folder
+
+
+def wheel(checkout: Path, platform: str, **environment: str) -> Path:
+    out = checkout.parent / platform
+    command = [
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--wheel-dir",
+        str(out),
+        str(checkout),
+    ]
+    names = {"PYTHONPATH": str(checkout / "build-tools"), "HANDOVER_WHEEL_PLATFORM": platform, **environment}
+    subprocess.run([sys.executable, *command], env={**os.environ, **names}, check=True)
+    (made,) = out.iterdir()
+    return made
+
+
+def test_every_platform_is_tried():
+    made = re.search(r"^WHEELS := (.*)$", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+    assert made is not None
+    assert set(TAGS) == set(TARGETS) == set(made[1].split())
+
+
+@pytest.mark.parametrize("platform", TAGS)
+def test_a_wheel_has_the_libraries_of_its_platform_and_no_others(checkout: Path, platform: str):
+    made = wheel(checkout, platform)
+    assert made.name.endswith(f"-py3-none-{TAGS[platform]}.whl")
+    system, suffix = platform.partition("-")[2], TARGETS[platform][1]
+    expected = [f"handover/{name.format(platform)}{suffix}" for name in LIBRARIES]
+    expected = [name for name in expected if system != "windows" or "isolation" not in name]
+    with zipfile.ZipFile(made) as archive:
+        assert [n for n in sorted(archive.namelist()) if n.endswith((".so", ".dll", ".dylib"))] == expected
+        assert {n.split("/bin/")[1].split("/")[0] for n in archive.namelist() if "/bin/" in n} == {platform}
+        for name in expected:
+            found = facts(archive.read(name))
+            assert found.platform == platform
+            assert found.oldest <= OLDEST[system]
+
+
+def test_an_index_shows_pictures_by_their_address_or_leaves_them_out(checkout: Path):
+    host = next(iter(TAGS))
+    pages: list[str] = []
+    for site in ("", SITE):
+        made = wheel(checkout, host, HANDOVER_SITE=site)
+        with zipfile.ZipFile(made) as archive:
+            (name,) = [n for n in archive.namelist() if n.endswith(".dist-info/METADATA")]
+            metadata = message_from_bytes(archive.read(name))
+        assert metadata["Author"] == "The handover-cosim authors"
+        assert bool(metadata["Project-URL"]) == bool(site)
+        pages.append(str(metadata.get_payload()))
+    alone, linked = pages
+    assert "](docs/" not in alone + linked
+    assert "![" not in alone
+    assert f"]({SITE}/docs/helix_handover.jpg)" in linked
+    pictures = re.findall(rf"\({SITE}/([^)]*)\)", linked)
+    assert len(pictures) > 5
+    assert [file for file in pictures if not (ROOT / file).exists()] == []
