@@ -4,7 +4,6 @@ Every FMU carries this file, as its block's packages are imported in whatever ho
 only.
 """
 
-import importlib.metadata
 import importlib.util
 import os
 import re
@@ -78,9 +77,11 @@ def _install(module: str) -> str:
 
 def _requirements() -> list[tuple[str, str]]:
     """Return distributions that this project's extras bring, each with the name of its extra."""
+    from importlib import metadata  # slow to load, here and below: the catalog imports this module
+
     try:
-        wanted = importlib.metadata.requires(_OWN) or []
-    except importlib.metadata.PackageNotFoundError:  # in an environment that only runs its FMUs
+        wanted = metadata.requires(_OWN) or []
+    except metadata.PackageNotFoundError:  # in an environment that only runs its FMUs
         return []
     parts = [(_REQUIRED.match(requirement), _EXTRA.search(requirement)) for requirement in wanted]
     return [(name[0], extra[1]) for name, extra in parts if name and extra]
@@ -89,7 +90,9 @@ def _requirements() -> list[tuple[str, str]]:
 def _distribution(module: str) -> str:
     if module in _DISTRIBUTIONS:
         return _DISTRIBUTIONS[module]
-    return next(iter(importlib.metadata.packages_distributions().get(module, [])), module)
+    from importlib import metadata
+
+    return next(iter(metadata.packages_distributions().get(module, [])), module)
 
 
 def _chain(error: BaseException | None) -> list[BaseException]:

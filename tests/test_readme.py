@@ -53,6 +53,16 @@ def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " report " in c]) == 1
 
 
+def test_the_citation_is_of_this_version():
+    cited, own = (
+        re.search(r'^version\W+([\d.]+)"?$', (ROOT / file).read_text(), flags=re.MULTILINE)
+        for file in ("CITATION.cff", "pyproject.toml")
+    )
+    assert cited is not None
+    assert own is not None
+    assert cited[1] == own[1]
+
+
 def test_the_make_targets_exist():
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
     named = set(re.findall(r"^make ([\w-]+)$", README, flags=re.MULTILINE))
