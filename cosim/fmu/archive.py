@@ -344,7 +344,7 @@ def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
 
 
 def _packed(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip file: members, their directory, its end.
+    """Return a zip file: members, their directory, its end. It takes 65,535 files, and 4 GiB of each and in all.
 
     Not by `zipfile`: where an exception such as Ctrl-C drops its objects within a member, Python 3.13 reports that they
     cannot be closed.
